@@ -1,0 +1,1 @@
+"""How good it is: suites of tasks, graders and the tables they print."""

@@ -1,0 +1,221 @@
+"""Grades positions by a task's success rule, against the true outline.
+
+The rules are those of evals/photos/README.md, written apart from the checker on purpose: a
+certificate speaks of the outline the agent measured, a grade of the one a person drew.
+Frame: pixels of the stored image, x right, y down.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
+from shapely.geometry import LineString, Polygon
+
+from ..tools.geometry.outline import FloatArray, distances
+from ..tools.geometry.sampling import min_spacing, nearest
+from .suite import Task
+
+STRICT_GAPS = (0.5, 1.5)
+"""Strict and even: each gap as a multiple of the mean gap."""
+STRICT_SHARE = 2 / 3
+"""Strict: the share of a tolerance that may be used."""
+STRICT_SPREAD = 1.25
+"""Strict and inside: spacing this much wider, coverage this much closer than the rule's."""
+
+
+@dataclass
+class Grade:
+    """What was wrong, if anything: by the rule itself, and by its strict form."""
+
+    failures: list[str] = field(default_factory=list[str])
+    strict_failures: list[str] = field(default_factory=list[str])
+
+    @property
+    def success(self) -> bool:
+        """The rule holds for every robot."""
+        return not self.failures
+
+    @property
+    def strict(self) -> bool:
+        """The rule holds, and evenness and two thirds of every tolerance too."""
+        return not self.failures and not self.strict_failures
+
+
+def grade(task: Task, positions: ArrayLike | None) -> Grade:
+    """Grade (N, 2) positions, or None where nothing was placed."""
+    result = Grade()
+    if positions is None:
+        result.failures.append("nothing was placed")
+        return result
+    points = np.asarray(positions, dtype=float).reshape(-1, 2)
+    width, height = task.size
+    if len(points) != task.robots:
+        result.failures.append(f"{len(points)} positions for {task.robots} robots")
+        return result
+    if not ((points >= 0) & (points <= (width - 1, height - 1))).all():
+        result.failures.append("a position outside the picture")
+    where = str(task.success["where"]).partition(":")[0]
+    _RULES[where](task, points, result)
+    return result
+
+
+def _limit(result: Grade, bad: bool, strict_bad: bool, text: str) -> None:
+    if bad:
+        result.failures.append(text)
+    elif strict_bad:
+        result.strict_failures.append(text)
+
+
+def _truth(task: Task) -> Polygon:
+    return Polygon(task.target.polygon, task.target.holes)
+
+
+def _boundary(task: Task, points: FloatArray, result: Grade) -> None:
+    rule, target = task.success, Polygon(task.target.polygon)
+    low, high = rule["band_px"]
+    near = float(distances(target, points).min())
+    far = float(distances(target.convex_hull, points).max())
+    _limit(result, near < low, False, f"{near:.1f} px from the target, {low} needed")
+    _limit(result, far > high, False, f"{far:.1f} px from the target, {high} allowed")
+    loop = points[_around(target, points)]
+    gaps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    widest = float(gaps.max()) if len(loop) > 1 else float("inf")
+    most = rule["max_gap_px"]
+    _limit(result, widest > most, False, f"gap of {widest:.0f} px, {most} allowed")
+    if rule.get("even") and len(loop) > 2:
+        _even(_gaps_along(target, loop, task), result)
+
+
+def _around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
+    """Order of the points along the target's convex hull."""
+    hull = LineString(shapely.get_coordinates(target.convex_hull))
+    return np.argsort(shapely.line_locate_point(hull, shapely.points(points)), kind="stable")
+
+
+def _gaps_along(target: Polygon, loop: FloatArray, task: Task) -> FloatArray:
+    """Gaps along a loop in mid band; where the picture cuts it, the widest is that cut."""
+    middle = target.buffer(max(float(np.mean(distances(target, loop))), 1.0)).exterior
+    station = np.sort(shapely.line_locate_point(middle, shapely.points(loop)))
+    gaps = np.diff(station, append=station[0] + middle.length)
+    width, height = task.size
+    frame = shapely.box(0, 0, width - 1, height - 1)
+    return gaps if frame.contains(middle) else np.sort(gaps)[:-1]
+
+
+def _even(gaps: FloatArray, result: Grade) -> None:
+    low, high = gaps.min() / gaps.mean(), gaps.max() / gaps.mean()
+    uneven = bool(low < STRICT_GAPS[0] or high > STRICT_GAPS[1])
+    _limit(result, False, uneven, f"uneven: gaps {low:.2f} to {high:.2f} of their mean")
+
+
+def _inside(task: Task, points: FloatArray, result: Grade) -> None:
+    rule, target = task.success, _truth(task)
+    depth = distances(target.boundary, points) * np.where(
+        shapely.contains_xy(target, points), 1.0, -1.0
+    )
+    least = rule["min_clearance_px"]
+    _limit(result, depth.min() < least, False, f"{depth.min():.1f} px inside, {least} needed")
+    apart = min_spacing(points)
+    floor = rule["min_spacing_px"]
+    _limit(
+        result,
+        apart < floor,
+        apart < STRICT_SPREAD * floor,
+        f"two robots {apart:.0f} px apart, {floor} needed",
+    )
+    x0, y0, x1, y1 = target.bounds
+    step = task.target.outline.size / 80
+    columns, rows = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
+    cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
+    bare = float(nearest(points, cells[shapely.contains_xy(target, cells)], 1)[0].max())
+    most = rule["max_uncovered_px"]
+    _limit(
+        result,
+        bare > most,
+        STRICT_SPREAD * bare > most,
+        f"a part {bare:.0f} px from the nearest robot, {most} allowed",
+    )
+
+
+def _corners(task: Task, points: FloatArray, result: Grade) -> None:
+    rule = task.success
+    distance = np.linalg.norm(points[:, None] - np.asarray(rule["points"])[None], axis=2)
+    worst = float(distance[linear_sum_assignment(np.maximum(distance, 1e-9) ** 4)].max())
+    most = rule["tolerance_px"]
+    _limit(
+        result,
+        worst > most,
+        worst > STRICT_SHARE * most,
+        f"{worst:.1f} px from its corner, {most} allowed",
+    )
+    near = float(distances(_truth(task), points).min())
+    low = rule.get("min_clearance_px", 0)
+    _limit(result, near <= 0 or near < low, near < 1, f"{near:.1f} px from the target")
+
+
+def _side(task: Task, points: FloatArray, result: Grade) -> None:
+    rule, target = task.success, Polygon(task.target.polygon)
+    name = rule["where"].partition(":")[2]
+    axis = 0 if name in ("top", "bottom") else 1
+    span, extent = np.ptp(points[:, axis]), np.ptp(np.asarray(task.target.polygon)[:, axis])
+    low, high = rule["band_px"]
+    clearance = distances(target, points)
+    _limit(
+        result,
+        clearance.min() < low or clearance.max() > high,
+        False,
+        f"{clearance.min():.0f} to {clearance.max():.0f} px from the target, {low}-{high} wanted",
+    )
+    most = rule["min_span_frac"]
+    _limit(result, span < most * extent, False, f"spans {span / extent:.2f}, {most} needed")
+    _limit(result, not _beyond(target, points, name), False, f"not all on the {name} side")
+    ordered = points[np.argsort(points[:, axis])]
+    _even(np.linalg.norm(np.diff(ordered, axis=0), axis=1), result)
+
+
+def _beyond(target: Polygon, points: FloatArray, name: str) -> bool:
+    """Nothing of the target lies between a robot and the picture's border on that side."""
+    far = 1e5
+    way = {"left": (-far, 0), "right": (far, 0), "top": (0, -far), "bottom": (0, far)}[name]
+    rays = shapely.linestrings(np.stack([points, points + way], axis=1))
+    return not bool(shapely.intersects(rays, target).any())
+
+
+def _line_between(task: Task, points: FloatArray, result: Grade) -> None:
+    rule = task.success
+    a, b = np.asarray(rule["points"], dtype=float)
+    along = (points - a) @ (b - a) / float((b - a) @ (b - a))
+    off = distances(LineString([a, b]), points)
+    most = rule["tolerance_px"]
+    _limit(
+        result,
+        off.max() > most,
+        off.max() > STRICT_SHARE * most,
+        f"{off.max():.1f} px off the line, {most} allowed",
+    )
+    if len(points) > 2:
+        _even(np.diff(np.sort(along)), result)
+
+
+def _center(task: Task, points: FloatArray, result: Grade) -> None:
+    most = task.success["tolerance_px"]
+    off = float(np.linalg.norm(points - np.asarray(task.success["points"][0]), axis=1).max())
+    _limit(
+        result,
+        off > most,
+        off > STRICT_SHARE * most,
+        f"{off:.1f} px from the centre, {most} allowed",
+    )
+
+
+_RULES: dict[str, Callable[[Task, FloatArray, Grade], None]] = {
+    "boundary": _boundary,
+    "inside": _inside,
+    "corners": _corners,
+    "side": _side,
+    "line_between": _line_between,
+    "center": _center,
+}

@@ -1,0 +1,1 @@
+"""The photographs that ship with formup, with outlines, tasks and success rules."""

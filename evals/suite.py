@@ -1,0 +1,123 @@
+"""Suites of photographs: pictures with outlines, tasks and success rules, read and validated.
+
+The format is described in evals/photos/README.md and published as evals/photos/schema.json;
+any folder with an annotations.json in it is a suite.
+"""
+
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+
+from ..tools.errors import InputError
+from ..tools.geometry.outline import Outline, make_outline
+
+Ring = list[list[float]]
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An annotated object: its name and outline, pixels of the stored image."""
+
+    id: str
+    name: str
+    polygon: Ring
+    holes: list[Ring]
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The outline as geometry."""
+        return make_outline(self.polygon, tuple(self.holes))
+
+
+@dataclass(frozen=True)
+class Task:
+    """One instruction on one photograph with the rule that says when it is done."""
+
+    id: str
+    instruction: str
+    robots: int
+    category: str
+    setup: str
+    image: Path
+    size: tuple[int, int]
+    target: Thing
+    success: dict[str, Any] = field(repr=False)
+    other: Thing | None = None
+
+
+def photos_folder() -> Path:
+    """The photographs that ship with formup."""
+    return Path(__file__).parent / "photos"
+
+
+def load_tasks(folder: Path | None = None) -> list[Task]:
+    """All tasks of a folder of photographs, in file order.
+
+    Args:
+        folder: holds annotations.json and the images it names; None for the shipped ones.
+
+    Raises:
+        InputError: no such file, not JSON, against the schema, or a picture or target missing.
+    """
+    root = folder or photos_folder()
+    path = root / "annotations.json"
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(
+            f"{path}: {error.strerror or error}; --data takes a folder with an annotations.json."
+        ) from None
+    except ValueError as error:
+        raise InputError(f"{path} is not JSON: {error}.") from None
+    _validate(entries, path)
+    return [task for entry in entries for task in _tasks(entry, root)]
+
+
+def _validate(entries: Any, path: Path) -> None:
+    schema = json.loads((photos_folder() / "schema.json").read_text(encoding="utf-8"))
+    validator = jsonschema.Draft202012Validator(schema)
+    problems = [
+        f"{error.json_path}: {error.message[:120]}"
+        for error in sorted(validator.iter_errors(entries), key=lambda e: e.json_path)
+    ]
+    if problems:
+        more = f" (and {len(problems) - 3} more)" if len(problems) > 3 else ""
+        raise InputError(f"{path} breaks the photos format: {'; '.join(problems[:3])}{more}.")
+
+
+def _tasks(entry: dict[str, Any], root: Path) -> list[Task]:
+    image = root / entry["image"]
+    if not image.is_file():
+        raise InputError(f"{root / 'annotations.json'} names {entry['image']}, which is not there.")
+    things = {
+        o["id"]: Thing(o["id"], o["name"], o["polygon"], o.get("holes", []))
+        for o in entry["objects"]
+    }
+    tasks: list[Task] = []
+    for task in entry["tasks"]:
+        named = [task["target"], *filter(None, [task["success"].get("other")])]
+        missing = [name for name in named if name not in things]
+        if missing:
+            raise InputError(
+                f"Task {task['id']} names the target {missing[0]!r}, which is not "
+                f"among its picture's objects: {', '.join(things)}."
+            )
+        tasks.append(
+            Task(
+                id=task["id"],
+                instruction=task["instruction"],
+                robots=task["robots"],
+                category=task["category"],
+                setup=task["setup"],
+                image=image,
+                size=(entry["width"], entry["height"]),
+                target=things[task["target"]],
+                success=task["success"],
+                other=things[named[1]] if len(named) > 1 else None,
+            )
+        )
+    return tasks

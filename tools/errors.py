@@ -1,0 +1,33 @@
+"""Every exception formup raises on purpose, so that callers can catch one or all.
+
+FormupError
+├── InputError     a person gave something that cannot be used; the text says what would do
+│   └── ImageError     the picture file: missing, broken, too large, of a foreign format
+├── ToolError      a model asked a tool for something it cannot do; goes back to the model
+├── ModelError     a model or its provider failed, or does not exist
+└── FleetError     robots could not be moved or observed
+"""
+
+
+class FormupError(Exception):
+    """Base of all errors whose message is meant to be read by a person or a model."""
+
+
+class InputError(FormupError):
+    """Bad input from a person: the message names the value, what is allowed, what to do."""
+
+
+class ImageError(InputError):
+    """A picture that cannot be loaded safely."""
+
+
+class ToolError(FormupError):
+    """A tool cannot do what its arguments ask; the model is told why and may repair."""
+
+
+class ModelError(FormupError):
+    """A model, or the service behind it, could not answer."""
+
+
+class FleetError(FormupError):
+    """The fleet could not be reached, moved or observed."""

@@ -1,0 +1,1 @@
+"""Plan to observed poses: the fleets that move robots, and arrival as it was observed."""

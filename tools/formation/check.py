@@ -1,0 +1,242 @@
+"""The checker: positions against a contract, every violation at once, with numbers.
+
+It measures with exact distances on float polygons and trusts nothing about where the
+positions came from. Frame: image pixels, x right, y down; robots count from 1 over all groups.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+
+from ..geometry.outline import FloatArray, distances
+from ..geometry.sampling import coverage_radius, inside, min_spacing
+from . import spacing
+from .contract import CENTRE_SHARE, Contract
+from .place import Site, reference_curve
+from .verdict import TOLERANCE, Audit, Part, Verdict, parts_of
+
+SPACING_SHARE, COVER_SHARE = 0.6, 1.4
+"""inside, even: against a Lloyd tessellation of the same region at least this share of its
+smallest spacing, at most this multiple of its coverage radius."""
+LINE_SHARE = 0.03
+"""How far off a straight line a robot may stand, as a share of the line's length."""
+
+
+def certify(positions: ArrayLike, contract: Contract, site: Site) -> Verdict:
+    """Check positions against a contract whose defaults are written out.
+
+    Args:
+        positions: (N, 2) image pixels, robots in order over all groups.
+        contract: what they must satisfy.
+        site: outlines of every target the contract names, and the picture's size.
+    """
+    audit = Audit()
+    points = np.asarray(positions, dtype=float).reshape(-1, 2)
+    if len(points) != contract.robots:
+        text = f"The contract wants {contract.robots} positions; {len(points)} were given."
+        audit.whole("count", len(points), contract.robots, text, "robots")
+        return audit.verdict()
+    for i in np.flatnonzero(~np.isfinite(points).all(axis=1)):
+        audit.robot("not_finite", int(i), 0.0, 0.0, "has a coordinate that is no finite number")
+    if audit.findings:
+        return audit.verdict()
+    if len(points) > 1:
+        audit.least("min_spacing_px", min_spacing(points))
+    _bounds(points, contract, site, audit)
+    _crowding(points, contract, audit)
+    _keep_out(points, contract, site, audit)
+    for part in parts_of(contract, points, site):
+        _RULES[part.group.relation](part, audit)
+    return audit.verdict()
+
+
+def _bounds(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
+    radius = contract.robot_radius
+    far = np.array([site.width - 1 - radius, site.height - 1 - radius])
+    room = np.minimum(points - radius, far - points).min(axis=1)
+    for i in np.flatnonzero(room < -TOLERANCE):
+        text = f"is {-room[i]:.1f} px outside the part of the picture robots may stand in"
+        audit.robot("out_of_picture", int(i), -room[i], 0.0, text)
+
+
+def _crowding(points: FloatArray, contract: Contract, audit: Audit) -> None:
+    """Pairs of robots nearer than either one's group allows, each pair once."""
+    from scipy.spatial import cKDTree
+
+    least = np.concatenate(
+        [np.full(g.robots, g.min_spacing or contract.spacing_floor) for g in contract.groups]
+    )
+    pairs = cKDTree(points).query_pairs(max(least.max() - TOLERANCE, 0), output_type="ndarray")
+    for i, j in pairs[np.lexsort(pairs.T[::-1])]:
+        apart, needed = np.linalg.norm(points[i] - points[j]), float(max(least[i], least[j]))
+        if apart < needed - TOLERANCE:
+            text = f"is {apart:.1f} px from robot {i + 1}; {needed:.1f} px or more are needed"
+            audit.robot("too_close", int(j), float(apart), needed, text)
+
+
+def _keep_out(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
+    for name in contract.keep_out:
+        distance = distances(site.outlines[name].filled, points)
+        for i in np.flatnonzero(distance <= contract.robot_radius):
+            audit.robot(
+                "keep_out",
+                int(i),
+                distance[i],
+                contract.robot_radius,
+                f"stands on {name}, which is to be kept out of",
+            )
+
+
+def _outside(part: Part, audit: Audit) -> None:
+    """Robots stand off the filled outline, their edges within the clearance range.
+
+    At corners the distance to the corner is the upper limit: rounded outlines fall short of it.
+    """
+    distance = distances(part.outline.filled, part.points)
+    clearance = distance - part.radius
+    least, greatest = part.clearance
+    audit.least("min_clearance_px", clearance.min())
+    audit.greatest("max_clearance_px", clearance.max())
+    name = part.group.targets[0]
+    for i, value in enumerate(clearance, start=part.first):
+        if distance[i - part.first] <= 0:
+            audit.robot("on_target", i, 0.0, least, f"stands on {name}")
+        elif value < least - TOLERANCE:
+            audit.robot(
+                "too_near",
+                i,
+                value,
+                least,
+                f"is {value:.1f} px from {name}; {least:.1f} px or more are needed",
+            )
+        elif value > greatest + TOLERANCE and part.group.relation != "corners":
+            audit.robot(
+                "too_far",
+                i,
+                value,
+                greatest,
+                f"is {value:.1f} px from {name}; {greatest:.1f} px at most are allowed",
+            )
+
+
+def _around(part: Part, audit: Audit) -> None:
+    _outside(part, audit)
+    curve = reference_curve(part.group, part.site, part.radius)
+    if not curve.closed:
+        share = curve.length / curve.whole_length
+        audit.least("ring_in_picture", share)
+        audit.notes.append(
+            f"Only {share:.0%} of the ring lies inside the picture; the robots spread over that."
+        )
+    if part.group.relation == "cage":
+        spacing.enclosure(part, curve, audit)
+    if part.group.spacing == "even":
+        spacing.evenness(part, curve, audit)
+
+
+def _along(part: Part, audit: Audit) -> None:
+    _outside(part, audit)
+    curve = reference_curve(part.group, part.site, part.radius)
+    if curve.length < 0.995 * curve.whole_length:
+        share = curve.length / curve.whole_length
+        audit.notes.append(
+            f"Only {share:.0%} of that side lies inside the picture; the robots spread over that."
+        )
+    reach = max(0.1 * part.outline.size, part.clearance[1] - part.clearance[0])
+    spacing.on_curve(part, curve, reach, "the side asked for", audit)
+    if part.group.spacing == "even":
+        spacing.evenness(part, curve, audit)
+
+
+def _line(part: Part, audit: Audit) -> None:
+    for name in part.group.targets:
+        distance = distances(part.site.outlines[name].filled, part.points)
+        for i in np.flatnonzero(distance <= part.radius):
+            audit.robot("on_target", part.first + int(i), 0.0, part.radius, f"stands on {name}")
+    if part.group.relation == "shape" and part.group.line is None:
+        audit.notes.append("A free shape: bounds, spacing and named targets were checked.")
+        return
+    curve = reference_curve(part.group, part.site, part.radius)
+    spacing.on_curve(part, curve, max(LINE_SHARE * curve.whole_length, 2.0), "the line", audit)
+    if part.group.spacing == "even":
+        spacing.evenness(part, curve, audit)
+
+
+def _corners(part: Part, audit: Audit) -> None:
+    _outside(part, audit)
+    spacing.corner_matching(part, audit)
+
+
+def _inside(part: Part, audit: Audit) -> None:
+    polygon, name = part.outline.polygon, part.group.targets[0]
+    sign = np.where(shapely.intersects_xy(polygon, part.points), 1.0, -1.0)
+    depth = sign * distances(polygon.boundary, part.points) - part.radius
+    least = part.clearance[0]
+    audit.least("min_clearance_px", depth.min())
+    for i in np.flatnonzero(depth < least - TOLERANCE):
+        where = "outside" if sign[i] < 0 else f"{depth[i]:.1f} px from the edge of"
+        audit.robot(
+            "not_inside",
+            part.first + int(i),
+            depth[i],
+            least,
+            f"is {where} {name}; it must be {least:.1f} px or more inside",
+        )
+    if part.group.spacing == "even" and len(part.points) > 1:
+        _evenly_inside(part, audit)
+
+
+def _evenly_inside(part: Part, audit: Audit) -> None:
+    margin, floor = part.clearance[0] + part.radius, part.group.min_spacing or 0.0
+    ideal = inside(part.outline, part.group.robots, margin, floor)
+    apart, cover = min_spacing(part.points), coverage_radius(part.outline, part.points)
+    ideal_apart = min_spacing(ideal) if len(ideal) > 1 else 0.0
+    audit.greatest("coverage_radius_px", cover)
+    if ideal_apart:
+        audit.least("spacing_ratio", apart / ideal_apart)
+    least = SPACING_SHARE * ideal_apart
+    most = COVER_SHARE * coverage_radius(part.outline, ideal) if len(ideal) else np.inf
+    if apart < least - TOLERANCE:
+        audit.whole(
+            "uneven",
+            apart,
+            least,
+            f"The closest two robots inside are {apart:.1f} px apart; even spreading "
+            f"needs {least:.1f} px or more.",
+        )
+    if cover > most + TOLERANCE:
+        audit.whole(
+            "uncovered",
+            cover,
+            most,
+            f"Part of the target is {cover:.1f} px from the nearest robot; even "
+            f"spreading allows {most:.1f} px.",
+        )
+
+
+def _centre(part: Part, audit: Audit) -> None:
+    distance = np.linalg.norm(part.points - part.outline.centre, axis=1)
+    most = CENTRE_SHARE * part.outline.size
+    audit.greatest("max_from_centre_px", distance.max())
+    for i in np.flatnonzero(distance > most + TOLERANCE):
+        audit.robot(
+            "off_centre",
+            part.first + int(i),
+            distance[i],
+            most,
+            f"is {distance[i]:.1f} px from the centre; {most:.1f} px at most are allowed",
+        )
+
+
+_RULES: dict[str, Callable[[Part, Audit], None]] = {
+    "around": _around,
+    "cage": _around,
+    "along": _along,
+    "corners": _corners,
+    "inside": _inside,
+    "between": _line,
+    "shape": _line,
+    "centre": _centre,
+}

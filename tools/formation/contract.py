@@ -1,0 +1,185 @@
+"""What an instruction demands of a formation, in a form code can check.
+
+A model (or a person) writes a Contract before anything is placed; the checker certifies
+positions against it. Lengths are pixels of the picture; clearances are measured from the
+outline to the robot's edge, so a robot of radius r keeps its centre r further away.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ..geometry.outline import Outline
+
+MAX_ROBOTS = 10_000
+MIN_SPACING = 2.0
+"""Centres of point robots nearer than this, px, are the same place."""
+CLEARANCE_SHARE, MIN_CLEARANCE = 0.16, 6.0
+"""Default clearance: this share of the target's size (square root of its area), at least 6 px."""
+CORNER_SHARE, MIN_STANDOFF = 0.045, 3.0
+INSIDE_SHARE = 0.03
+CENTRE_SHARE = 0.2
+
+Relation = Literal["around", "cage", "corners", "along", "inside", "between", "centre", "shape"]
+SideName = Literal["left", "right", "top", "bottom", "long", "short"]
+Length = Annotated[float, Field(ge=0, le=100_000, allow_inf_nan=False)]
+OUTSIDE: frozenset[str] = frozenset({"around", "cage", "corners", "along"})
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Group(_Frozen):
+    """One arrangement of some of the robots."""
+
+    relation: Relation = Field(
+        description="around: even ring; cage: closed even ring; corners: one per corner; along: "
+        "beside one side or chosen edges; inside: spread evenly over the target; between: two "
+        "targets; centre: gathered at the target's centre; shape: a line or free positions."
+    )
+    targets: tuple[str, ...] = Field(
+        default=(), max_length=2, description="Target ids such as t1; two for between, else one."
+    )
+    robots: int = Field(ge=1, le=MAX_ROBOTS, description="How many robots form this group.")
+    clearance: tuple[Length, Length] | None = Field(
+        default=None,
+        description="Least and greatest distance, px, from the target's outline to the robot's "
+        "edge (inside: from the edge inward). Leave out for the default.",
+    )
+    spacing: Literal["even", "free"] = Field(
+        default="even", description="Whether neighbours must be evenly spaced."
+    )
+    min_spacing: Length | None = Field(
+        default=None, description="Least distance of two robots' centres, px."
+    )
+    max_gap: Length | None = Field(
+        default=None, description="cage: widest opening allowed between neighbours' edges, px."
+    )
+    side: SideName | None = Field(
+        default=None,
+        description="along: side of the target in the picture, or its long/short side.",
+    )
+    edges: tuple[int, ...] | None = Field(
+        default=None, description="along: edge numbers from describe_shape, instead of a side."
+    )
+    layout: Literal["line", "divider"] = Field(
+        default="line",
+        description="between: a line that joins the targets, or a divider that parts them.",
+    )
+    line: tuple[float, float, float, float] | None = Field(
+        default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free."
+    )
+    closure: Literal["ring"] | None = Field(
+        default=None, description="cage: ring = even and closed (the default)."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        problems: list[str] = []
+        wanted = {"between": 2, "shape": 0}.get(self.relation, 1)
+        if len(self.targets) != wanted and not (self.relation == "shape" and self.targets):
+            problems.append(f"{self.relation} takes {wanted} target(s), got {len(self.targets)}")
+        if self.relation == "along" and (self.side is None) == (self.edges is None):
+            problems.append("along takes either a side or edges")
+        if self.clearance is not None and self.clearance[0] > self.clearance[1]:
+            problems.append(f"clearance {self.clearance} must be (least, greatest)")
+        for name, only in (
+            ("side", "along"),
+            ("edges", "along"),
+            ("max_gap", "cage"),
+            ("closure", "cage"),
+            ("line", "shape"),
+        ):
+            if getattr(self, name) is not None and self.relation != only:
+                problems.append(f"{name} belongs to {only}, not to {self.relation}")
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+
+class Contract(_Frozen):
+    """All groups of a formation; robots are numbered through them in order, from 1."""
+
+    groups: tuple[Group, ...] = Field(min_length=1, max_length=50)
+    robot_radius: Length = Field(default=0.0, description="Radius of a robot, px; 0 is a point.")
+    keep_out: tuple[str, ...] = Field(default=(), description="Further targets no robot may touch.")
+
+    @property
+    def robots(self) -> int:
+        """Robots over all groups."""
+        return sum(group.robots for group in self.groups)
+
+    @property
+    def target_ids(self) -> tuple[str, ...]:
+        """Every target named, once, in order."""
+        named = [t for group in self.groups for t in group.targets] + list(self.keep_out)
+        return tuple(dict.fromkeys(named))
+
+    @property
+    def spacing_floor(self) -> float:
+        """Least distance of any two robots' centres, px: bodies must not overlap."""
+        return max(2 * self.robot_radius, MIN_SPACING)
+
+
+def with_defaults(
+    contract: Contract, outlines: Mapping[str, Outline], room: tuple[float, float]
+) -> Contract:
+    """The contract with every length it leaves open written out, so that all can be read.
+
+    Args:
+        contract: as stated.
+        outlines: of every target it names.
+        room: width and height of the picture, px.
+    """
+    groups = tuple(
+        group.model_copy(update=_defaults(group, outlines, room, contract))
+        for group in contract.groups
+    )
+    return contract.model_copy(update={"groups": groups})
+
+
+def nominal(clearance: tuple[float, float]) -> float:
+    """The clearance aimed at within an allowed range: the geometric mean, px."""
+    least, greatest = clearance
+    return math.sqrt(least * greatest) if least > 0 else greatest / 2
+
+
+def default_clearance(outline: Outline, room: tuple[float, float], radius: float) -> float:
+    """0.16 of the target's size, at least 6 px, no more than the picture has room for."""
+    x0, y0, x1, y1 = outline.bounds
+    widest = max(x0, y0, room[0] - 1 - x1, room[1] - 1 - y1) - 2 * radius
+    return min(max(CLEARANCE_SHARE * outline.size, MIN_CLEARANCE), max(0.6 * widest, 1.0))
+
+
+def _defaults(
+    group: Group, outlines: Mapping[str, Outline], room: tuple[float, float], contract: Contract
+) -> dict[str, object]:
+    update: dict[str, object] = {}
+    if group.min_spacing is None or group.min_spacing < contract.spacing_floor:
+        update["min_spacing"] = contract.spacing_floor
+    if group.relation == "cage" and group.closure is None:
+        update["closure"] = "ring"
+    if group.clearance is None and group.targets:
+        outline = outlines[group.targets[0]]
+        update["clearance"] = _default_range(group, outline, room, contract.robot_radius)
+    return update
+
+
+def _default_range(
+    group: Group, outline: Outline, room: tuple[float, float], radius: float
+) -> tuple[float, float] | None:
+    if group.relation in ("around", "cage", "along"):
+        aim = default_clearance(outline, room, radius)
+        return (aim / 2, aim * 2)
+    if group.relation == "corners":
+        aim = max(CORNER_SHARE * outline.size, MIN_STANDOFF)
+        return (aim / 3, aim * 3)
+    if group.relation == "inside":
+        least = min(INSIDE_SHARE * outline.size, 0.1 * outline.min_width)
+        return (least, outline.size)
+    if group.relation == "centre":
+        return (0.0, outline.size)
+    return None

@@ -1,0 +1,140 @@
+"""From where robots are to where they shall stand: who goes where, and on which path.
+
+Assignment is least sum of squared distances (the condition of CAPT, Turpin et al. 2014); paths
+are shortest ones around the targets on a visibility graph (Lozano-Perez and Wesley 1979).
+Frame: image pixels. Robots do not yet avoid each other.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from ..geometry.curves import Frame
+from ..geometry.outline import FloatArray, distances
+from .contract import Contract
+from .place import Site
+
+MAX_NODES = 60
+"""Vertices kept of an obstacle: enough for a path within a percent of the shortest."""
+ROOM_SHARE = 0.7
+"""How much of the smallest clearance at starts and goals paths keep on their way."""
+
+
+def assign(starts: FloatArray, goals: FloatArray) -> NDArray[np.intp]:
+    """For each goal the index of the robot that takes it, by least sum of squared distances.
+
+    Args:
+        starts: (n, 2).
+        goals: (n, 2).
+    """
+    from scipy.optimize import linear_sum_assignment
+    from scipy.spatial.distance import cdist
+
+    # The optimum does not change when all goals move together; aligned sets solve faster.
+    shift = starts.mean(axis=0) - goals.mean(axis=0)
+    goal, robot = linear_sum_assignment(cdist(goals + shift, starts, "sqeuclidean"))
+    return np.asarray(robot[np.argsort(goal)], dtype=np.intp)
+
+
+def obstacles(contract: Contract, site: Site) -> BaseGeometry:
+    """What robots have to drive around: targets no group of the contract stands on."""
+    entered = {t for g in contract.groups if g.relation in ("inside", "centre") for t in g.targets}
+    solid = [site.outlines[t].filled for t in contract.target_ids if t not in entered]
+    return shapely.union_all(np.asarray(solid, dtype=object)) if solid else Polygon()
+
+
+def routes(
+    starts: FloatArray, goals: FloatArray, solid: BaseGeometry, radius: float, frame: Frame
+) -> list[FloatArray]:
+    """Shortest paths that keep robots of a radius off the obstacles, start i to goal i.
+
+    Paths stay in the frame where they can, and leave it only where there is no other way.
+
+    Args:
+        starts, goals: (n, 2), off the obstacles.
+        solid: the obstacles' union.
+        radius: of a robot, px.
+        frame: the picture.
+
+    Returns:
+        n polylines, (k, 2) each.
+    """
+    straight = shapely.linestrings(np.stack([starts, goals], axis=1))
+    paths = list(np.stack([starts, goals], axis=1))
+    if solid.is_empty:
+        return paths
+    near = float(min(distances(solid, starts).min(), distances(solid, goals).min()))
+    keep = radius + max(ROOM_SHARE * (near - radius), 0.0) if near > radius else 0.99 * near
+    barrier = solid.buffer(keep * 0.999)
+    shapely.prepare(barrier)
+    blocked = np.flatnonzero(shapely.intersects(straight, barrier))
+    if not len(blocked):
+        return paths
+    nodes = _nodes(solid, keep)
+    inside = shapely.intersects_xy(frame.box, nodes)
+    for graph in (_Visibility(nodes[inside], barrier), _Visibility(nodes, barrier)):
+        for i in blocked:
+            if len(paths[i]) == 2:
+                paths[i] = graph.path(starts[i], goals[i])
+    return paths
+
+
+def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
+    """Where robots are when each has covered its share of its path, (n, 2)."""
+    places = [_interpolated(path, float(share)) for path, share in zip(paths, shares, strict=True)]
+    return np.stack(places)
+
+
+def _interpolated(path: FloatArray, share: float) -> FloatArray:
+    if not np.ptp(path, axis=0).any():
+        return path[-1]
+    return shapely.get_coordinates(LineString(path).interpolate(share, normalized=True))[0]
+
+
+def _nodes(solid: BaseGeometry, keep: float) -> FloatArray:
+    """Corners to bend around: the vertices of the obstacles grown a little past the barrier."""
+    grown = solid.buffer(keep, quad_segs=2).buffer(0.02 * keep + 0.05, join_style="mitre")
+    tolerance = 0.0
+    coordinates = shapely.get_coordinates(grown)
+    while len(coordinates) > MAX_NODES:
+        tolerance = max(1.5 * tolerance, 0.25)
+        wider = solid.buffer(keep + 1.1 * tolerance, quad_segs=2)
+        coordinates = shapely.get_coordinates(wider.simplify(tolerance))
+    return np.unique(coordinates, axis=0)
+
+
+class _Visibility:
+    """All-pairs shortest paths among nodes that see each other past a barrier."""
+
+    def __init__(self, nodes: FloatArray, barrier: BaseGeometry) -> None:
+        from scipy.sparse.csgraph import shortest_path
+
+        self._nodes, self._barrier = nodes, barrier
+        if not len(nodes):
+            return
+        lengths = np.stack([self._sight(node) for node in nodes])
+        self._length, self._before = shortest_path(lengths, return_predecessors=True)
+
+    def path(self, start: FloatArray, goal: FloatArray) -> FloatArray:
+        """The shortest path, or the straight line where none is found."""
+        if not len(self._nodes):
+            return np.stack([start, goal])
+        total = self._sight(start)[:, None] + self._length + self._sight(goal)[None, :]
+        first, last = np.unravel_index(int(np.argmin(total)), total.shape)
+        if not np.isfinite(total[first, last]):
+            return np.stack([start, goal])
+        chain = [int(last)]
+        while chain[-1] != first:
+            chain.append(int(self._before[first, chain[-1]]))
+        return np.concatenate([[start], self._nodes[chain[::-1]], [goal]])
+
+    def _sight(self, point: FloatArray) -> FloatArray:
+        """Distance to every node that is seen from a point, infinite to the others."""
+        ends = np.broadcast_to(point, self._nodes.shape)
+        lines = shapely.linestrings(np.stack([ends, self._nodes], axis=1))
+        distance = np.linalg.norm(self._nodes - point, axis=1)
+        return np.where(shapely.intersects(lines, self._barrier), np.inf, distance)

@@ -1,0 +1,168 @@
+"""Positions that satisfy a contract, computed from it alone.
+
+Each relation has one reference (a curve, corners, a region, a point) that the checker also
+measures against. Frame: image pixels, x right, y down.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+
+from ..errors import ToolError
+from ..geometry.curves import Curve, Frame, edge_curve, ring, segment, side
+from ..geometry.outline import FloatArray, Outline
+from ..geometry.sampling import (
+    along_curve,
+    around_point,
+    at_corners,
+    inside,
+    min_spacing,
+)
+from .contract import CENTRE_SHARE, Contract, Group, nominal
+
+DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
+
+
+@dataclass(frozen=True)
+class Site:
+    """What positions are judged in: the targets' outlines and the picture's size, px."""
+
+    outlines: Mapping[str, Outline]
+    width: float
+    height: float
+
+    @property
+    def room(self) -> tuple[float, float]:
+        """Width and height, px."""
+        return self.width, self.height
+
+    def frame(self, radius: float) -> Frame:
+        """Where robots of a radius stand wholly inside the picture."""
+        return Frame(self.width, self.height, radius)
+
+
+class CapacityError(ToolError):
+    """A group has more robots than its place holds."""
+
+    def __init__(self, group: Group, fits: int, why: str) -> None:
+        noun = "robot fits" if fits == 1 else "robots fit"
+        super().__init__(f"{group.robots} robots were asked for but only {fits} {noun}: {why}.")
+        self.fits = fits
+        self.group = group
+
+
+def place(contract: Contract, site: Site) -> FloatArray:
+    """Positions of all robots, groups in order, (N, 2).
+
+    Args:
+        contract: with its defaults written out.
+        site: the outlines of every target named, and the picture.
+
+    Raises:
+        CapacityError: a group has more robots than fit; its `fits` says how many do.
+        ToolError: the contract leaves positions to the caller (a free shape).
+    """
+    parts = [_place_group(group, site, contract.robot_radius) for group in contract.groups]
+    return np.concatenate(parts)
+
+
+def reference_curve(group: Group, site: Site, radius: float) -> Curve:
+    """The curve a ring, side, line or between group stands on."""
+    frame = site.frame(radius)
+    if group.relation == "shape":
+        ends = np.asarray(group.line or (0, 0, 0, 0), dtype=float).reshape(2, 2)
+        return segment(ends[0], ends[1], frame)
+    if group.relation == "between":
+        return _between(group, site, frame)
+    outline = site.outlines[group.targets[0]]
+    assert group.clearance is not None
+    offset = nominal(group.clearance) + radius
+    if group.relation != "along":
+        return ring(outline, offset, frame, keep=group.clearance[0] + radius)
+    if group.edges is not None:
+        return edge_curve(outline, group.edges, offset, frame)
+    return side(outline, side_direction(group, outline, site), offset, frame)
+
+
+def side_direction(group: Group, outline: Outline, site: Site) -> tuple[float, float]:
+    """Outward vector of a group's side; of the two long (short) sides the one with more room."""
+    name = group.side or "bottom"
+    if name in DIRECTIONS:
+        return DIRECTIONS[name]
+    unit = outline.long_axis[0]
+    normal = np.array([-unit[1], unit[0]]) if name == "long" else unit
+    reach = (outline.long_axis[2] if name == "long" else outline.long_axis[1]) / 2
+    middle = shapely.get_coordinates(outline.polygon.centroid)[0]
+
+    def room(way: FloatArray) -> float:
+        x, y = middle + way * reach * 1.2
+        return min(x, y, site.width - 1 - x, site.height - 1 - y)
+
+    best = max((normal, -normal), key=room)
+    return float(best[0]), float(best[1])
+
+
+def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
+    n, spacing = group.robots, group.min_spacing or 0.0
+    if group.relation == "shape" and group.line is None:
+        raise ToolError("A free shape has no places of its own: give the positions.")
+    if group.relation in ("corners", "inside", "centre"):
+        points, why = _place_at_target(group, site, radius)
+    else:
+        curve = reference_curve(group, site, radius)
+        points = _fit(curve, n, spacing)
+        why = f"the {curve.length:.0f} px that are left to stand on allow no more at {spacing:g} px"
+    if len(points) < n:
+        raise CapacityError(group, len(points), why)
+    return points
+
+
+def _place_at_target(group: Group, site: Site, radius: float) -> tuple[FloatArray, str]:
+    outline = site.outlines[group.targets[0]]
+    assert group.clearance is not None
+    n, spacing = group.robots, group.min_spacing or 0.0
+    if group.relation == "corners":
+        standoff = nominal(group.clearance) + radius
+        return at_corners(outline, n, standoff), "the target has no more corners"
+    if group.relation == "inside":
+        points = inside(outline, n, group.clearance[0] + radius, spacing)
+        return points, f"spaced {spacing:g} px and {group.clearance[0]:.1f} px from the edge"
+    pitch = max(spacing * 1.05, min(0.1 * outline.size, CENTRE_SHARE * outline.size / n**0.5))
+    points = around_point(outline.centre, n, pitch)
+    reach = np.linalg.norm(points - outline.centre, axis=1) <= CENTRE_SHARE * outline.size
+    return points[reach], f"within {CENTRE_SHARE * outline.size:.0f} px of the centre"
+
+
+def _fit(curve: Curve, n: int, spacing: float) -> FloatArray:
+    """Evenly along the curve; if n are too tight, as many as are not."""
+    points = along_curve(curve, n)
+    count = min(n, int(curve.length / spacing) + 1) if spacing > 0 else n
+    while len(points) > 1 and min_spacing(points) < spacing * (1 - 1e-6):
+        points = along_curve(curve, max(count, 1))
+        count = min(count - 1, int(count * 0.99))
+    return points
+
+
+def _between(group: Group, site: Site, frame: Frame) -> Curve:
+    """The gap between two targets: joined along their centroids, or parted across the middle."""
+    first, second = (site.outlines[t] for t in group.targets)
+    ends = [shapely.get_coordinates(o.filled.centroid)[0] for o in (first, second)]
+    free = LineString(ends).difference(shapely.union(first.filled, second.filled))
+    pieces = [g for g in shapely.get_parts(free) if isinstance(g, LineString)]
+    if not pieces:
+        raise ToolError("The two targets touch or overlap: nothing lies between them.")
+    a, b = shapely.get_coordinates(max(pieces, key=lambda g: g.length))
+    if group.layout == "line":
+        inset = (b - a) / (group.robots + 1)
+        return segment(a + inset, b - inset, frame)
+    across = np.array([-(b - a)[1], (b - a)[0]]) / np.linalg.norm(b - a)
+    middle = (a + b) / 2
+    spans = [(shapely.get_coordinates(o.filled) - middle) @ across for o in (first, second)]
+    low, high = max(s.min() for s in spans), min(s.max() for s in spans)
+    if high - low < 0.3 * min(np.ptp(s) for s in spans):
+        low, high = min(s.min() for s in spans), max(s.max() for s in spans)
+    start, end = sorted((middle + low * across, middle + high * across), key=lambda p: (p[1], p[0]))
+    return segment(start, end, frame)

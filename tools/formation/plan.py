@@ -1,0 +1,90 @@
+"""A certified formation as a value that can be stored, approved by its id, and deployed.
+
+The id is a hash of what would be driven to and why: positions, contract, robot radius and the
+scene version. Whoever approves an id approves exactly that; a changed scene voids the plan.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict
+
+from ..geometry.outline import FloatArray
+from .check import certify
+from .contract import Contract, with_defaults
+from .place import Site, place
+from .verdict import Verdict
+
+DECIMALS = 3
+"""Positions are rounded to this many places of a pixel before they are certified."""
+
+Point = tuple[float, float]
+
+
+class Formation(BaseModel):
+    """N positions in robot order with the contract they are meant to satisfy."""
+
+    model_config = ConfigDict(frozen=True)
+
+    positions: tuple[Point, ...]
+    contract: Contract
+    scene_version: str
+
+    @property
+    def id(self) -> str:
+        """The content hash that names the plan, `p-` and 10 hex digits."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+        return "p-" + hashlib.sha256(text.encode()).hexdigest()[:10]
+
+    @property
+    def points(self) -> FloatArray:
+        """Positions, (N, 2), image pixels."""
+        return np.asarray(self.positions, dtype=float).reshape(-1, 2)
+
+
+class Plan(BaseModel):
+    """A formation with its verdict; only a certified one may be deployed."""
+
+    model_config = ConfigDict(frozen=True)
+
+    formation: Formation
+    verdict: Verdict
+
+    @property
+    def id(self) -> str:
+        """The formation's content hash."""
+        return self.formation.id
+
+
+def make_plan(
+    contract: Contract, site: Site, scene_version: str, positions: ArrayLike | None = None
+) -> Plan:
+    """Write out the contract's defaults, place the robots unless placed, and certify.
+
+    Args:
+        contract: as stated.
+        site: outlines of every target it names, and the picture's size.
+        scene_version: of the scene the outlines were measured in.
+        positions: (N, 2) image pixels, robots in order over all groups; None to place them here.
+
+    Raises:
+        ToolError: no positions were given and the contract cannot be satisfied.
+    """
+    full = with_defaults(contract, site.outlines, site.room)
+    points = place(full, site) if positions is None else np.asarray(positions, dtype=float)
+    rounded = np.round(points.reshape(-1, 2), DECIMALS) + 0.0  # + 0.0: no negative zeros
+    formation = Formation(
+        positions=tuple((float(x), float(y)) for x, y in rounded),
+        contract=full,
+        scene_version=scene_version,
+    )
+    return Plan(formation=formation, verdict=certify(rounded, full, site))
+
+
+def scene_version(picture_sha256: str, outlines: Mapping[str, object]) -> str:
+    """Hash of what a certificate depends on: the picture and every outline in it."""
+    text = json.dumps([picture_sha256, dict(sorted(outlines.items()))], separators=(",", ":"))
+    return "s-" + hashlib.sha256(text.encode()).hexdigest()[:10]

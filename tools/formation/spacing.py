@@ -1,0 +1,163 @@
+"""How robots are spread along the curve or over the corners a contract refers to."""
+
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString, Polygon
+
+from ..geometry.curves import Curve
+from ..geometry.outline import FloatArray, distances
+from ..geometry.sampling import corner_points
+from .verdict import TOLERANCE, Audit, Part
+
+WIDEST, NARROWEST = 1.5, 0.5
+"""Even spacing: a gap between neighbours as a multiple of the mean gap."""
+CORNER_SHARE = 0.15
+"""How far from its corner a robot may stand, as a share of the target's size."""
+
+
+def evenness(part: Part, curve: Curve, audit: Audit) -> None:
+    """Gaps between neighbours, measured along the curve, against their mean."""
+    if len(part.points) < 2 or curve.length <= 0:
+        return
+    gaps, pairs, ends = _gaps(part, curve)
+    mean = float(np.mean(gaps or [curve.length]))
+    if gaps:
+        audit.least("spacing_ratio", min(gaps) / mean)
+        audit.greatest("worst_gap_px", max(gaps))
+    for gap, (i, j) in zip(gaps, pairs, strict=True):
+        apart = f"and robot {j + 1} are {gap:.1f} px apart along the curve"
+        if gap > WIDEST * mean + TOLERANCE:
+            text = f"{apart}; even spacing allows {WIDEST * mean:.1f} px"
+            audit.robot("gap", i, gap, WIDEST * mean, text)
+        elif gap < NARROWEST * mean - TOLERANCE:
+            text = f"{apart}; even spacing needs {NARROWEST * mean:.1f} px"
+            audit.robot("crowded", i, gap, NARROWEST * mean, text)
+    for i, stretch in ends:
+        if stretch > mean + TOLERANCE:
+            text = f"is the last before {stretch:.1f} px without a robot; {mean:.1f} px are allowed"
+            audit.robot("bare_end", i, stretch, mean, text)
+
+
+def on_curve(part: Part, curve: Curve, reach: float, name: str, audit: Audit) -> None:
+    """Every robot within `reach` px of the curve."""
+    distance = distances(curve.geometry(), part.points)
+    for i in np.flatnonzero(~(distance <= reach + TOLERANCE)):
+        audit.robot(
+            "off_curve",
+            part.first + int(i),
+            distance[i],
+            reach,
+            f"is {distance[i]:.1f} px from {name}; {reach:.1f} px at most are allowed",
+        )
+
+
+def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
+    """A closed ring: the robots' polygon holds the target, no opening wider than allowed."""
+    points = part.points[_order(part.points, curve)]
+    opening = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) - 2 * part.radius
+    allowed = part.group.max_gap
+    if allowed is None:
+        allowed = WIDEST * curve.whole_length / len(points)
+    audit.greatest("widest_opening_px", opening.max())
+    audit.measures["min_width_px"] = round(part.outline.min_width, 2)
+    encloses = len(points) > 2 and shapely.make_valid(Polygon(points)).contains(
+        shapely.Point(part.outline.centre)
+    )
+    name = part.group.targets[0]
+    if not encloses:
+        audit.whole(
+            "not_enclosed",
+            len(points),
+            3,
+            f"The robots do not enclose {name}; a closed ring takes 3 or more all round.",
+            "robots",
+        )
+    order = _order(part.points, curve) + part.first
+    for k in np.flatnonzero(opening > allowed + TOLERANCE):
+        other = order[(k + 1) % len(order)] + 1
+        cut = "" if curve.closed else " (the picture's border cuts the ring there)"
+        audit.robot(
+            "opening",
+            int(order[k]),
+            opening[k],
+            allowed,
+            f"and robot {other} leave an opening of {opening[k]:.1f} px; a closed ring "
+            f"allows {allowed:.1f} px{cut}",
+        )
+
+
+def corner_matching(part: Part, audit: Audit) -> None:
+    """One robot per corner: a one-to-one matching within reach of the corners."""
+    from scipy.optimize import linear_sum_assignment
+
+    corners = corner_points(part.outline, part.group.robots)
+    if part.group.robots > len(corners):
+        audit.whole(
+            "corners",
+            part.group.robots,
+            len(corners),
+            f"The target has {len(corners)} corners for {part.group.robots} robots.",
+            "robots",
+        )
+        return
+    reach = max(CORNER_SHARE * part.outline.size, 1.5 * (part.clearance[1] + part.radius))
+    distance = np.linalg.norm(part.points[:, None] - corners[None], axis=2)
+    cost = distance + 1e6 * (distance > reach)
+    robots, matched = linear_sum_assignment(cost)
+    audit.greatest("max_from_corner_px", distance[robots, matched].max())
+    for i, k in zip(robots, matched, strict=True):
+        if distance[i, k] > reach + TOLERANCE:
+            x, y = corners[k]
+            audit.robot(
+                "off_corner",
+                part.first + int(i),
+                distance[i, k],
+                reach,
+                f"is {distance[i, k]:.1f} px from its corner ({x:.0f}, {y:.0f}); "
+                f"{reach:.1f} px at most are allowed",
+            )
+
+
+def _order(points: FloatArray, curve: Curve) -> NDArray[np.intp]:
+    """Indices of the points in the order met along the curve."""
+    return np.argsort(_stations(points, curve)[0], kind="stable")
+
+
+def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Arc length of each point's foot on the curve, pieces laid end to end, and its piece."""
+    lines = [LineString(line) for line in curve.lines]
+    places = shapely.points(points)
+    piece = np.argmin(np.stack([distances(line, points) for line in lines]), axis=0)
+    starts = np.concatenate([[0.0], np.cumsum([line.length for line in lines])])
+    along = np.stack([shapely.line_locate_point(line, places) for line in lines])
+    return starts[piece] + along[piece, np.arange(len(points))], piece
+
+
+def _gaps(
+    part: Part, curve: Curve
+) -> tuple[list[float], list[tuple[int, int]], list[tuple[int, float]]]:
+    """Gaps of successive robots, who stands on either side, and bare ends of open pieces."""
+    station, piece = _stations(part.points, curve)
+    order = np.argsort(station, kind="stable")
+    names = [int(i) + part.first for i in order]
+    cut = 0.0 if curve.closed else curve.cut(len(part.points))
+    if cut is not None:
+        around = np.diff(station[order], append=station[order[0]] + curve.length + cut)
+        return [float(g) for g in around], list(zip(names, names[1:] + names[:1], strict=True)), []
+    gaps: list[float] = []
+    pairs: list[tuple[int, int]] = []
+    ends: list[tuple[int, float]] = []
+    start = 0.0
+    for k, line in enumerate(curve.lines):
+        mine = [(station[i] - start, int(i) + part.first) for i in order if piece[i] == k]
+        length = float(LineString(line).length)
+        start += length
+        for (a, i), (b, j) in pairwise(mine):
+            gaps.append(float(b - a))
+            pairs.append((i, j))
+        if mine:
+            ends += [(mine[0][1], float(mine[0][0])), (mine[-1][1], float(length - mine[-1][0]))]
+    return gaps, pairs, ends

@@ -1,0 +1,206 @@
+"""Curves robots stand on: rings around an outline, its sides and chosen edges.
+
+All are parts of offset curves (Minkowski sums with a disc), so every point of them has the
+clearance asked for. Frame: image pixels, x right, y down.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString, MultiLineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from .outline import FloatArray, Outline, distances
+
+QUAD_SEGMENTS = 16
+ROUND_JOIN_DIP = 1 / math.cos(math.pi / (4 * QUAD_SEGMENTS))
+"""A round join is a polyline inside the true arc; offsetting this much further makes up for it."""
+FACING = math.radians(50)
+"""How far a curve's outward normal may turn from a side's direction and still be that side."""
+SIDE_STEP = 400
+"""Samples along a curve when a part of it is cut out by a condition."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One or more polylines; `closed` when it is a single loop.
+
+    Attributes:
+        lines: each (n, 2), image pixels; a loop repeats its first point.
+        closed: whether robots go all the way round.
+        whole_length: length the curve would have had with nothing cut off by the picture, px.
+    """
+
+    lines: tuple[FloatArray, ...]
+    closed: bool
+    whole_length: float
+
+    @property
+    def length(self) -> float:
+        """Length that is left, px."""
+        return sum(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in self.lines)
+
+    def cut(self, n: int) -> float | None:
+        """Straight length between the ends of a loop that the picture cut once, px.
+
+        None when the curve is no such loop, or the cut is wider than the gap n robots would
+        leave: then they go to the ends instead.
+        """
+        if self.closed or len(self.lines) != 1:
+            return None
+        across = float(np.linalg.norm(self.lines[0][0] - self.lines[0][-1]))
+        return across if across < (self.length + across) / n else None
+
+    def geometry(self) -> MultiLineString:
+        """The curve as a shapely geometry."""
+        return MultiLineString([LineString(line) for line in self.lines])
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The part of the plane robots may stand in: the picture less a margin.
+
+    Attributes:
+        width, height: of the picture, px.
+        margin: kept free along the picture's border, px.
+    """
+
+    width: float
+    height: float
+    margin: float = 0.0
+
+    @property
+    def box(self) -> Polygon:
+        """The allowed rectangle; empty when the margin eats the picture."""
+        far_x, far_y = self.width - 1 - self.margin, self.height - 1 - self.margin
+        if far_x < self.margin or far_y < self.margin:
+            return Polygon()
+        return shapely.box(self.margin, self.margin, far_x, far_y)
+
+
+def ring(outline: Outline, offset: float, frame: Frame | None = None, keep: float = 0.0) -> Curve:
+    """The loop around an outline at a distance, led along the picture's border where that cuts it.
+
+    Concavities narrower than about four offsets are bridged, as a ring of robots would.
+
+    Args:
+        outline: what to go around; its holes do not matter.
+        offset: distance from the outline, px, > 0.
+        frame: where robots may stand; None for the whole plane.
+        keep: parts of the border run that come nearer to the outline than this are cut out, px.
+    """
+    swept = outline.filled.buffer(2 * offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
+    closed = swept.buffer(-offset, quad_segs=QUAD_SEGMENTS)
+    assert isinstance(closed, Polygon)
+    whole = closed.exterior
+    if frame is None or frame.box.contains(closed):
+        return Curve((shapely.get_coordinates(whole),), True, float(whole.length))
+    inside = shapely.boundary(_filled_parts(closed.intersection(frame.box)))
+    near = outline.filled.buffer(keep * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
+    lines = _lines(inside.difference(near))
+    is_loop = len(lines) == 1 and bool(np.allclose(lines[0][0], lines[0][-1]))
+    return Curve(lines, is_loop, float(whole.length))
+
+
+def side(
+    outline: Outline, direction: tuple[float, float], offset: float, frame: Frame | None = None
+) -> Curve:
+    """The part of the offset curve on one side of the outline, seen from that side.
+
+    Args:
+        outline: the thing.
+        direction: outward vector of the side, image frame: (0, 1) is the bottom, (-1, 0) the left.
+        offset: distance from the outline, px, > 0.
+        frame: parts outside are cut off.
+    """
+    unit = np.asarray(direction, dtype=float) / math.hypot(*direction)
+    across = np.array([-unit[1], unit[0]])
+    loop = outline.filled.buffer(offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
+    extent = shapely.get_coordinates(outline.filled) @ across
+    depth = shapely.get_coordinates(loop) @ unit
+    steps: FloatArray = np.linspace(float(extent.min()), float(extent.max()), SIDE_STEP)
+    stations = steps[:, None] * across
+    rays = shapely.linestrings(
+        np.stack([stations + (depth.max() + 1) * unit, stations + depth.min() * unit], axis=1)
+    )
+    hits, ray = shapely.get_coordinates(shapely.intersection(rays, loop), return_index=True)
+    order = np.lexsort((-(hits @ unit), ray))  # per ray the hit nearest to its outer end first
+    line = hits[order[np.unique(ray[order], return_index=True)[1]]]
+    tangent = np.gradient(line, axis=0)
+    facing = np.abs(np.arctan2(tangent @ unit, np.abs(tangent @ across))) <= FACING
+    return _clip(_longest_runs(line, facing if facing.any() else ~facing), frame)
+
+
+def edge_curve(
+    outline: Outline, edges: tuple[int, ...], offset: float, frame: Frame | None = None
+) -> Curve:
+    """The part of the offset curve whose nearest edges of E are the chosen ones.
+
+    Args:
+        outline: the thing, with its graph G = (V, E).
+        edges: indices into E.
+        offset: distance from the simplified outline, px, > 0.
+        frame: parts outside are cut off.
+
+    Raises:
+        IndexError: an edge number that is not in E.
+    """
+    vertices, pairs = outline.graph()
+    sides = [LineString(vertices[list(pair)]) for pair in pairs]
+    _ = [sides[i] for i in edges]
+    solid = shapely.make_valid(Polygon(vertices))
+    loop = _filled_parts(solid.buffer(offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS))
+    dense = shapely.get_coordinates(shapely.segmentize(shapely.boundary(loop), offset / 20))
+    nearest = np.argmin(np.stack([distances(s, dense) for s in sides]), axis=0)
+    chosen = np.isin(nearest, edges)
+    if chosen.all():
+        return _clip([dense], frame)
+    start = int(np.argmin(chosen))
+    rolled, flags = np.roll(dense[:-1], -start, axis=0), np.roll(chosen[:-1], -start)
+    return _clip(_runs(rolled, flags), frame)
+
+
+def segment(start: FloatArray, end: FloatArray, frame: Frame | None = None) -> Curve:
+    """The straight line between two points, (2,) each, image pixels."""
+    return _clip([np.stack([start, end])], frame)
+
+
+def _runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
+    """Stretches of at least two successive flagged points."""
+    changes = np.flatnonzero(np.diff(flags.astype(np.int8))) + 1
+    pieces = np.split(line, changes)
+    kept = np.split(flags, changes)
+    return [p for p, f in zip(pieces, kept, strict=True) if f[0] and len(p) > 1]
+
+
+def _longest_runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
+    """Runs, less the splinters that a rough contour leaves between them."""
+    runs = _runs(line, flags) or [line]
+    lengths = [float(np.linalg.norm(run[-1] - run[0])) for run in runs]
+    return [run for run, x in zip(runs, lengths, strict=True) if x > 0.1 * max(lengths)]
+
+
+def _clip(lines: list[FloatArray], frame: Frame | None) -> Curve:
+    whole = MultiLineString([LineString(line) for line in lines])
+    kept = _lines(whole if frame is None else whole.intersection(frame.box))
+    closed = len(kept) == 1 and len(kept[0]) > 3 and bool(np.allclose(kept[0][0], kept[0][-1]))
+    return Curve(kept, closed, float(whole.length))
+
+
+def _lines(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
+    """Polylines of any geometry, pieces that touch joined, dust under half a pixel dropped."""
+    parts = [g for g in shapely.get_parts(geometry) if isinstance(g, LineString)]
+    merged = shapely.line_merge(MultiLineString(parts)) if parts else MultiLineString()
+    lines = (shapely.get_coordinates(g) for g in shapely.get_parts(merged))
+    return tuple(x for x in lines if np.linalg.norm(np.diff(x, axis=0), axis=1).sum() > 0.5)
+
+
+def _filled_parts(geometry: BaseGeometry) -> BaseGeometry:
+    """The geometry's polygons without their holes."""
+    parts: list[BaseGeometry] = [
+        Polygon(g.exterior) for g in shapely.get_parts(geometry) if isinstance(g, Polygon)
+    ]
+    return shapely.union_all(parts)

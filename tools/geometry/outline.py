@@ -1,0 +1,240 @@
+"""The shape of a target as an immutable value: polygon, graph G = (V, E), corners, axes.
+
+Frame everywhere: image pixels, x right, y down, pixel centres at integer coordinates.
+A contour of pixels is dense and noisy; V and E are its simplification, found by an epsilon
+sweep, with a judgement whether the thing is polygonal or smooth.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
+
+from ..errors import InputError
+
+FloatArray = NDArray[np.float64]
+Kind = Literal["polygonal", "smooth"]
+
+SWEEP_STEPS = 8
+SMOOTH_SLOPE = -0.40
+"""Vertex count falls as eps**-1/2 on smooth curves and stays put on polygons; this divides them."""
+CORNER_TURN = math.radians(25)
+"""A vertex turning less than this is a bend of the contour, not a corner."""
+MIN_AREA = 4.0
+"""Square pixels below which an outline has no usable shape."""
+
+
+@dataclass(frozen=True)
+class Outline:
+    """One connected region with holes, in image pixels (x right, y down).
+
+    Attributes:
+        polygon: the exact boundary; valid, positive area, exterior counter-clockwise in (x, y).
+        vertices: V, the simplified exterior, in the exterior's order, (k, 2).
+        kind: whether V are real corners (polygonal) or samples of a curve (smooth).
+        kind_confidence: 0.5 (undecided) to 1.
+    """
+
+    polygon: Polygon
+    vertices: tuple[tuple[float, float], ...]
+    kind: Kind
+    kind_confidence: float
+
+    @property
+    def edges(self) -> tuple[tuple[int, int], ...]:
+        """E, index pairs into V; edge i runs from vertex i to the next, the last one closes."""
+        count = len(self.vertices)
+        return tuple((i, (i + 1) % count) for i in range(count))
+
+    @property
+    def area(self) -> float:
+        """Area in square pixels, holes excluded."""
+        return float(self.polygon.area)
+
+    @property
+    def size(self) -> float:
+        """The square root of the area, holes filled, px: the length all defaults scale with."""
+        return math.sqrt(self.filled.area)
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the exterior, px."""
+        return float(self.polygon.exterior.length)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Bounding box (x0, y0, x1, y1)."""
+        x0, y0, x1, y1 = self.polygon.bounds
+        return float(x0), float(y0), float(x1), float(y1)
+
+    @cached_property
+    def filled(self) -> Polygon:
+        """The region with its holes filled: what robots outside have to keep off."""
+        return Polygon(self.polygon.exterior)
+
+    @cached_property
+    def rectangle(self) -> FloatArray:
+        """Corners of the minimum-area rectangle, (4, 2), in the exterior's direction."""
+        corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(self.polygon))[:4]
+        return corners if Polygon(corners).exterior.is_ccw else corners[::-1]
+
+    @property
+    def min_width(self) -> float:
+        """The smallest distance of two parallel lines that hold the region between them, px."""
+        points = shapely.get_coordinates(self.polygon.convex_hull)
+        along = np.diff(points, axis=0)
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        heights = points @ normal.T
+        return float((heights.max(axis=0) - heights.min(axis=0)).min())
+
+    @cached_property
+    def long_axis(self) -> tuple[FloatArray, float, float]:
+        """Unit vector along the rectangle's long side, its length and the short side's, px."""
+        sides = np.roll(self.rectangle, -1, axis=0) - self.rectangle
+        lengths = np.linalg.norm(sides, axis=1)
+        longest = int(np.argmax(lengths[:2]))
+        unit = sides[longest] / lengths[longest]
+        if unit[0] < 0 or (unit[0] == 0 and unit[1] < 0):
+            unit = -unit
+        return unit, float(lengths[longest]), float(lengths[1 - longest])
+
+    @cached_property
+    def centre(self) -> tuple[float, float]:
+        """The centroid where it lies well inside, else the centre of the largest inscribed disc."""
+        disc = shapely.maximum_inscribed_circle(self.polygon)
+        centroid = self.polygon.centroid
+        depth = self.polygon.boundary.distance(centroid)
+        if self.polygon.contains(centroid) and depth >= 0.5 * disc.length:
+            return float(centroid.x), float(centroid.y)
+        x, y = disc.coords[0]
+        return float(x), float(y)
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """The corners robots can be sent to, (k, 2).
+
+        Of a polygonal outline the vertices that turn by more than 25 degrees, where they
+        rebuild the region; else the corners of the minimum-area rectangle.
+        """
+        if self.kind == "polygonal":
+            turning = [
+                v
+                for v, turn in zip(self.vertices, _turns(self.vertices), strict=True)
+                if abs(turn) > CORNER_TURN
+            ]
+            if len(turning) >= 3 and _iou(Polygon(turning), self.filled) > 0.9:
+                return np.asarray(turning, dtype=float)
+        return self.rectangle
+
+    def graph(self) -> tuple[FloatArray, NDArray[np.intp]]:
+        """G = (V, E) as arrays: (k, 2) coordinates and (k, 2) index pairs."""
+        return np.asarray(self.vertices, dtype=float), np.asarray(self.edges, dtype=np.intp)
+
+
+def make_outline(exterior: ArrayLike, holes: tuple[ArrayLike, ...] = ()) -> Outline:
+    """Build an outline from rings of points.
+
+    Args:
+        exterior: (n, 2) points in image pixels, n >= 3, any direction, closed or not.
+        holes: rings of the same form.
+
+    Raises:
+        InputError: fewer than 3 points, not finite, or enclosing under 4 square pixels.
+    """
+    rings = [np.asarray(ring, dtype=float) for ring in (exterior, *holes)]
+    for ring in rings:
+        if ring.ndim != 2 or ring.shape[1:] != (2,) or len(ring) < 3:
+            raise InputError(f"An outline needs 3 or more (x, y) points; got shape {ring.shape}.")
+        if not np.isfinite(ring).all():
+            raise InputError("An outline's coordinates must be finite numbers.")
+    return outline_of(Polygon(rings[0], rings[1:]))
+
+
+def outline_of(polygon: Polygon | MultiPolygon) -> Outline:
+    """Build an outline from a polygon; an invalid one is mended, of several parts the largest kept.
+
+    Raises:
+        InputError: the region has under 4 square pixels.
+    """
+    region = largest_part(shapely.make_valid(polygon))
+    if region is None or region.area < MIN_AREA:
+        area = 0.0 if region is None else region.area
+        raise InputError(f"The outline encloses {area:.1f} square pixels; 4 or more are needed.")
+    region = orient(region)
+    vertices, kind, confidence = _simplify(np.asarray(region.exterior.coords, dtype=float)[:-1])
+    return Outline(region, tuple((float(x), float(y)) for x, y in vertices), kind, confidence)
+
+
+def distances(geometry: BaseGeometry, points: FloatArray) -> FloatArray:
+    """Distance of each of (n, 2) points to a geometry, 0 inside a polygon, (n,), px."""
+    return np.asarray(shapely.distance(geometry, shapely.points(points)), dtype=float)
+
+
+def largest_part(geometry: shapely.Geometry) -> Polygon | None:
+    """The polygon of largest area in any geometry, or None where there is none."""
+    parts = [g for g in shapely.get_parts(shapely.get_parts(geometry)) if isinstance(g, Polygon)]
+    return max(parts, key=lambda g: g.area, default=None)
+
+
+def _simplify(ring: FloatArray) -> tuple[FloatArray, Kind, float]:
+    """V by sweeping the Douglas-Peucker tolerance and taking the commonest vertex count."""
+    start = int(np.argmax(((ring - ring.mean(axis=0)) ** 2).sum(axis=1)))
+    closed = np.concatenate([np.roll(ring, -start, axis=0), ring[start : start + 1]])
+    line = shapely.LineString(closed)
+    low = max(1.5, 4 * _noise(closed), 0.008 * line.length)
+    tolerances = np.geomspace(low, max(0.04 * line.length, 2 * low), SWEEP_STEPS)
+    candidates = [_douglas_peucker(line, eps) for eps in tolerances]
+    counts = np.array([len(c) for c in candidates])
+    slope = float(np.polyfit(np.log(tolerances), np.log(counts), 1)[0])
+    kind: Kind = "polygonal" if slope > SMOOTH_SLOPE else "smooth"
+    confidence = 1 / (1 + math.exp(-abs(slope - SMOOTH_SLOPE) / 0.1))
+    if kind == "smooth":
+        return candidates[0], kind, confidence
+    values, frequency = np.unique(counts, return_counts=True)
+    commonest = values[np.argmax(frequency)]
+    return candidates[int(np.argmax(counts == commonest))], kind, confidence
+
+
+def _douglas_peucker(line: shapely.LineString, tolerance: float) -> FloatArray:
+    simple = shapely.get_coordinates(line.simplify(tolerance, preserve_topology=False))[:-1]
+    if len(simple) < 3:
+        return shapely.get_coordinates(shapely.minimum_rotated_rectangle(line))[:4]
+    return simple
+
+
+def _noise(closed: FloatArray) -> float:
+    """Noise of a pixel contour: robust deviation from its smoothed self, px."""
+    ring = closed[:-1]
+    if len(ring) < 60 or shapely.LineString(closed).length / len(ring) > 2:
+        return 0.0  # a drawn polygon, not a traced one
+    offsets = np.arange(-12, 13)
+    weights = np.exp(-0.5 * (offsets / 4.0) ** 2)
+    weights /= weights.sum()
+    smooth = sum(w * np.roll(ring, -k, axis=0) for w, k in zip(weights, offsets, strict=True))
+    tangent = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+    return float(1.48 * np.median(np.abs(((ring - smooth) * normal).sum(axis=1))))
+
+
+def _turns(vertices: tuple[tuple[float, float], ...]) -> FloatArray:
+    """Turning angle at each vertex, radians, signed."""
+    points = np.asarray(vertices, dtype=float)
+    before = points - np.roll(points, 1, axis=0)
+    after = np.roll(points, -1, axis=0) - points
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return np.arctan2(cross, (before * after).sum(axis=1))
+
+
+def _iou(a: Polygon, b: Polygon) -> float:
+    if not a.is_valid:
+        return 0.0
+    return float(a.intersection(b).area / a.union(b).area)

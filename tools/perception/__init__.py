@@ -1,0 +1,1 @@
+"""Picture to candidates to masks to outlines, without learned weights."""

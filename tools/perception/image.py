@@ -1,0 +1,315 @@
+"""Pictures come from strangers: any path, any bytes.
+
+This module is the one door they pass: either plain RGB pixels come out, as a person would
+see them, or one ImageError whose sentence says what is wrong and what would do. Everything
+is judged from file size and header before a decoder may spend memory on it.
+"""
+
+import hashlib
+import logging
+import os
+import re
+import stat
+import warnings
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import ExifTags, Image, TiffImagePlugin, UnidentifiedImageError, features
+
+from ..errors import ImageError
+
+MAX_FILE_BYTES = 64 * 2**20
+MAX_PIXELS = 50_000_000
+MAX_SIDE = 20_000
+MIN_SIDE = 16
+
+# A closed list: Pillow knows dozens of rare formats whose readers few people have tested.
+_FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "GIF", "TIFF") + (
+    ("AVIF",) if "avif" in features.modules and features.check_module("avif") else ()
+)
+
+_ALLOWED = f"{', '.join(_FORMATS[:-1])} or {_FORMATS[-1]}"
+_UNKNOWN = "is not a picture of an allowed format, or its first part is damaged"
+_RESAVE = "open it in an image viewer and save it again as PNG or JPEG"
+
+_FOREIGN = (
+    (rb"\s*%PDF", "a PDF document"),
+    (rb"(?s).*<svg\b", "an SVG drawing"),
+    (rb"(?s).*<(!doctype )?html\b", "a web page"),
+    (rb"(?s)....ftyp(hei|hev|mif1|msf1)", "a HEIC photo"),
+    (rb"[\t\n\r\x20-\x7e]+\Z", "plain text"),
+)
+
+_TURNS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
+
+
+# Arrays have no single truth value, so a generated __eq__ would raise; compare sha256.
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One picture as a person sees it; compare two by `sha256`.
+
+    pixels: (H, W, 3) uint8 RGB, read-only, row 0 at the top, column 0 at the left.
+    sha256: hex digest of the file's bytes, or of shape and pixels for an array.
+    name: file name, for messages.
+    notes: what a person should know of how the pixels came about; often empty.
+    """
+
+    pixels: NDArray[np.uint8]
+    sha256: str
+    name: str
+    notes: tuple[str, ...]
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+        return self.pixels.shape[1]
+
+    @property
+    def height(self) -> int:
+        """Pixels down."""
+        return self.pixels.shape[0]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) in pixels."""
+        return self.width, self.height
+
+
+def load_picture(path: str | os.PathLike[str]) -> Picture:
+    """Read a picture file of at most 64 MiB, as `picture_from_bytes` does.
+
+    Raises ImageError if it is missing, unreadable, not a regular file, too large, or for
+    any reason for which `picture_from_bytes` would.
+    """
+    shown = os.fspath(path)
+    try:
+        data = _read(Path(path), shown)
+    except (OSError, ValueError) as error:
+        raise _unreadable(shown, error) from None
+    return picture_from_bytes(data, Path(path).name)
+
+
+def picture_from_bytes(data: bytes, name: str) -> Picture:
+    """Decode a picture file's bytes; `name` is the file name for messages.
+
+    EXIF orientation is applied, transparent parts are shown on white, of several frames the
+    first is used. Grey of more than 8 bits: values that all lie in 0..255 stay as they are,
+    floats that all lie in 0..1 are multiplied by 255, else the smallest value becomes black
+    and the largest white; of floats, NaN and -inf become black, +inf white. Colour profiles
+    are not applied.
+
+    Raises ImageError if the bytes are none or too many, of a format not allowed, damaged,
+    under 16 pixels on a side, over 20,000 on a side or over 50 megapixels.
+    """
+    if not data:
+        raise _empty(name)
+    _check_bytes(name, len(data))
+    pixels, notes = _decode(data, name)
+    return Picture(pixels, hashlib.sha256(data).hexdigest(), name, notes)
+
+
+def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Picture:
+    """Copy an array of (H, W, 3) RGB or (H, W) grey uint8 into a Picture.
+
+    Raises ImageError for any other dtype or shape, and for the sizes that
+    `picture_from_bytes` refuses.
+    """
+    if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or pixels.shape[2:] not in ((), (3,)):
+        raise _fault(
+            name,
+            f"is an array of {pixels.dtype} with shape {pixels.shape}",
+            "give uint8 of shape (height, width, 3) or (height, width)",
+        )
+    _check_size(name, pixels.shape[1], pixels.shape[0])
+    grey = pixels.ndim == 2
+    copy = np.repeat(pixels[:, :, None], 3, axis=2) if grey else np.array(pixels, order="C")
+    copy.setflags(write=False)
+    digest = hashlib.sha256(repr(copy.shape).encode())
+    digest.update(copy.tobytes())
+    return Picture(copy, digest.hexdigest(), name, ())
+
+
+def _fault(name: str, problem: str, remedy: str) -> ImageError:
+    return ImageError(f"{name!r} {problem}; {remedy}.")
+
+
+def _empty(name: str) -> ImageError:
+    return _fault(name, "is empty (0 bytes)", f"give a {_ALLOWED} picture")
+
+
+def _read(path: Path, shown: str) -> bytes:
+    info = path.stat()
+    if stat.S_ISDIR(info.st_mode):
+        raise _fault(shown, "is a folder", "give the path of one picture file")
+    # Reading a pipe can wait for ever, and a device such as /dev/zero never ends.
+    if not stat.S_ISREG(info.st_mode):
+        raise _fault(shown, "is a device or pipe", "give the path of a regular picture file")
+    if info.st_size == 0:
+        raise _empty(shown)
+    _check_bytes(shown, info.st_size)
+    with path.open("rb") as file:
+        # Bounded, because the file may have grown since its size was asked.
+        return file.read(MAX_FILE_BYTES + 1)
+
+
+def _unreadable(shown: str, error: Exception) -> ImageError:
+    if isinstance(error, (FileNotFoundError, NotADirectoryError)):
+        return _fault(shown, "does not exist", "check the spelling of the path")
+    if isinstance(error, PermissionError):
+        return _fault(shown, "may not be read: permission denied", "allow reading, or copy it")
+    reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+    return _fault(shown, f"cannot be read ({reason})", "check the path of the picture file")
+
+
+def _check_bytes(name: str, count: int) -> None:
+    if count > MAX_FILE_BYTES:
+        raise _fault(
+            name,
+            f"is too large: {count / 2**20:,.1f} MiB",
+            f"at most {MAX_FILE_BYTES // 2**20} MiB are allowed, so save a smaller copy",
+        )
+
+
+def _check_size(name: str, width: int, height: int) -> None:
+    if min(width, height) < MIN_SIDE:
+        raise _fault(
+            name,
+            f"is too small: {width} x {height} pixels",
+            f"give a picture of at least {MIN_SIDE} pixels on each side",
+        )
+    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
+        raise _too_many_pixels(name, f"{width} x {height} pixels")
+
+
+def _too_many_pixels(name: str, claim: str) -> ImageError:
+    return _fault(
+        name,
+        f"is too large: {claim}",
+        f"at most {MAX_PIXELS // 10**6} megapixels and {MAX_SIDE:,} pixels on a side are "
+        "allowed, so save a smaller copy",
+    )
+
+
+def _decode(data: bytes, name: str) -> tuple[NDArray[np.uint8], tuple[str, ...]]:
+    try:
+        with _quiet(), Image.open(BytesIO(data), formats=_FORMATS) as opened:
+            _check_size(name, *opened.size)
+            _check_tiles(name, opened)
+            frames = _frames_note(opened)
+            opened.load()
+            # Some decoders learn the true size only now.
+            _check_size(name, *opened.size)
+            pixels, note = _to_rgb(_upright(opened))
+    except ImageError:
+        raise
+    # Over the years Pillow's readers have let out nearly every built-in exception.
+    except Exception as error:
+        raise _undecodable(name, data, error) from None
+    pixels.setflags(write=False)
+    return pixels, tuple(text for text in (frames, note) if text)
+
+
+@contextmanager
+def _quiet() -> Generator[None]:
+    """Keep Pillow's warnings, and the one error it logs, from the user for a while."""
+    logger = logging.getLogger(TiffImagePlugin.__name__)
+
+    def drop(_: logging.LogRecord) -> bool:
+        return False
+
+    logger.addFilter(drop)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.removeFilter(drop)
+
+
+def _undecodable(name: str, data: bytes, error: Exception) -> ImageError:
+    if isinstance(error, UnidentifiedImageError):
+        what = next((text for pattern, text in _FOREIGN if re.match(pattern, data[:512], re.I)), "")
+        problem = f"is {what}, not a picture of an allowed format" if what else _UNKNOWN
+        return _fault(name, problem, f"give a {_ALLOWED} file")
+    if isinstance(error, Image.DecompressionBombError):
+        return _too_many_pixels(name, "its header claims a vast picture")
+    if isinstance(error, MemoryError):
+        return _fault(name, "needs more memory than there is", "save a smaller copy")
+    return _fault(
+        name, "cannot be decoded: it is damaged, cut short or has oversized metadata", _RESAVE
+    )
+
+
+def _check_tiles(name: str, opened: Image.Image) -> None:
+    """Refuse a small TIFF cut into one vast tile, for which libtiff would make room."""
+    if isinstance(opened, TiffImagePlugin.TiffImageFile):
+        tags = opened.tag_v2
+        width = tags.get(TiffImagePlugin.TILEWIDTH, 0)
+        length = tags.get(TiffImagePlugin.TILELENGTH, 0)
+        if width * length > MAX_PIXELS:
+            raise _too_many_pixels(name, f"a tile of {width} x {length} pixels")
+
+
+def _frames_note(opened: Image.Image) -> str:
+    # Frames are not counted: that walks the whole file, for which a hostile one takes minutes.
+    # MPO is a phone's JPEG with a gain map or preview behind it, which is no frame to a person.
+    several = opened.format != "MPO" and getattr(opened, "is_animated", False)
+    return "first of several frames" if several else ""
+
+
+def _upright(image: Image.Image) -> Image.Image:
+    try:
+        turn = _TURNS.get(image.getexif().get(ExifTags.Base.Orientation, 1))
+    # Broken EXIF says nothing about the pixels, which are already decoded.
+    except Exception:
+        return image
+    return image if turn is None else image.transpose(turn)
+
+
+def _to_rgb(image: Image.Image) -> tuple[NDArray[np.uint8], str]:
+    """(H, W, 3) pixels and a note, which may be empty."""
+    if image.mode == "F" or image.mode.startswith("I"):
+        return _from_deep(np.array(image, dtype=np.float64), whole=image.mode != "F")
+    note = ""
+    if image.has_transparency_data:
+        image = image.convert("RGBA")
+        if image.getchannel("A").getextrema() != (255, 255):
+            note = "transparent parts shown on white"
+        canvas = Image.new("RGB", image.size, "white")
+        canvas.paste(image, mask=image)
+        image = canvas
+    return np.asarray(image.convert("RGB")), note
+
+
+def _from_deep(values: NDArray[np.float64], *, whole: bool) -> tuple[NDArray[np.uint8], str]:
+    finite = np.isfinite(values)
+    low = float(values.min(where=finite, initial=np.inf))
+    high = float(values.max(where=finite, initial=-np.inf))
+    note = ""
+    if not whole and low >= 0 and high <= 1:
+        low, high = 0.0, 1.0
+    elif low >= 0 and high <= 255:
+        low, high = 0.0, 255.0
+    else:
+        note = f"grey values {low:g} to {high:g} stretched from black to white"
+    # In place: at 50 megapixels every copy of float64 costs 400 MB.
+    values -= low
+    values *= 255 / (high - low or 1.0)
+    values += 0.5
+    np.clip(values, 0, 255, out=values)
+    np.nan_to_num(values, copy=False, nan=0.0)
+    grey = values.astype(np.uint8)
+    return np.repeat(grey[:, :, None], 3, axis=2), note

@@ -1,0 +1,80 @@
+"""What is known of the world: one picture, the targets found in it, and where robots are.
+
+A Scene is an immutable value; its version is a hash of all that a certificate depends on.
+Frame everywhere: pixels of the picture as the user sees it, x right, y down.
+"""
+
+from dataclasses import dataclass, replace
+
+from .errors import ToolError
+from .formation.contract import Contract
+from .formation.place import Site
+from .formation.plan import scene_version
+from .geometry.outline import Outline
+from .perception.image import Picture
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Target:
+    """An object of interest.
+
+    Attributes:
+        id: t1, t2, ... in order of finding.
+        label: what it is called; "the thing pointed at" where nobody named it.
+        box: x0, y0, x1, y1.
+        confidence: alpha, 0 to 1: self-consistency of the segmentation, not accuracy.
+        outline: measured, holes kept.
+        prompt: what it was found from: point, box, outline or points.
+        parts: what alpha was made of.
+    """
+
+    id: str
+    label: str
+    box: Box
+    confidence: float
+    outline: Outline
+    prompt: str
+    parts: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A picture and the targets found in it."""
+
+    picture: Picture
+    targets: tuple[Target, ...] = ()
+
+    @property
+    def version(self) -> str:
+        """Changes with the picture and with every target found, moved or renamed."""
+        return scene_version(
+            self.picture.sha256, {t.id: t.outline.polygon.wkt for t in self.targets}
+        )
+
+    def target(self, name: str) -> Target:
+        """The target with an id.
+
+        Raises:
+            ToolError: there is none; the text lists those there are.
+        """
+        for target in self.targets:
+            if target.id == name:
+                return target
+        known = ", ".join(t.id for t in self.targets) or "none yet: segment something first"
+        raise ToolError(f"There is no target {name!r}. Targets: {known}.")
+
+    def with_target(self, target: Target) -> "Scene":
+        """The scene with one more target, or with the one of the same id replaced."""
+        others = tuple(t for t in self.targets if t.id != target.id)
+        return replace(self, targets=(*others, target))
+
+    def site(self, contract: Contract) -> Site:
+        """The outlines a contract refers to and the picture's size.
+
+        Raises:
+            ToolError: it names a target that is not there.
+        """
+        outlines = {name: self.target(name).outline for name in contract.target_ids}
+        return Site(outlines, self.picture.width, self.picture.height)
