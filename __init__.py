@@ -1,0 +1,114 @@
+"""formup: say where a team of robots should stand, get it certified, watch them arrive."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .agent.agent import Agent, Run
+    from .agent.messages import Call, Reply, Result, User
+    from .agent.models.doubles import FunctionModel, ScriptedModel
+    from .agent.outcomes import Answered, Cancelled, Paused, Stopped
+    from .agent.report import Report
+    from .tools.errors import (
+        FleetError,
+        FormupError,
+        ImageError,
+        InputError,
+        ModelError,
+        ToolError,
+    )
+    from .tools.fleet.deploy import Arrival
+    from .tools.formation.check import certify
+    from .tools.formation.contract import Contract, Group
+    from .tools.formation.plan import Formation, Plan, make_plan
+    from .tools.formation.verdict import Finding, Verdict
+    from .tools.geometry.outline import Outline, make_outline
+    from .tools.perception.image import Picture, load_picture
+    from .tools.perception.prompts import TargetPrompt
+    from .tools.scene import Scene, Target
+    from .tools.tool import Tool, ToolResult, tool
+    from .tools.workspace import Settings, Workspace
+
+_HOMES = {
+    "agent.agent": ("Agent", "Run"),
+    "agent.messages": ("Call", "Reply", "Result", "User"),
+    "agent.models.doubles": ("FunctionModel", "ScriptedModel"),
+    "agent.outcomes": ("Answered", "Cancelled", "Paused", "Stopped"),
+    "agent.report": ("Report",),
+    "tools.errors": (
+        "FleetError",
+        "FormupError",
+        "ImageError",
+        "InputError",
+        "ModelError",
+        "ToolError",
+    ),
+    "tools.fleet.deploy": ("Arrival",),
+    "tools.formation.check": ("certify",),
+    "tools.formation.contract": ("Contract", "Group"),
+    "tools.formation.plan": ("Formation", "Plan", "make_plan"),
+    "tools.formation.verdict": ("Finding", "Verdict"),
+    "tools.geometry.outline": ("Outline", "make_outline"),
+    "tools.perception.image": ("Picture", "load_picture"),
+    "tools.perception.prompts": ("TargetPrompt",),
+    "tools.scene": ("Scene", "Target"),
+    "tools.tool": ("Tool", "ToolResult", "tool"),
+    "tools.workspace": ("Settings", "Workspace"),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Agent",
+    "Answered",
+    "Arrival",
+    "Call",
+    "Cancelled",
+    "Contract",
+    "Finding",
+    "FleetError",
+    "Formation",
+    "FormupError",
+    "FunctionModel",
+    "Group",
+    "ImageError",
+    "InputError",
+    "ModelError",
+    "Outline",
+    "Paused",
+    "Picture",
+    "Plan",
+    "Reply",
+    "Report",
+    "Result",
+    "Run",
+    "Scene",
+    "ScriptedModel",
+    "Settings",
+    "Stopped",
+    "Target",
+    "TargetPrompt",
+    "Tool",
+    "ToolError",
+    "ToolResult",
+    "User",
+    "Verdict",
+    "Workspace",
+    "certify",
+    "load_picture",
+    "make_outline",
+    "make_plan",
+    "tool",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first used, so that `import formup` stays light."""
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOME_OF[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

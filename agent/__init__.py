@@ -1,0 +1,1 @@
+"""Who decides: messages, models, the loop, its limits and outcomes."""

@@ -1,0 +1,1 @@
+"""How people reach formup; everything is used here and nothing uses this."""

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 
 from ..geometry.outline import Outline
 
@@ -24,7 +24,19 @@ CENTRE_SHARE = 0.2
 
 Relation = Literal["around", "cage", "corners", "along", "inside", "between", "centre", "shape"]
 SideName = Literal["left", "right", "top", "bottom", "long", "short"]
+Fit = Literal["tight", "normal", "wide"]
+FIT_FACTOR = {"tight": 0.5, "normal": 1.0, "wide": 2.0}
 Length = Annotated[float, Field(ge=0, le=100_000, allow_inf_nan=False)]
+Coordinate = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
+
+
+def _numbers(count: int) -> WithJsonSchema:
+    """Schema of a fixed-length list; providers do not all know prefixItems."""
+    return WithJsonSchema(
+        {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
+    )
+
+
 OUTSIDE: frozenset[str] = frozenset({"around", "cage", "corners", "along"})
 
 
@@ -44,10 +56,13 @@ class Group(_Frozen):
         default=(), max_length=2, description="Target ids such as t1; two for between, else one."
     )
     robots: int = Field(ge=1, le=MAX_ROBOTS, description="How many robots form this group.")
-    clearance: tuple[Length, Length] | None = Field(
+    clearance: Annotated[tuple[Length, Length], _numbers(2)] | None = Field(
         default=None,
         description="Least and greatest distance, px, from the target's outline to the robot's "
         "edge (inside: from the edge inward). Leave out for the default.",
+    )
+    fit: Fit = Field(
+        default="normal", description="How close to stand where no clearance is given."
     )
     spacing: Literal["even", "free"] = Field(
         default="even", description="Whether neighbours must be evenly spaced."
@@ -69,8 +84,8 @@ class Group(_Frozen):
         default="line",
         description="between: a line that joins the targets, or a divider that parts them.",
     )
-    line: tuple[float, float, float, float] | None = Field(
-        default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free."
+    line: Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], _numbers(4)] | None = (
+        Field(default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free.")
     )
     closure: Literal["ring"] | None = Field(
         default=None, description="cage: ring = even and closed (the default)."
@@ -172,10 +187,10 @@ def _default_range(
     group: Group, outline: Outline, room: tuple[float, float], radius: float
 ) -> tuple[float, float] | None:
     if group.relation in ("around", "cage", "along"):
-        aim = default_clearance(outline, room, radius)
+        aim = default_clearance(outline, room, radius) * FIT_FACTOR[group.fit]
         return (aim / 2, aim * 2)
     if group.relation == "corners":
-        aim = max(CORNER_SHARE * outline.size, MIN_STANDOFF)
+        aim = max(CORNER_SHARE * outline.size, MIN_STANDOFF) * FIT_FACTOR[group.fit]
         return (aim / 3, aim * 3)
     if group.relation == "inside":
         least = min(INSIDE_SHARE * outline.size, 0.1 * outline.min_width)

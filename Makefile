@@ -1,0 +1,53 @@
+# Everything sets itself up: `make demo` on a fresh machine needs Python 3.11 or later, git, make.
+PYTHON ?= python3
+BIN := .venv/bin
+PHOTOS := evals/photos/images
+OUT := formup-runs/demo
+
+.PHONY: demo test check bench clean
+
+demo: .venv/.ready
+	@$(BIN)/formup run $(PHOTOS)/cars_two.jpg "Surround the red car at the corners" -n 4 \
+	  --point 390,260 --out $(OUT)/car
+	@echo
+	@$(BIN)/formup run $(PHOTOS)/ucm_sparseresidential28.jpg "Fill the pool with 6 robots" \
+	  --outline 347,282,364,247,383,254,404,227,433,231,438,262,411,291,394,327,370,341,349,321 \
+	  --out $(OUT)/pool
+	@echo
+	@$(BIN)/formup run $(PHOTOS)/us_coins.jpg "Make a ring of 10 robots around the coin" \
+	  --point 285,80 --out $(OUT)/coin
+
+test: .venv/.ready-dev
+	$(BIN)/pytest -q
+
+check: .venv/.ready-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/pytest -q tests/test_architecture.py
+
+bench: .venv/.ready-dev
+	$(BIN)/python -m formup.evals.bench
+
+clean:
+	rm -rf .venv build dist *.egg-info formup-runs
+
+# uv where it is there, else venv and pip. constraints.txt pins what was tested together.
+.venv/.ready: pyproject.toml constraints.txt
+	@$(call install,-e .)
+	@touch $@
+
+.venv/.ready-dev: .venv/.ready
+	@$(call install,-e '.[dev]')
+	@mkdir -p .venv/src && ln -sfn ../.. .venv/src/formup
+	@touch $@
+
+define install
+	if command -v uv >/dev/null; then \
+	  uv venv --quiet --allow-existing --python '>=3.11' .venv && \
+	  uv pip install --quiet --python $(BIN)/python -c constraints.txt $(1); \
+	else \
+	  test -x $(BIN)/pip || $(PYTHON) -m venv .venv && \
+	  $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt $(1); \
+	fi
+endef

@@ -1,0 +1,222 @@
+"""The agent: a model, the tools and the loop put together for one instruction on one picture."""
+
+import asyncio
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from ..tools.doors import TOOLS
+from ..tools.errors import InputError
+from ..tools.formation.contract import MAX_ROBOTS
+from ..tools.formation.plan import Plan
+from ..tools.perception.image import Picture
+from ..tools.perception.prompts import TargetPrompt
+from ..tools.scene import Scene
+from ..tools.store import rings
+from ..tools.tool import Tool
+from ..tools.workspace import Settings, Workspace
+from .loop import Limits, run
+from .messages import History, Reply, Result, User
+from .model import Model
+from .models import model_named
+from .outcomes import Answered, Cancelled, Outcome, Paused
+from .report import Report, Status, Totals
+from .task import task_text
+
+Show = Callable[[User | Reply | Result], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished or paused run: its report, how it ended, and what it worked on."""
+
+    report: Report
+    outcome: Outcome
+    workspace: Workspace
+
+
+class Agent:
+    """Carries out instructions on pictures.
+
+    Args:
+        model: a name (`offline`) or any object with a name and a `reply` method.
+        tools: what the model may call.
+        system: the prompt; the offline planner reads none.
+        limits: bounds of each run.
+
+    Raises:
+        InputError: an unknown model name.
+    """
+
+    def __init__(
+        self,
+        model: str | Model = "offline",
+        *,
+        tools: tuple[Tool, ...] = TOOLS,
+        system: str = "",
+        limits: Limits | None = None,
+    ) -> None:
+        self.model = model_named(model) if isinstance(model, str) else model
+        self.tools, self.system, self.limits = tools, system, limits
+
+    def run(
+        self,
+        picture: Picture,
+        instruction: str,
+        *,
+        pointed: Sequence[TargetPrompt] = (),
+        settings: Settings | None = None,
+        show: Show | None = None,
+    ) -> Run:
+        """Carry out one instruction; the synchronous door to `arun`.
+
+        Raises:
+            InputError: something given cannot be used.
+        """
+        return asyncio.run(
+            self.arun(picture, instruction, pointed=pointed, settings=settings, show=show)
+        )
+
+    async def arun(
+        self,
+        picture: Picture,
+        instruction: str,
+        *,
+        pointed: Sequence[TargetPrompt] = (),
+        settings: Settings | None = None,
+        show: Show | None = None,
+    ) -> Run:
+        """Carry out one instruction on one picture.
+
+        Args:
+            picture: where.
+            instruction: what, in the person's words.
+            pointed: the things meant, if the person points.
+            settings: what the person fixed.
+            show: is given every message as it comes.
+
+        Raises:
+            InputError: something given cannot be used.
+        """
+        fixed = settings or Settings()
+        _check(instruction, fixed.robots)
+        workspace = Workspace(Scene(picture), fixed, tuple(pointed))
+        first = User(text=task_text(instruction, workspace))
+        if show is not None:
+            show(first)
+        return await self.resume(workspace, (first,), instruction, show)
+
+    async def resume(
+        self, workspace: Workspace, messages: History, instruction: str, show: Show | None = None
+    ) -> Run:
+        """Go on from a history, answered where it had paused."""
+        began = time.perf_counter()
+        outcome = await run(
+            self.model,
+            self.tools,
+            workspace,
+            messages,
+            system=self.system,
+            limits=self.limits,
+            allowed=lambda call: workspace.settings.fleet == "simulated",
+            show=show or (lambda message: None),
+        )
+        seconds = time.perf_counter() - began
+        report = _report(outcome, workspace, instruction, self.model.name, seconds)
+        return Run(report, outcome, workspace)
+
+
+def _check(instruction: str, robots: int | None) -> None:
+    if not instruction.strip():
+        raise InputError(
+            'The instruction is empty; say what to do, such as "Surround the car at the corners".'
+        )
+    if robots is not None and not 1 <= robots <= MAX_ROBOTS:
+        raise InputError(f"{robots} robots cannot be placed; 1 to {MAX_ROBOTS:,} can.")
+
+
+def _report(
+    outcome: Outcome, workspace: Workspace, instruction: str, model: str, seconds: float
+) -> Report:
+    picture = workspace.scene.picture
+    plan = _last_plan(workspace)
+    arrival = workspace.arrivals.get(plan.id) if plan else None
+    status, message = _status(outcome, workspace, plan)
+    return Report(
+        status=status,
+        message=message,
+        instruction=instruction,
+        image={"sha256": picture.sha256, "width": picture.width, "height": picture.height},
+        targets=tuple(_target(workspace, t.id) for t in workspace.scene.targets),
+        candidates=_candidates(outcome, workspace),
+        contract=plan.formation.contract if plan else None,
+        plan_id=plan.id if plan else None,
+        positions=plan.formation.positions if plan else None,
+        verdict=plan.verdict if plan else None,
+        arrival=arrival,
+        model=model,
+        usage=_totals(outcome.messages, seconds),
+    )
+
+
+def _last_plan(workspace: Workspace) -> Plan | None:
+    """The plan deployed last, else the one proposed last."""
+    names = list(workspace.arrivals) or list(workspace.plans)
+    return workspace.plans[names[-1]] if names else None
+
+
+def _status(outcome: Outcome, workspace: Workspace, plan: Plan | None) -> tuple[Status, str]:
+    if isinstance(outcome, Paused):
+        if outcome.call.name == "ask_user":
+            return "question", str(outcome.call.arguments["question"])
+        return "needs_approval", f"A person must approve {outcome.call.arguments.get('plan_id')}."
+    if isinstance(outcome, Cancelled):
+        return "stopped", "The run was cancelled."
+    if not isinstance(outcome, Answered):
+        return ("stopped" if outcome.kind in ("limit", "repeat") else "failed"), outcome.reason
+    last = outcome.messages[-1]
+    if isinstance(last, Result):
+        return "impossible", json.loads(outcome.text)["reason"]
+    arrival = workspace.arrivals.get(plan.id) if plan else None
+    if arrival is not None:
+        return ("deployed" if arrival.arrived else "failed"), outcome.text
+    if plan is not None and plan.verdict.certified:
+        return "planned", outcome.text
+    return "impossible", outcome.text
+
+
+def _target(workspace: Workspace, name: str) -> dict[str, object]:
+    target = workspace.scene.target(name)
+    outline, holes = rings(target)
+    return {
+        "id": target.id,
+        "label": target.label,
+        "box": [round(v, 1) for v in target.box],
+        "confidence": target.confidence,
+        "parts": dict(target.parts),
+        "outline": outline,
+        "holes": holes,
+    }
+
+
+def _candidates(outcome: Outcome, workspace: Workspace) -> tuple[dict[str, object], ...] | None:
+    if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
+        return None
+    named = outcome.call.arguments.get("candidates", ())
+    found = [
+        workspace.scene.target(n) for n in named if n in {t.id for t in workspace.scene.targets}
+    ]
+    return tuple({"id": t.id, "label": t.label, "box": list(t.box)} for t in found)
+
+
+def _totals(messages: History, seconds: float) -> Totals:
+    replies = [m for m in messages if isinstance(m, Reply)]
+    return Totals(
+        requests=len(replies),
+        tool_calls=sum(len(m.calls) for m in replies),
+        input_tokens=sum(m.usage.input_tokens for m in replies),
+        output_tokens=sum(m.usage.output_tokens for m in replies),
+        cost_usd=sum(m.usage.cost_usd for m in replies),
+        seconds=round(seconds, 3),
+    )

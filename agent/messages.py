@@ -1,0 +1,94 @@
+"""Messages of a conversation as frozen values; the history of them is all the state there is.
+
+A history that ends in calls without results is a paused run: whoever continues it answers them.
+"""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+ErrorKind = Literal["unknown_tool", "arguments", "tool"]
+"""unknown_tool: no such tool; arguments: against its schema; tool: it could not do that."""
+
+
+class _Value(BaseModel):
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", ser_json_bytes="base64", val_json_bytes="base64"
+    )
+
+
+class Call(_Value):
+    """A model's wish to have a tool run."""
+
+    id: str
+    name: str
+    arguments: dict[str, Any]
+
+
+class Usage(_Value):
+    """What one request cost; zero where nothing is counted."""
+
+    input_tokens: int = 0
+    output_tokens: int = 0
+    cost_usd: float = 0.0
+
+
+class User(_Value):
+    """What the person says; images are PNG or JPEG files."""
+
+    role: Literal["user"] = "user"
+    text: str
+    images: tuple[bytes, ...] = ()
+
+
+class Reply(_Value):
+    """What the model says: text, calls, or both; without calls the turn is over."""
+
+    role: Literal["assistant"] = "assistant"
+    text: str = ""
+    calls: tuple[Call, ...] = ()
+    usage: Usage = Usage()
+
+
+class Result(_Value):
+    """A tool's answer to one call; `error` says what kind of mistake it reports, if any."""
+
+    role: Literal["tool"] = "tool"
+    call_id: str
+    name: str
+    text: str
+    error: ErrorKind | None = None
+    images: tuple[bytes, ...] = ()
+
+
+Message = Annotated[User | Reply | Result, Field(discriminator="role")]
+History = tuple[User | Reply | Result, ...]
+HISTORY: TypeAdapter[History] = TypeAdapter(tuple[Message, ...])
+"""Reads and writes a history as JSON: HISTORY.dump_json(history), HISTORY.validate_json(text)."""
+
+
+def unanswered(history: Sequence[User | Reply | Result]) -> tuple[Call, ...]:
+    """Calls of the last reply that have no result yet, in order."""
+    answered: set[str] = set()
+    for message in reversed(history):
+        if isinstance(message, Result):
+            answered.add(message.call_id)
+        elif isinstance(message, Reply):
+            return tuple(call for call in message.calls if call.id not in answered)
+        else:
+            break
+    return ()
+
+
+def failed_before(history: Sequence[User | Reply | Result], call: Call) -> bool:
+    """Whether the very same call, name and arguments, got an error earlier."""
+    failed = {m.call_id for m in history if isinstance(m, Result) and m.error is not None}
+    return any(
+        past.id in failed
+        and past.id != call.id
+        and (past.name, past.arguments) == (call.name, call.arguments)
+        for m in history
+        if isinstance(m, Reply)
+        for past in m.calls
+    )

@@ -1,0 +1,33 @@
+"""The cut between the loop and whatever decides: a model is a name and one method."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..tools.tool import Tool
+from .messages import History, Reply
+
+
+@dataclass(frozen=True)
+class Request:
+    """All a model sees: the prompt, the conversation, the tools it may call."""
+
+    system: str
+    messages: History
+    tools: tuple[Tool, ...]
+
+
+class Model(Protocol):
+    """Anything that answers a request with one complete reply."""
+
+    @property
+    def name(self) -> str:
+        """What results are recorded under."""
+        ...
+
+    async def reply(self, request: Request) -> Reply:
+        """Answer.
+
+        Raises:
+            ModelError: it cannot.
+        """
+        ...

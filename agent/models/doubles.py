@@ -1,0 +1,44 @@
+"""Models for tests: replies written down beforehand, or a function in a model's place."""
+
+from collections.abc import Callable, Sequence
+
+from ...tools.errors import ModelError
+from ..messages import Reply
+from ..model import Request
+
+
+class ScriptedModel:
+    """Gives its replies one after another; `requests` keeps what it was asked."""
+
+    def __init__(self, replies: Sequence[Reply], name: str = "scripted") -> None:
+        self.name = name
+        self._replies = list(replies)
+        self.requests: list[Request] = []
+
+    async def reply(self, request: Request) -> Reply:
+        """The next reply.
+
+        Raises:
+            ModelError: there is none left.
+        """
+        self.requests.append(request)
+        if len(self.requests) > len(self._replies):
+            raise ModelError(f"The script has {len(self._replies)} replies; one more was wanted.")
+        return self._replies[len(self.requests) - 1]
+
+    def assert_complete(self) -> None:
+        """Fail a test that left replies unused."""
+        used, there = len(self.requests), len(self._replies)
+        assert used == there, f"{there - used} of {there} scripted replies were not used"
+
+
+class FunctionModel:
+    """A function is the model."""
+
+    def __init__(self, function: Callable[[Request], Reply], name: str = "function") -> None:
+        self.name = name
+        self._function = function
+
+    async def reply(self, request: Request) -> Reply:
+        """What the function says."""
+        return self._function(request)

@@ -1,0 +1,133 @@
+"""The offline planner: rules in a model's place, so that everything runs with no key and no GPU.
+
+It reads the arrangement from a phrase table, points tools at what the person pointed at, and
+asks when the words do not settle what to do. It is no language model and sees no picture.
+"""
+
+import json
+from typing import Any
+
+from ..messages import Call, History, Reply, Result, User
+from ..model import Request
+from ..task import Task, read_task
+from .understand import Reading, understand
+
+EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
+
+
+class OfflinePlanner:
+    """Rules that call the tools: propose, deploy, say what was observed."""
+
+    name = "offline"
+
+    async def reply(self, request: Request) -> Reply:
+        """The next step for a conversation that began with a task message."""
+        first = request.messages[0]
+        assert isinstance(first, User)
+        task = read_task(first.text)
+        last = request.messages[-1]
+        if isinstance(last, Result) and last.name == "propose_formation":
+            return _after_proposal(task, last, request.messages)
+        if isinstance(last, Result) and last.name == "deploy":
+            return Reply(text=_after_deploy(task, last, request.messages))
+        return _begin(task, request.messages)
+
+
+def _begin(task: Task, history: History) -> Reply:
+    """Propose a formation, or ask for what is missing."""
+    answers = [m.text for m in history if isinstance(m, Result) and m.name == "ask_user"]
+    reading = understand(". ".join([task.instruction, *answers]))
+    bare = [int(a) for a in answers if a.strip().isdigit()]
+    robots = task.robots or reading.robots or next(iter(bare), None)
+    question = _open_question(task, reading, robots)
+    if question or robots is None:
+        return _call(history, "ask_user", {"question": question or "How many robots?"})
+    prompts = [p for p in task.pointed if p["id"] not in task.targets]
+    arguments = {"contract": {"groups": [_group(task, reading, robots)]}, "targets": prompts}
+    return _call(history, "propose_formation", arguments)
+
+
+def _open_question(task: Task, reading: Reading, robots: int | None) -> str | None:
+    """What has to be asked first, or None."""
+    things = len(_target_ids(task))
+    if not reading.relations:
+        return f"Which arrangement is meant? For example {EXAMPLES}."
+    if len(reading.relations) > 1:
+        return f"Which arrangement is meant: {' or '.join(reading.relations)}?"
+    if robots is None and reading.odd_count:
+        return f"How many robots? {reading.odd_count!r} names no whole number above 0."
+    if not robots:
+        return "How many robots? Say it in the words or with -n."
+    if reading.relations[0] == "between" and things < 2:
+        return "Between which two things? Point at both: --point X,Y --point X,Y."
+    if things == 0:
+        return (
+            "Which thing is meant? The offline planner does not see: point at it with "
+            "--point X,Y, --box X0,Y0,X1,Y1 or --outline X1,Y1,X2,Y2,..."
+        )
+    return None
+
+
+def _group(task: Task, reading: Reading, robots: int) -> dict[str, Any]:
+    relation = reading.relations[0]
+    group: dict[str, Any] = {
+        "relation": relation,
+        "targets": _target_ids(task)[: 2 if relation == "between" else 1],
+        "robots": robots,
+        "fit": reading.fit,
+        "spacing": reading.spacing,
+    }
+    if relation == "along":
+        group["side"] = reading.side or "long"
+    if relation == "between":
+        group["layout"] = reading.layout
+    if reading.clearance is not None and relation not in ("between", "centre"):
+        group["clearance"] = [reading.clearance, reading.clearance + 1]
+    return group
+
+
+def _target_ids(task: Task) -> list[str]:
+    return list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))
+
+
+def _after_proposal(task: Task, result: Result, history: History) -> Reply:
+    if result.error:
+        if "Insufficient segmentation accuracy" in result.text:
+            return _call(history, "ask_user", {"question": result.text})
+        return _call(history, "report_impossible", {"reason": result.text})
+    plan = json.loads(result.text)
+    if not plan["certified"]:
+        arguments = {"reason": " ".join(plan["findings"]), "plan_id": plan["plan_id"]}
+        return _call(history, "report_impossible", arguments)
+    if task.deploy:
+        return _call(history, "deploy", {"plan_id": plan["plan_id"]})
+    return Reply(text=f"{_planned(plan)} Nothing was moved.")
+
+
+def _after_deploy(task: Task, result: Result, history: History) -> str:
+    proposal = next(
+        m for m in reversed(history) if isinstance(m, Result) and m.name == "propose_formation"
+    )
+    planned = _planned(json.loads(proposal.text))
+    if result.error:
+        return f"{planned} {result.text}"
+    arrival = json.loads(result.text)
+    if not arrival["arrived"]:
+        return (
+            f"{planned} Robot {arrival['worst_robot']} stopped {arrival['worst_residual_px']:.1f} "
+            f"px from its place after {arrival['corrections']} corrections."
+        )
+    return (
+        f"{planned} All arrived; the furthest is {arrival['worst_residual_px']:.1f} px from its "
+        "place."
+    )
+
+
+def _planned(plan: dict[str, Any]) -> str:
+    noun = "robot has a certified place" if plan["robots"] == 1 else "robots have certified places"
+    return " ".join([f"{plan['robots']} {noun} (plan {plan['plan_id']}).", *plan["notes"]])
+
+
+def _call(history: History, name: str, arguments: dict[str, Any]) -> Reply:
+    number = sum(isinstance(m, Reply) for m in history) + 1
+    return Reply(calls=(Call(id=f"call-{number}", name=name, arguments=arguments),))

@@ -1,0 +1,131 @@
+"""Words to an arrangement, by rules: phrases of vocabulary.yaml, found in the instruction.
+
+Not a language model and not meant to look like one: what the phrases do not settle is left
+open, and the planner asks.
+"""
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import yaml
+
+GAP = 6
+"""Words that "..." may stand for."""
+ENDINGS = ("ing", "ed", "es", "s", "e")
+Words = list[str]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What was understood; `relations` with more or fewer than one entry settles nothing."""
+
+    relations: tuple[str, ...]
+    robots: int | None
+    odd_count: str | None
+    side: str | None
+    layout: str
+    fit: str
+    spacing: str
+    clearance: float | None
+
+
+def understand(instruction: str) -> Reading:
+    """Read an instruction in English."""
+    words = _without_ignored(_words(instruction))
+    side = next(iter(_matches("sides", words)), None)
+    relations = _unbeaten(_matches("relations", words))
+    if not relations:
+        relations = ["along"] if side else _matches("weak", words)
+    robots, odd = _count(instruction)
+    return Reading(
+        relations=tuple(relations),
+        robots=robots,
+        odd_count=odd,
+        side=side if "along" in relations else None,
+        layout=next(iter(_matches("layout", words)), "line"),
+        fit=next(iter(_matches("fit", words)), "normal"),
+        spacing="free" if any(_found(p, words) for p in _vocabulary()["free"]) else "even",
+        clearance=_clearance(instruction),
+    )
+
+
+@cache
+def _vocabulary() -> dict[str, Any]:
+    text = resources.files(__package__ or "").joinpath("vocabulary.yaml").read_text("utf-8")
+    return yaml.safe_load(text)
+
+
+def _words(text: str) -> Words:
+    return [_stem(word) for word in re.findall(r"[a-z']+|[0-9.]+|[;!?]", text.lower())]
+
+
+def _stem(word: str) -> str:
+    for ending in ENDINGS:
+        if word.endswith(ending) and len(word) - len(ending) >= 3:
+            return word[: -len(ending)]
+    return word
+
+
+def _matches(kind: str, words: Words) -> list[str]:
+    """Keys of a vocabulary table of which some phrase is in the words."""
+    table: dict[str, list[str]] = _vocabulary()[kind]
+    return [key for key, phrases in table.items() if any(_found(p, words) for p in phrases)]
+
+
+def _found(phrase: str, words: Words) -> tuple[int, int] | None:
+    """Where a phrase stands in the words: first and past-the-last index."""
+    parts = [[_stem(w) for w in part.split()] for part in phrase.split(" ... ")]
+    for start in range(len(words)):
+        end = start
+        for i, part in enumerate(parts):
+            reach = range(end, end + 1 if i == 0 else min(end + GAP + 1, len(words)))
+            at = next((k for k in reach if words[k : k + len(part)] == part), None)
+            if at is None or any(w in ";!?" for w in words[end:at]):
+                break
+            end = at + len(part)
+        else:
+            return start, end
+    return None
+
+
+def _without_ignored(words: Words) -> Words:
+    for phrase in _vocabulary()["ignore"]:
+        while (place := _found(phrase, words)) is not None:
+            words = words[: place[0]] + words[place[1] :]
+    return words
+
+
+def _unbeaten(relations: list[str]) -> list[str]:
+    beats: dict[str, list[str]] = _vocabulary()["beats"]
+    beaten = {loser for r in relations for loser in beats.get(r, [])}
+    return [r for r in relations if r not in beaten]
+
+
+def _count(text: str) -> tuple[int | None, str | None]:
+    """A number of robots in the words, or what stands there but is none."""
+    numbers: dict[str, int] = _vocabulary()["numbers"]
+    nouns = "|".join(rf"{noun}s?" for noun in _vocabulary()["robots"] if noun != "one")
+    names = "|".join(numbers)
+    pattern = (
+        rf"(-?[0-9][0-9,.]*|\b(?:{names})\b|\bmany|\bseveral|\bsome)(?:\s+[a-z-]+)?\s+(?:{nouns})\b"
+    )
+    found = re.search(pattern, text.lower())
+    if re.search(
+        r"\b(?:each|every)\b.*corner", text.lower()
+    ):  # "one robot at each": not one in all
+        found = re.search(rf"([0-9]+|{names})\s+corners?", text.lower())
+    if found is None:
+        return None, None
+    word = found[1].replace(",", "")
+    if word in numbers:
+        return numbers[word], None
+    return (int(word), None) if re.fullmatch(r"[0-9]+", word) else (None, found[0])
+
+
+def _clearance(text: str) -> float | None:
+    """A distance in pixels that the words name."""
+    found = re.search(r"([0-9]+(?:\.[0-9]+)?)\s*(?:px|pixels?)\b", text.lower())
+    return float(found[1]) if found else None

@@ -1,0 +1,66 @@
+"""What a run came to, as one value: the object `formup run --json` prints."""
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from ..tools.fleet.deploy import Arrival
+from ..tools.formation.contract import Contract
+from ..tools.formation.verdict import Verdict
+
+Status = Literal[
+    "deployed", "planned", "needs_approval", "question", "impossible", "stopped", "failed"
+]
+EXIT_CODES: dict[Status, int] = {
+    "deployed": 0,
+    "planned": 0,
+    "question": 3,
+    "impossible": 3,
+    "needs_approval": 3,
+    "stopped": 4,
+    "failed": 4,
+}
+
+
+class Totals(BaseModel):
+    """What the run used."""
+
+    model_config = ConfigDict(frozen=True)
+
+    requests: int = 0
+    tool_calls: int = 0
+    input_tokens: int = 0
+    output_tokens: int = 0
+    cost_usd: float = 0.0
+    seconds: float = 0.0
+
+
+class Report(BaseModel):
+    """Status, what was found, the contract, its certificate, and what was observed.
+
+    Lengths are pixels of the picture as the user sees it (x right, y down); positions are in
+    robot order over all groups. What does not apply is None.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    status: Status
+    message: str
+    instruction: str
+    image: dict[str, Any]
+    targets: tuple[dict[str, Any], ...] = ()
+    candidates: tuple[dict[str, Any], ...] | None = None
+    contract: Contract | None = None
+    plan_id: str | None = None
+    positions: tuple[tuple[float, float], ...] | None = None
+    verdict: Verdict | None = None
+    arrival: Arrival | None = None
+    model: str
+    prompt: dict[str, Any] | None = None
+    usage: Totals = Totals()
+    files: dict[str, str | None] | None = None
+
+    @property
+    def exit_code(self) -> int:
+        """What `formup run` exits with."""
+        return EXIT_CODES[self.status]

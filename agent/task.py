@@ -1,0 +1,62 @@
+"""What the person asks for, as the first message of a conversation: lines a model can read."""
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from ..tools.workspace import Workspace
+
+
+@dataclass(frozen=True)
+class Task:
+    """The facts of the first message.
+
+    Attributes:
+        robots: how many, or None where the person left it to the words.
+        pointed: what the person pointed at, as arguments of propose_formation's `targets`.
+        targets: ids of targets that are measured already.
+        deploy: whether robots shall move once the plan is certified.
+    """
+
+    instruction: str
+    robots: int | None
+    pointed: tuple[dict[str, Any], ...]
+    targets: tuple[str, ...]
+    deploy: bool
+
+
+def task_text(instruction: str, workspace: Workspace) -> str:
+    """The first message: one fact a line, the person's words quoted so that they stay one."""
+    settings, picture = workspace.settings, workspace.scene.picture
+    pointed = [
+        p.model_dump(mode="json", exclude_defaults=True) | {"id": p.id} for p in workspace.pointed
+    ]
+    lines = {
+        "Instruction": instruction,
+        "Robots": settings.robots,
+        "Picture": f"{picture.width} x {picture.height} px",
+        "Pointed at": pointed,
+        "Targets": [t.id for t in workspace.scene.targets],
+        "Deploy": settings.may_deploy,
+    }
+    return "\n".join(f"{name}: {json.dumps(v, ensure_ascii=False)}" for name, v in lines.items())
+
+
+def read_task(text: str) -> Task:
+    """The facts of a message written by `task_text`.
+
+    Raises:
+        ValueError: it was not.
+    """
+    facts = {
+        name: json.loads(value)
+        for name, separator, value in (line.partition(": ") for line in text.splitlines())
+        if separator
+    }
+    return Task(
+        instruction=facts["Instruction"],
+        robots=facts["Robots"],
+        pointed=tuple(facts["Pointed at"]),
+        targets=tuple(facts["Targets"]),
+        deploy=facts["Deploy"],
+    )

@@ -1,0 +1,72 @@
+"""`formup eval photos`: success over photographs, as a table and as JSON."""
+
+import json
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from ..evals.pointed import Row, as_json, evaluate, mode_named, one_target, summary
+from ..evals.suite import load_tasks
+from ..tools.errors import InputError
+from ..tools.store import write_whole
+from . import options as o
+
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+
+
+@app.callback()
+def group() -> None:
+    """How good it is, on tasks with known answers."""
+
+
+@app.command()
+def photos(
+    data: o.DataFolder = None,
+    mode: o.Mode = "box",
+    seeds: o.Seeds = 3,
+    out: o.JsonFile = Path("photos-eval.json"),
+) -> None:
+    """Success over all one-target tasks of a folder of photographs; the shipped ones by default."""
+    if seeds < 1:
+        raise InputError(f"--seeds {seeds} cannot be used; give 1 or more.")
+    chosen, tasks = mode_named(mode), one_target(load_tasks(data))
+    count = len(tasks) * (seeds if chosen in ("box", "outline") else 1)
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task(f"{chosen}, {len(tasks)} tasks", total=count)
+        rows = evaluate(tasks, chosen, seeds, lambda row: progress.advance(bar))
+    means = summary(rows)
+    _print(means, rows, chosen)
+    if out is not None:
+        content = {
+            "mode": chosen,
+            "seeds": seeds,
+            "data": str(data) if data else "shipped",
+            "summary": means,
+            "rows": [as_json(row) for row in rows],
+        }
+        write_whole(out, json.dumps(content, indent=1).encode())
+
+
+def _print(means: dict[str, dict[str, float]], rows: list[Row], mode: str) -> None:
+    console = Console(highlight=False)
+    table = Table(title=f"offline planner, pointed by {mode}", header_style="cyan")
+    for name in ("category", "runs", "placed", "success", "strict", "mean IoU"):
+        table.add_column(name, justify="left" if name == "category" else "right")
+    for name, values in means.items():
+        table.add_row(
+            name,
+            f"{values['runs']:.0f}",
+            f"{values['placed']:.3f}",
+            f"{values['success']:.3f}",
+            f"{values['strict']:.3f}",
+            f"{values['iou']:.3f}",
+        )
+    console.print(table)
+    for row in rows:
+        if not row.strict:
+            kind = "not strict" if row.success else row.status if row.failures else "failed"
+            why = "; ".join(row.failures) if row.status == "deployed" else row.message
+            console.print(f"{row.task} seed {row.seed}: {kind}: {why[:150]}", soft_wrap=True)

@@ -1,0 +1,161 @@
+"""Command-line words to values; each mistake is one sentence with the value and what is allowed."""
+
+import json
+import math
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..tools.errors import InputError
+from ..tools.formation.contract import MAX_ROBOTS
+from ..tools.geometry.outline import FloatArray
+from ..tools.perception.prompts import TargetPrompt
+from ..tools.tool import violations
+from ..tools.workspace import Descriptor
+
+
+def robots(text: str | None) -> int | None:
+    """A number of robots.
+
+    Raises:
+        InputError: not a whole number from 1 to 10,000.
+    """
+    if text is None:
+        return None
+    try:
+        count = int(text.replace(",", "").strip())
+    except ValueError:
+        count = 0
+    if not 1 <= count <= MAX_ROBOTS:
+        raise InputError(
+            f"--robots {text!r} cannot be used; give a whole number from 1 to {MAX_ROBOTS:,}."
+        )
+    return count
+
+
+def length(name: str, text: str | None) -> float | None:
+    """A length in pixels, 0 or more.
+
+    Raises:
+        InputError: not such a number.
+    """
+    if text is None:
+        return None
+    value = _number(text)
+    if value is None or not 0 <= value <= 100_000:
+        raise InputError(f"{name} {text!r} is no length; give pixels from 0 to 100000, such as 12.")
+    return value
+
+
+def share(name: str, text: str | None) -> float | None:
+    """A number from 0 to 1.
+
+    Raises:
+        InputError: not such a number.
+    """
+    if text is None:
+        return None
+    value = _number(text)
+    if value is None or not 0 <= value <= 1:
+        raise InputError(f"{name} {text!r} cannot be used; give a number from 0 to 1.")
+    return value
+
+
+def descriptor(text: str) -> Descriptor:
+    """How shapes are put into text.
+
+    Raises:
+        InputError: not one of the three.
+    """
+    for known in get_args(Descriptor):
+        if text == known:
+            return known
+    raise InputError(f"Unknown descriptor {text!r}. There are: {', '.join(get_args(Descriptor))}.")
+
+
+def pointed(points: list[str], boxes: list[str], outlines: list[str]) -> tuple[TargetPrompt, ...]:
+    """What was pointed at, as t1, t2, ...: points first, then boxes, then outlines.
+
+    Raises:
+        InputError: not numbers, or not as many as are needed.
+    """
+    found: list[dict[str, object]] = []
+    for text in points:
+        found.append({"points": (_pair(text, "--point", "X,Y"),)})
+    for text in boxes:
+        values = _numbers(text, "--box", "X0,Y0,X1,Y1")
+        if len(values) != 4:
+            raise InputError(_wrong("--box", text, "X0,Y0,X1,Y1"))
+        found.append({"box": tuple(values)})
+    for text in outlines:
+        values = _numbers(text, "--outline", "X1,Y1,X2,Y2,...")
+        if len(values) % 2 or not 6 <= len(values) <= 60:
+            raise InputError(
+                f"--outline {text!r} has {len(values)} numbers; give 3 to 30 vertices as "
+                "X1,Y1,X2,Y2,..."
+            )
+        found.append({"outline": tuple(zip(values[::2], values[1::2], strict=True))})
+    try:
+        return tuple(
+            TargetPrompt.model_validate({"id": f"t{i}", **prompt})
+            for i, prompt in enumerate(found, start=1)
+        )
+    except ValidationError as error:
+        raise InputError(violations(error)) from None
+
+
+def starts(path: Path | None) -> FloatArray | None:
+    """Starting positions from a JSON file [[x, y], ...] or lines of x,y; (n, 2), px.
+
+    Raises:
+        InputError: it cannot be read, or holds anything but finite pairs.
+    """
+    if path is None:
+        return None
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"--starts {path} cannot be read: {error}.") from None
+    try:
+        rows = (
+            json.loads(text)
+            if text.lstrip().startswith("[")
+            else [[float(v) for v in line.split(",")] for line in text.splitlines() if line.strip()]
+        )
+        values = np.asarray(rows, dtype=float)
+    except (ValueError, TypeError):
+        values = np.empty(0)
+    if values.ndim != 2 or values.shape[1:] != (2,) or not np.isfinite(values).all():
+        raise InputError(
+            f"--starts {path} must hold one x,y a line, or JSON [[x, y], ...], in pixels."
+        )
+    return values
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _numbers(text: str, option: str, form: str) -> list[float]:
+    values = [_number(part) for part in text.split(",")]
+    known = [v for v in values if v is not None]
+    if len(known) < len(values):
+        raise InputError(_wrong(option, text, form))
+    return known
+
+
+def _pair(text: str, option: str, form: str) -> tuple[float, float]:
+    values = _numbers(text, option, form)
+    if len(values) != 2:
+        raise InputError(_wrong(option, text, form))
+    return values[0], values[1]
+
+
+def _wrong(option: str, text: str, form: str) -> str:
+    return f"{option} {text!r} cannot be read; give {form} in pixels, numbers with commas between."

@@ -1,0 +1,41 @@
+"""The entry point: exit codes, one sentence for every error a user can cause, Ctrl-C at once."""
+
+import signal
+import sys
+from types import FrameType
+
+
+def main() -> None:
+    """Run the command line and exit."""
+    # Not the default handler: asyncio would turn that into a cancellation at the next await.
+    signal.signal(signal.SIGINT, _interrupt)
+    try:
+        sys.exit(_run())
+    except KeyboardInterrupt:
+        print("formup: interrupted; nothing more was done.", file=sys.stderr)  # noqa: T201
+        sys.exit(130)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _run() -> int:
+    import typer
+
+    from ..tools.errors import FleetError, FormupError, ModelError
+    from .cli import app
+
+    try:
+        return app(standalone_mode=False) or 0
+    except typer.TyperException as error:
+        print(f"formup: {error.format_message()} (--help shows what there is)", file=sys.stderr)  # noqa: T201
+        return 2
+    except typer.Abort:
+        raise KeyboardInterrupt from None
+    except FormupError as error:
+        print(f"formup: {error}", file=sys.stderr)  # noqa: T201
+        return 4 if isinstance(error, (ModelError, FleetError)) else 2
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader has gone; there is nobody to tell
+        return 0

@@ -1,0 +1,55 @@
+"""The command line's options, each declared once."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Image = Annotated[Path, typer.Argument(help="Picture of the place.", show_default=False)]
+Instruction = Annotated[str, typer.Argument(help="What to do, in your words.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Robots = Annotated[str | None, typer.Option("-n", "--robots", help="How many, 1 to 10,000.")]
+Points = Annotated[
+    list[str] | None, typer.Option("--point", help="X,Y on the thing meant; repeatable.")
+]
+Boxes = Annotated[
+    list[str] | None, typer.Option("--box", help="X0,Y0,X1,Y1 close around it; repeatable.")
+]
+Outlines = Annotated[
+    list[str] | None,
+    typer.Option("--outline", help="X1,Y1,X2,Y2,...: 3 to 30 rough vertices; repeatable."),
+]
+PlanOnly = Annotated[bool, typer.Option("--plan-only", help="Certify a plan but move nothing.")]
+Out = Annotated[
+    Path | None, typer.Option("--out", help="Folder for the files; default: formup-runs/TIME.")
+]
+ModelName = Annotated[str, typer.Option("--model", help="Who decides; offline is rules, no AI.")]
+PromptName = Annotated[
+    str | None, typer.Option("--prompt", help="ID@VERSION; the offline rules read none.")
+]
+SegmenterName = Annotated[str, typer.Option("--segmenter", help="How outlines are measured.")]
+Threshold = Annotated[
+    str | None, typer.Option("--threshold", help="Least confidence a mask is used at, 0 to 1.")
+]
+DescriptorName = Annotated[
+    str, typer.Option("--descriptor", help="Shapes as edges, edges+vertices or matrix.")
+]
+FleetName = Annotated[str, typer.Option("--fleet", help="Which robots move.")]
+Starts = Annotated[
+    Path | None, typer.Option("--starts", help="Starting positions: x,y a line, or JSON.")
+]
+Radius = Annotated[str | None, typer.Option("--robot-radius", help="Radius of a robot, px.")]
+Clearance = Annotated[
+    str | None, typer.Option("--clearance", help="Exact distance from the target, px.")
+]
+Seed = Annotated[int, typer.Option("--seed", help="Of the simulator.")]
+Arguments = Annotated[str, typer.Option("--args", help="The tool's arguments as JSON.")]
+StateFile = Annotated[Path | None, typer.Option("--state", help="Keeps the scene between calls.")]
+PlanFile = Annotated[Path, typer.Argument(help="A plan.json that formup wrote.")]
+PictureFile = Annotated[Path | None, typer.Option("--image", help="The picture to work on.")]
+DataFolder = Annotated[
+    Path | None, typer.Option("--data", help="Photographs in the format of evals/photos.")
+]
+Mode = Annotated[str, typer.Option("--mode", help="How to point: box, outline, truth or words.")]
+JsonFile = Annotated[Path | None, typer.Option("--out", help="Where to write the rows as JSON.")]
+Seeds = Annotated[int, typer.Option("--seeds", help="Jitters of every task.")]

@@ -1,0 +1,115 @@
+"""The files a run leaves: plan.json, plan.png, deploy.gif, trace.jsonl; each whole or not at all."""
+
+import io
+import json
+import time
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from ..agent.agent import Run
+from ..agent.messages import Reply, Result, User
+from ..tools.draw import draw_deployment, draw_look, draw_plan, save_gif
+from ..tools.errors import InputError
+from ..tools.formation.plan import Plan
+from ..tools.store import store, write_whole
+from ..tools.workspace import Workspace
+
+MAX_ANIMATED = 1_000
+"""More robots than this are drawn but not animated."""
+
+
+class Folder:
+    """Where a run's files go; made at once so that an unusable place is found before the work."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path or _fresh(Path("formup-runs"))
+        self._made = not self.path.exists()
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            probe = self.path / f".probe-{time.time_ns()}"
+            probe.touch()
+            probe.unlink()
+        except OSError as error:
+            raise InputError(
+                f"The output folder {self.path} cannot be written: {error.strerror or error}; "
+                "give another with --out."
+            ) from None
+
+    def remove_if_empty(self) -> None:
+        """Leave no empty folder behind when nothing came of the run."""
+        if self._made:
+            with suppress(OSError):
+                self.path.rmdir()
+                self.path.parent.rmdir()
+
+
+class Trace:
+    """Gathers the messages of a run as JSON lines, images as their sizes."""
+
+    def __init__(self) -> None:
+        self._began = time.perf_counter()
+        self.lines: list[str] = []
+
+    def __call__(self, message: User | Reply | Result) -> None:
+        """Add a message."""
+        data: dict[str, Any] = message.model_dump(mode="json", exclude={"images"})
+        images = () if isinstance(message, Reply) else message.images
+        seconds = round(time.perf_counter() - self._began, 4)
+        line = {"seconds": seconds, **data, "images": [len(i) for i in images]}
+        self.lines.append(json.dumps(line, ensure_ascii=False))
+
+    def text(self) -> bytes:
+        """The lines as a file."""
+        return ("\n".join(self.lines) + "\n").encode()
+
+
+def write_files(
+    folder: Folder, run: Run, image: Path | None, trace: Trace
+) -> dict[str, str | None]:
+    """Write what there is; names relative to the folder, None for what there is not."""
+    files: dict[str, str | None] = {
+        "plan": None,
+        "picture": None,
+        "animation": None,
+        "trace": "trace.jsonl",
+    }
+    workspace, report = run.workspace, run.report
+    plan = workspace.plans.get(report.plan_id or "")
+    title = report.instruction
+    if plan is not None:
+        stored = store(workspace, image, plan_id=plan.id, instruction=title)
+        write_whole(folder.path / "plan.json", stored.model_dump_json(indent=1).encode())
+        write_whole(folder.path / "plan.png", _png(draw_plan(workspace.scene, plan, title)))
+        files |= {"plan": "plan.json", "picture": "plan.png"}
+        if animate(folder.path / "deploy.gif", workspace, plan, title):
+            files["animation"] = "deploy.gif"
+    elif workspace.scene.targets:
+        write_whole(folder.path / "plan.png", _png(draw_look(workspace.scene)))
+        files["picture"] = "plan.png"
+    write_whole(folder.path / "trace.jsonl", trace.text())
+    return files
+
+
+def animate(path: Path, workspace: Workspace, plan: Plan, title: str) -> bool:
+    """Write the deployment of a plan as a GIF; False when it was not deployed."""
+    frames = workspace.frames.get(plan.id)
+    if not frames or len(frames[0]) > MAX_ANIMATED:
+        return False
+    robots = workspace.arrivals[plan.id].robots
+    save_gif(draw_deployment(workspace.scene, plan, frames, title, robots), path)
+    return True
+
+
+def _png(image: Any) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def _fresh(parent: Path) -> Path:
+    """A folder named by the time that is not there yet."""
+    stem = datetime.now().astimezone().strftime("%Y-%m-%dT%H-%M-%S")
+    names = (stem if i == 0 else f"{stem}-{i + 1}" for i in range(1_000))
+    return next(parent / name for name in names if not (parent / name).exists())

@@ -1,0 +1,90 @@
+"""`formup deploy PLAN.json`: a person's approval of exactly that plan, and the move."""
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+import typer
+from rich.console import Console
+
+from ..agent.report import Report
+from ..tools.doors.committing import deploy as deploy_tool
+from ..tools.errors import FleetError, InputError, ToolError
+from ..tools.formation.check import certify
+from ..tools.formation.plan import Plan
+from ..tools.store import Stored, read_stored, restore, rings
+from ..tools.workspace import Settings, Workspace
+from . import options as o
+from .output import animate
+from .screen import show_report
+
+
+def deploy(plan: o.PlanFile, fleet: o.FleetName = "simulated", as_json: o.Json = False) -> None:
+    """Move robots to a certified plan; naming the file is the approval."""
+    settings = Settings(fleet=fleet)
+    settings.check()
+    stored = read_stored(plan)
+    if stored.plan_id is None or stored.plan_id not in stored.plans:
+        raise InputError(f"{plan} holds no plan to deploy; give a plan.json written by formup run.")
+    workspace = restore(stored, None, settings)
+    chosen = _certified(stored.plans[stored.plan_id], workspace, plan)
+    try:
+        asyncio.run(deploy_tool.call(workspace, {"plan_id": chosen.id}))
+    except ToolError as error:
+        raise FleetError(str(error)) from None
+    animation = plan.with_name("deploy.gif")
+    drawn = animate(animation, workspace, chosen, stored.instruction or "")
+    report = _report(chosen, workspace, stored, animation.name if drawn else None)
+    if as_json:
+        print(report.model_dump_json(indent=2))  # noqa: T201
+        print(f"formup: files in {plan.parent}", file=sys.stderr)  # noqa: T201
+    else:
+        show_report(Console(highlight=False), report, str(plan.parent))
+    raise typer.Exit(report.exit_code)
+
+
+def _certified(plan: Plan, workspace: Workspace, path: Path) -> Plan:
+    """The plan, certified anew: a file's own word is not taken for it."""
+    formation = plan.formation
+    if formation.scene_version != workspace.scene.version:
+        raise InputError(f"{path}: its targets are not those it was certified for; plan again.")
+    site = workspace.scene.site(formation.contract)
+    verdict = certify(formation.points, formation.contract, site)
+    if not verdict.certified:
+        raise InputError(
+            f"{path}: plan {plan.id} is not certified and is not moved to: "
+            f"{verdict.findings[0].sentence}"
+        )
+    return plan.model_copy(update={"verdict": verdict})
+
+
+def _report(plan: Plan, workspace: Workspace, stored: Stored, animation: str | None) -> Report:
+    arrival = workspace.arrivals[plan.id]
+    state = "All arrived" if arrival.arrived else "Not all arrived"
+    targets = [
+        {
+            "id": t.id,
+            "label": t.label,
+            "box": [round(v, 1) for v in t.box],
+            "confidence": t.confidence,
+            "parts": dict(t.parts),
+            "outline": rings(t)[0],
+            "holes": rings(t)[1],
+        }
+        for t in workspace.scene.targets
+    ]
+    return Report(
+        status="deployed" if arrival.arrived else "failed",
+        message=f"{state}; the furthest is {max(arrival.residual_px):.1f} px from its place.",
+        instruction=stored.instruction or "",
+        image=json.loads(stored.image.model_dump_json(exclude={"path"})),
+        targets=tuple(targets),
+        contract=plan.formation.contract,
+        plan_id=plan.id,
+        positions=plan.formation.positions,
+        verdict=plan.verdict,
+        arrival=arrival,
+        model="offline",
+        files={"plan": None, "picture": None, "animation": animation, "trace": None},
+    )

@@ -1,0 +1,110 @@
+"""A run on the terminal: what was found, the contract, its certificate, the arrival table."""
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..agent.report import Report
+from ..tools.formation.contract import Group
+
+MAX_ROWS = 16
+"""Robots shown in the arrival table; the rest are summed up."""
+STATUS_STYLE = {
+    "deployed": "bold green",
+    "planned": "bold green",
+    "question": "bold yellow",
+    "needs_approval": "bold yellow",
+    "impossible": "bold red",
+    "stopped": "bold red",
+    "failed": "bold red",
+}
+
+
+def show_report(console: Console, report: Report, folder: str) -> None:
+    """Print a report for a person."""
+    console.print(Text(report.instruction, style="bold"))
+    for target in report.targets:
+        parts = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in target["parts"].items())
+        box = ", ".join(f"{v:g}" for v in target["box"])
+        _line(
+            console,
+            "found",
+            f"{target['id']}: {target['label']}, box ({box}), "
+            f"confidence {target['confidence']:.2f} ({parts})",
+        )
+    if report.contract is not None:
+        for group in report.contract.groups:
+            _line(console, "contract", _group(group))
+    if report.verdict is not None:
+        _certificate(console, report)
+    if report.arrival is not None:
+        _arrival(console, report)
+    console.print(
+        Text.assemble((f"{report.status}: ", STATUS_STYLE[report.status]), report.message)
+    )
+    written = [name for name in (report.files or {}).values() if name]
+    if written:
+        _line(console, "files", f"{folder}/ {', '.join(written)}")
+
+
+def _line(console: Console, name: str, text: str) -> None:
+    console.print(Text.assemble((f"{name:>12}  ", "cyan"), text))
+
+
+def _group(group: Group) -> str:
+    noun = "robot" if group.robots == 1 else "robots"
+    words = [f"{group.robots} {noun} {group.relation}", " and ".join(group.targets)]
+    if group.side:
+        words.append(f"({group.side} side)")
+    if group.clearance is not None and group.relation == "inside":
+        words.append(f"at least {group.clearance[0]:.1f} px from its edge")
+    elif group.clearance is not None and group.relation not in ("centre", "corners"):
+        words.append(f"{group.clearance[0]:.1f} to {group.clearance[1]:.1f} px away")
+    if group.spacing == "even" and group.relation not in ("corners", "centre"):
+        words.append("evenly spaced")
+    if group.closure:
+        words.append(f"closed {group.closure}")
+    return " ".join(words)
+
+
+def _certificate(console: Console, report: Report) -> None:
+    verdict = report.verdict
+    assert verdict is not None
+    measures = ", ".join(f"{k.replace('_', ' ')} {v:g}" for k, v in verdict.measures.items())
+    if verdict.certified:
+        _line(console, "certified", f"plan {report.plan_id}: {measures}")
+    else:
+        _line(console, "NOT CERTIFIED", f"plan {report.plan_id}: {measures}")
+    for finding in verdict.findings[:MAX_ROWS]:
+        _line(console, "finding", finding.sentence)
+    if len(verdict.findings) > MAX_ROWS:
+        _line(console, "", f"and {len(verdict.findings) - MAX_ROWS} more findings")
+    for note in verdict.notes:
+        _line(console, "note", note)
+
+
+def _arrival(console: Console, report: Report) -> None:
+    arrival, positions = report.arrival, report.positions
+    assert arrival is not None and positions is not None
+    table = Table(box=None, padding=(0, 2), pad_edge=False, header_style="cyan")
+    for title in ("place", "robot", "requested", "observed", "off by"):
+        table.add_column(title, justify="right")
+    rows = zip(arrival.robots, positions, arrival.observed, arrival.residual_px, strict=True)
+    for place, (robot, wanted, seen, off) in enumerate(rows, start=1):
+        if place > MAX_ROWS:
+            break
+        table.add_row(
+            str(place),
+            str(robot),
+            f"{wanted[0]:.1f}, {wanted[1]:.1f}",
+            f"{seen[0]:.1f}, {seen[1]:.1f}",
+            f"{off:.2f} px",
+        )
+    console.print(table)
+    if len(positions) > MAX_ROWS:
+        _line(
+            console,
+            "",
+            f"and {len(positions) - MAX_ROWS} more robots, the furthest "
+            f"{max(arrival.residual_px):.2f} px off",
+        )

@@ -1,0 +1,78 @@
+"""`formup tools list` and `formup tools call`: any one tool by hand."""
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from ..tools.doors import TOOLS
+from ..tools.errors import InputError, ToolError
+from ..tools.perception.image import load_picture
+from ..tools.scene import Scene
+from ..tools.store import read_stored, restore, store, write_whole
+from ..tools.workspace import Settings, Workspace
+from . import options as o
+
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+
+
+@app.command("list")
+def list_tools(as_json: o.Json = False) -> None:
+    """The tools with what they do; with --json their JSON Schemas."""
+    if as_json:
+        listed = [
+            {"name": t.name, "description": t.description, "kind": t.kind, "parameters": t.schema}
+            for t in TOOLS
+        ]
+        print(json.dumps(listed, indent=2))  # noqa: T201
+        return
+    for tool in TOOLS:
+        print(f"{tool.name:20} {tool.kind:8} {tool.description.split('. ')[0].rstrip('.')}")  # noqa: T201
+
+
+@app.command("call")
+def call_tool(
+    name: str, image: o.PictureFile = None, args: o.Arguments = "{}", state: o.StateFile = None
+) -> None:
+    """Call one tool and print its answer; pictures go beside the state file or here."""
+    tool = next((t for t in TOOLS if t.name == name), None)
+    if tool is None:
+        raise InputError(f"Unknown tool {name!r}. There are: {', '.join(t.name for t in TOOLS)}.")
+    arguments = _arguments(args)
+    workspace = _workspace(image, state)
+    path = image or Path(read_stored(state).image.path or "") if state and state.exists() else image
+    try:
+        result = asyncio.run(tool.call(workspace, arguments))
+    except ToolError as error:
+        raise InputError(str(error)) from None
+    data = dict(result.data)
+    folder = state.parent if state else Path()
+    for number, png in enumerate(result.images, start=1):
+        written = folder / f"{name}-{number}.png"
+        write_whole(written, png)
+        data.setdefault("pictures", []).append(str(written))
+    if state is not None:
+        write_whole(state, store(workspace, path).model_dump_json(indent=1).encode())
+    print(json.dumps(data, indent=2, ensure_ascii=False))  # noqa: T201
+
+
+def _arguments(text: str) -> dict[str, Any]:
+    try:
+        arguments = json.loads(text)
+    except ValueError as error:
+        raise InputError(f"--args is not JSON: {error}.") from None
+    if not isinstance(arguments, dict):
+        raise InputError(f'--args must be a JSON object such as {{"target": "t1"}}, not {text!r}.')
+    return arguments
+
+
+def _workspace(image: Path | None, state: Path | None) -> Workspace:
+    if state is not None and state.exists():
+        return restore(read_stored(state), image, Settings())
+    if image is None:
+        raise InputError(
+            "Name the picture with --image, or a state file that has one with --state."
+        )
+    return Workspace(Scene(load_picture(image)))

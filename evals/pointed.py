@@ -1,0 +1,175 @@
+"""Runs the agent over photographs as a person would point: the way of pointing is the variable.
+
+truth: the drawn outline is the mask. box: the target's box, each side moved by up to 8 % of the
+box. outline: at most 12 vertices, each coordinate moved by up to 4 % of the size (square root of
+the area). words: nothing is pointed at.
+"""
+
+import asyncio
+import zlib
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from ..agent.agent import Agent, Run
+from ..agent.messages import User
+from ..agent.task import task_text
+from ..tools.errors import InputError
+from ..tools.geometry.outline import FloatArray
+from ..tools.perception.image import Picture, load_picture
+from ..tools.perception.prompts import TargetPrompt
+from ..tools.scene import Scene, Target
+from ..tools.workspace import Settings, Workspace
+from .grade import grade
+from .suite import Task
+
+Mode = Literal["truth", "box", "outline", "words"]
+BOX_JITTER, OUTLINE_JITTER, OUTLINE_VERTICES = 0.08, 0.04, 12
+
+
+@dataclass(frozen=True)
+class Row:
+    """One task under one jitter: what was asked, what came of it, and how it was graded."""
+
+    task: str
+    mode: Mode
+    seed: int
+    category: str
+    status: str
+    success: bool
+    strict: bool
+    certified: bool
+    iou: float | None
+    confidence: float | None
+    failures: list[str]
+    message: str
+
+
+def mode_named(text: str) -> Mode:
+    """A mode by name.
+
+    Raises:
+        InputError: there is none; the text lists those there are.
+    """
+    for mode in get_args(Mode):
+        if text == mode:
+            return mode
+    raise InputError(f"Unknown mode {text!r}. There are: {', '.join(get_args(Mode))}.")
+
+
+def one_target(tasks: Iterable[Task]) -> list[Task]:
+    """The tasks about one thing: those a single pointing can settle."""
+    return [task for task in tasks if task.other is None]
+
+
+def evaluate(
+    tasks: Iterable[Task], mode: Mode, seeds: int, done: Callable[[Row], None] = lambda row: None
+) -> list[Row]:
+    """Run every task under every seed; `done` is told of each row as it comes."""
+    rows: list[Row] = []
+    for task in tasks:
+        for seed in range(seeds if mode in ("box", "outline") else 1):
+            rows.append(_row(task, mode, seed))
+            done(rows[-1])
+    return rows
+
+
+def summary(rows: list[Row]) -> dict[str, dict[str, float]]:
+    """Per category and in total: runs, success, strict success, mean IoU, share answered."""
+    groups = {c: [r for r in rows if r.category == c] for c in ("general", "infill", "caging")}
+    groups["total"] = rows
+    return {name: _means(group) for name, group in groups.items() if group}
+
+
+def as_json(row: Row) -> dict[str, object]:
+    """A row as JSON data."""
+    return asdict(row)
+
+
+def _means(rows: list[Row]) -> dict[str, float]:
+    known = [row.iou for row in rows if row.iou is not None]
+    return {
+        "runs": len(rows),
+        "success": float(np.mean([row.success for row in rows])),
+        "strict": float(np.mean([row.strict for row in rows])),
+        "iou": float(np.mean(known)) if known else float("nan"),
+        "placed": float(np.mean([row.status == "deployed" for row in rows])),
+    }
+
+
+def _row(task: Task, mode: Mode, seed: int) -> Row:
+    run = _run(task, mode, seed)
+    report = run.report
+    placed = report.arrival.observed if report.arrival and report.arrival.arrived else None
+    graded = grade(task, placed)
+    target = run.workspace.scene.targets[0] if run.workspace.scene.targets else None
+    return Row(
+        task=task.id,
+        mode=mode,
+        seed=seed,
+        category=task.category,
+        status=report.status,
+        success=graded.success,
+        strict=graded.strict,
+        certified=report.verdict is not None and report.verdict.certified,
+        iou=None if target is None else round(_iou(target.outline.polygon, task), 4),
+        confidence=None if target is None else target.confidence,
+        failures=graded.failures + graded.strict_failures,
+        message=report.message,
+    )
+
+
+def _run(task: Task, mode: Mode, seed: int) -> Run:
+    picture, agent = _picture(task.image), Agent()
+    settings = Settings(robots=task.robots)
+    if mode == "truth":
+        outline = task.target.outline
+        target = Target("t1", task.target.name, outline.bounds, 1.0, outline, "truth")
+        workspace = Workspace(Scene(picture, (target,)), settings)
+        first = User(text=task_text(task.instruction, workspace))
+        return asyncio.run(agent.resume(workspace, (first,), task.instruction))
+    pointed = () if mode == "words" else (_prompt(task, mode, seed),)
+    return agent.run(picture, task.instruction, pointed=pointed, settings=settings)
+
+
+def _prompt(task: Task, mode: Mode, seed: int) -> TargetPrompt:
+    random = np.random.default_rng([seed, zlib.crc32(task.id.encode())])
+    far = np.array([task.size[0] - 1, task.size[1] - 1], dtype=float)
+    if mode == "box":
+        box = np.asarray(task.target.outline.bounds).reshape(2, 2)
+        moved = box + random.uniform(-BOX_JITTER, BOX_JITTER, (2, 2)) * (box[1] - box[0])
+        x0, y0, x1, y1 = np.clip(moved, 0, far).ravel()
+        return TargetPrompt(box=(float(x0), float(y0), float(x1), float(y1)))
+    vertices = _few_vertices(task)
+    while True:  # a jitter that crosses itself is no outline a person would draw
+        amount = OUTLINE_JITTER * task.target.outline.size
+        moved = np.clip(vertices + random.uniform(-amount, amount, vertices.shape), 0, far)
+        if Polygon(moved).is_valid:
+            return TargetPrompt(outline=tuple((float(x), float(y)) for x, y in moved))
+
+
+def _few_vertices(task: Task) -> FloatArray:
+    """The true outline simplified to at most 12 vertices, (k, 2)."""
+    ring = LineString([*task.target.polygon, task.target.polygon[0]])
+    tolerance = 0.5
+    while True:
+        points = shapely.get_coordinates(ring.simplify(tolerance))[:-1]
+        if len(points) <= OUTLINE_VERTICES:
+            return points
+        tolerance *= 1.15
+
+
+def _iou(polygon: Polygon, task: Task) -> float:
+    truth = shapely.make_valid(Polygon(task.target.polygon, task.target.holes))
+    return float(polygon.intersection(truth).area / polygon.union(truth).area)
+
+
+@lru_cache(maxsize=4)
+def _picture(path: Path) -> Picture:
+    return load_picture(path)

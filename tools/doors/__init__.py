@@ -1,0 +1,23 @@
+"""The tools a model sees: thin doors to perception, geometry, formation and fleet."""
+
+from ..tool import Tool
+from .committing import ask_user, deploy, propose_formation, report_impossible
+from .measuring import check_point, describe_shape, measure
+from .sampling import sample_along_edges, sample_inside, sample_shape
+from .seeing import locate_object, look, segment
+
+TOOLS: tuple[Tool, ...] = (
+    look,
+    locate_object,
+    segment,
+    describe_shape,
+    check_point,
+    sample_along_edges,
+    sample_inside,
+    sample_shape,
+    measure,
+    propose_formation,
+    deploy,
+    ask_user,
+    report_impossible,
+)

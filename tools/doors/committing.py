@@ -1,0 +1,156 @@
+"""Doors that commit: propose_formation, deploy, ask_user, report_impossible."""
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import ToolError
+from ..fleet.deploy import deploy as drive
+from ..fleet.simulated import SimulatedFleet
+from ..formation.contract import Contract, Group
+from ..formation.plan import Plan, make_plan
+from ..perception.prompts import Point, TargetPrompt
+from ..tool import ToolResult, tool
+from ..workspace import Settings, Workspace
+from .seeing import FRAME, summary
+
+MAX_FINDINGS = 12
+"""Findings spelled out in a reply; the rest are counted."""
+EXACT_SHARE, EXACT_PX = 0.05, 1.0
+"""How exactly a clearance the person fixed is held."""
+
+
+@tool("commit")
+def propose_formation(
+    workspace: Workspace,
+    contract: Contract,
+    targets: tuple[TargetPrompt, ...] = (),
+    positions: tuple[Point, ...] | None = None,
+    samples: tuple[str, ...] | None = None,
+) -> ToolResult:
+    """State what the instruction demands, place the robots, and have the placement certified.
+
+    Without positions or samples the robots are placed as the contract says: the usual way.
+    The reply has the plan id and every violation with numbers; an uncertified plan cannot be
+    deployed, so repair it and propose again.
+
+    Args:
+        contract: what the positions must satisfy; its robots must add up to those asked for.
+        targets: things not segmented yet, each by box, points or outline; they get the ids given.
+        positions: (x, y) of every robot, image pixels, y down, in the order of the groups.
+        samples: names of samples (s1, ...) to use as positions, in the order of the groups.
+    """
+    if positions is not None and samples is not None:
+        raise ToolError("propose_formation: give positions or samples, not both.")
+    asked = workspace.settings.robots
+    if asked is not None and contract.robots != asked:
+        raise ToolError(
+            f"The person asked for {asked} robots; the contract's groups add up to "
+            f"{contract.robots}."
+        )
+    for prompt in targets:
+        workspace.segment(prompt)
+    held = _held_to(contract, workspace.settings)
+    places = positions if samples is None else _sampled(workspace, samples)
+    plan = make_plan(held, workspace.scene.site(held), workspace.scene.version, places)
+    workspace.plans[plan.id] = plan
+    return ToolResult(_proposal(workspace, plan))
+
+
+@tool("actuate")
+async def deploy(workspace: Workspace, plan_id: str) -> ToolResult:
+    """Move the robots to a certified plan and report where they were observed to arrive.
+
+    Args:
+        plan_id: id of a certified plan made in this scene.
+    """
+    plan = workspace.current_plan(plan_id)
+    if not plan.verdict.certified:
+        raise ToolError(f"Plan {plan_id} is not certified; repair its findings and propose again.")
+    if not workspace.settings.may_deploy:
+        raise ToolError("The person asked for the plan only: nothing may be moved.")
+    site = workspace.scene.site(plan.formation.contract)
+    fleet = workspace.fleet_for(plan.formation.contract, site)
+    arrival = await drive(plan, site, fleet)
+    workspace.arrivals[plan_id] = arrival
+    if isinstance(fleet, SimulatedFleet):
+        workspace.frames[plan_id] = fleet.frames
+    worst = int(np.argmax(arrival.residual_px))
+    return ToolResult(
+        {
+            "plan_id": plan_id,
+            "arrived": arrival.arrived,
+            "corrections": arrival.corrections,
+            "worst_residual_px": arrival.residual_px[worst],
+            "worst_robot": worst + 1,
+            "tolerance_px": arrival.tolerance_px,
+        }
+    )
+
+
+@tool("ask")
+def ask_user(workspace: Workspace, question: str, candidates: tuple[str, ...] = ()) -> ToolResult:
+    """Ask the person when the instruction does not settle what to do; this ends the turn.
+
+    Args:
+        question: one clear question.
+        candidates: target ids the person may choose from.
+    """
+    listed = [summary(workspace.scene.target(c)) for c in candidates]
+    return ToolResult({"question": question, "candidates": listed})
+
+
+@tool("end")
+def report_impossible(
+    workspace: Workspace, reason: str, robots_needed: int | None = None, plan_id: str | None = None
+) -> ToolResult:
+    """Say that the instruction cannot be carried out, and why; this ends the run.
+
+    Args:
+        reason: why, in one sentence, with the numbers.
+        robots_needed: how many robots would do, where that is the trouble.
+        plan_id: the best plan that was found, certified or not.
+    """
+    if plan_id is not None and plan_id not in workspace.plans:
+        raise ToolError(f"There is no plan {plan_id!r}.")
+    return ToolResult({"reason": reason, "robots_needed": robots_needed, "plan_id": plan_id})
+
+
+def _held_to(contract: Contract, settings: Settings) -> Contract:
+    """The contract with what the person fixed: robot radius and clearance."""
+    groups = tuple(_with_clearance(g, settings.clearance) for g in contract.groups)
+    radius = settings.robot_radius
+    return contract.model_copy(update={"groups": groups, "robot_radius": radius})
+
+
+def _with_clearance(group: Group, clearance: float | None) -> Group:
+    if clearance is None or group.relation in ("between", "shape", "centre"):
+        return group
+    slack = max(EXACT_PX, EXACT_SHARE * clearance)
+    greatest = 100_000.0 if group.relation == "inside" else clearance + slack
+    least = clearance if group.relation == "inside" else max(clearance - slack, 0.0)
+    return group.model_copy(update={"clearance": (least, greatest)})
+
+
+def _sampled(workspace: Workspace, samples: tuple[str, ...]) -> Any:
+    unknown = [s for s in samples if s not in workspace.samples]
+    if unknown:
+        known = ", ".join(workspace.samples) or "none yet"
+        raise ToolError(f"There is no sample {unknown[0]!r}. Samples: {known}.")
+    return np.concatenate([workspace.samples[s] for s in samples] or [np.empty((0, 2))])
+
+
+def _proposal(workspace: Workspace, plan: Plan) -> dict[str, Any]:
+    verdict, contract = plan.verdict, plan.formation.contract
+    findings = [f.sentence for f in verdict.findings]
+    more = len(findings) - MAX_FINDINGS
+    return {
+        "plan_id": plan.id,
+        "certified": verdict.certified,
+        "findings": findings[:MAX_FINDINGS] + ([f"and {more} more findings"] if more > 0 else []),
+        "notes": list(verdict.notes),
+        "measures": verdict.measures,
+        "targets": [summary(workspace.scene.target(t)) for t in contract.target_ids],
+        "robots": contract.robots,
+        "frame": FRAME,
+    }

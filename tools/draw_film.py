@@ -1,0 +1,222 @@
+"""A deployment as moving pictures: where the robots are, frame by frame, and where they go."""
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from .draw_canvas import (
+    ALLOWED,
+    CERTIFIED,
+    FINDING,
+    INK,
+    MUTED,
+    PAPER,
+    ROBOT,
+    TARGET,
+    WHITE,
+    Canvas,
+    Colour,
+)
+from .draw_marks import draw_outline, draw_robots, robot_size
+from .draw_page import (
+    FOOTER,
+    FOOTER_HEIGHT,
+    LINE,
+    PAD,
+    TITLE,
+    draw_bars,
+    draw_footer,
+    footer_middle,
+    left_text,
+    make_page,
+)
+from .errors import InputError
+from .fleet.deploy import ARRIVED_PX, ARRIVED_SHARE
+from .formation.plan import Plan
+from .geometry.outline import FloatArray
+from .geometry.sampling import nearest
+from .perception.image import Picture
+from .scene import Scene
+
+SIDE = 640
+"""Greatest side of a frame, page px."""
+UNIT = 0.8
+TITLE_LINES = 2
+NARROWEST = 400.0
+NUMBERED, TRAILED = 30, 400
+"""Up to so many robots bear numbers; up to so many leave trails."""
+NUMBER_RADIUS = 8.0
+TRAIL = 10
+"""Frames a trail is long."""
+GIF_FRAMES, GIF_BYTES = 48, 3_000_000
+GIF_SIDES = (640, 520, 420, 320)
+"""Sides tried in turn until the file is small enough."""
+TICK_MS, LAST_MS = 80, 2000
+STYLE: tuple[Colour, ...] = (ROBOT, WHITE, INK, TARGET, PAPER, MUTED, CERTIFIED, FINDING, ALLOWED)
+"""Colours a palette made from the photograph alone would lose."""
+
+
+def draw_deployment(
+    scene: Scene,
+    plan: Plan,
+    frames: Sequence[FloatArray],
+    title: str,
+    robots: Sequence[int] | None = None,
+) -> list[Image.Image]:
+    """One picture per frame, all of one size, no side over 640 px.
+
+    Args:
+        scene: what the plan was made in.
+        plan: its places are the goals.
+        frames: (n, 2) each: where the fleet's robots are over time, image pixels.
+        title: usually the instruction.
+        robots: which robot of the fleet, from 1, takes each place; the goals bear its number.
+
+    Raises:
+        ToolError: the plan names a target that the scene does not have.
+    """
+    goals = plan.formation.points
+    page = make_page(scene.picture, _long(scene.picture), UNIT, title, TITLE_LINES, NARROWEST)
+    for name in plan.formation.contract.target_ids:
+        draw_outline(page.canvas, scene.target(name).outline)
+    radius = robot_size(page.canvas, goals)
+    _draw_goals(page.canvas, goals, radius, robots)
+    draw_bars(page)
+    return [
+        _frame(page.canvas, frames[max(i - TRAIL, 0) : i + 1], goals, radius, (i, len(frames)))
+        for i in range(len(frames))
+    ]
+
+
+def save_gif(frames: Sequence[Image.Image], path: Path) -> None:
+    """Write a looping GIF of 12 frames a second that rests on its last frame for 2 s.
+
+    Of more than 48 frames as many are kept, evenly; the first frame's size goes for all and is
+    reduced to sides of 640 px, or less until the file has under 3 MB. The file appears whole
+    or not at all.
+
+    Raises:
+        InputError: there are no frames.
+    """
+    if not frames:
+        raise InputError("There are no frames to save; draw at least one.")
+    chosen = np.linspace(0, len(frames) - 1, min(len(frames), GIF_FRAMES))
+    kept = [frames[round(float(i))].convert("RGB") for i in chosen]
+    data = b""
+    for side in GIF_SIDES:
+        data = _encoded(kept, side)
+        if len(data) <= GIF_BYTES:
+            break
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_bytes(data)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _long(picture: Picture) -> int:
+    """The photograph's long side with which a page of any title stays within SIDE."""
+    bars = (TITLE_LINES * TITLE * LINE + 2 * PAD + FOOTER_HEIGHT) * UNIT + 2
+    factor = min(SIDE / picture.width, (SIDE - bars) / picture.height)
+    return int(factor * max(picture.size))
+
+
+def _draw_goals(
+    canvas: Canvas, goals: FloatArray, radius: float, robots: Sequence[int] | None
+) -> None:
+    for goal in goals:
+        canvas.circle(goal, radius, WHITE, max(0.15 * radius, 0.7))
+    if robots is None or not _numbered(len(goals), radius):
+        return
+    for goal, robot in zip(canvas.at(goals), robots, strict=True):
+        canvas.text(goal, str(robot), 1.2 * radius, WHITE)
+
+
+def _numbered(count: int, radius: float) -> bool:
+    return count <= NUMBERED and radius >= NUMBER_RADIUS
+
+
+def _frame(
+    base: Canvas,
+    recent: Sequence[FloatArray],
+    goals: FloatArray,
+    radius: float,
+    step: tuple[int, int],
+) -> Image.Image:
+    """The base with trails, robots and footer; the last of the recent poses are the present."""
+    canvas, now = base.copy(), recent[-1]
+    last = step[0] == step[1] - 1
+    if not last and len(recent) > 1 and len(now) <= TRAILED:
+        canvas.trails(np.stack(recent), ALLOWED, 0.5 * radius)
+    draw_robots(canvas, dict(enumerate(now, start=1)), radius)
+    if _numbered(len(now), radius):
+        for robot, centre in enumerate(canvas.at(now), start=1):
+            canvas.text(centre, str(robot), 1.25 * radius, WHITE, ROBOT)
+    if last:
+        _draw_end(canvas, now, goals)
+    else:
+        _draw_progress(canvas, *step)
+    return canvas.finish()
+
+
+def _draw_progress(canvas: Canvas, index: int, count: int) -> None:
+    """A bar and the number of the step."""
+    y, pad = footer_middle(canvas), PAD * canvas.unit
+    text = f"step {index + 1} of {count}"
+    width = canvas.text_size(f"step {count} of {count}", FOOTER)[0]
+    left_text(canvas, pad, y, text, FOOTER, MUTED)
+    x0, x1 = 2 * pad + width, canvas.size[0] - pad
+    x, half = x0 + (x1 - x0) * (index + 1) / count, 3 * canvas.unit
+    canvas.box((x0, y - half, x1, y + half), MUTED, 3, 0.35)
+    canvas.box((x0, y - half, x, y + half), PAPER, 3)
+
+
+def _draw_end(canvas: Canvas, now: FloatArray, goals: FloatArray) -> None:
+    """How many of the places have a robot on them, within what a deployment tolerates."""
+    diagonal = float(np.hypot(*(canvas.source)))
+    tolerance = max(ARRIVED_PX, ARRIVED_SHARE * diagonal)
+    there = int((nearest(now, goals, 1)[0] <= tolerance).sum())
+    noun = "robot" if len(goals) == 1 else "robots"
+    if there == len(goals):
+        draw_footer(canvas, "arrived", CERTIFIED, [f"{len(goals)} {noun} in place"])
+    else:
+        draw_footer(canvas, "not arrived", FINDING, [f"{there} of {len(goals)} {noun} in place"])
+
+
+def _encoded(frames: Sequence[Image.Image], side: int) -> bytes:
+    """The frames as GIF with no side over a length, one palette for all."""
+    width, height = frames[0].size
+    factor = min(side / max(width, height), 1.0)
+    size = (max(round(width * factor), 1), max(round(height * factor), 1))
+    sized = [f if f.size == size else f.resize(size, Image.Resampling.LANCZOS) for f in frames]
+    palette = _palette(sized)
+    # Without dithering what stands still stays the same, which is most of a small file.
+    flat = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in sized]
+    buffer = BytesIO()
+    flat[0].save(
+        buffer,
+        "GIF",
+        save_all=True,
+        append_images=flat[1:],
+        duration=[TICK_MS] * (len(flat) - 1) + [LAST_MS],
+        loop=0,
+        optimize=True,
+        disposal=1,
+    )
+    return buffer.getvalue()
+
+
+def _palette(frames: Sequence[Image.Image]) -> Image.Image:
+    """A palette for all frames: the style's colours, and the rest from first, middle and last."""
+    width, height = frames[0].size
+    sample = Image.new("RGB", (width, 3 * height))
+    for row, frame in enumerate((frames[0], frames[len(frames) // 2], frames[-1])):
+        sample.paste(frame, (0, row * height))
+    colours = sample.quantize(255 - len(STYLE)).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([v for colour in STYLE for v in colour] + colours)
+    return palette

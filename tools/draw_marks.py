@@ -1,0 +1,303 @@
+"""Marks on a photograph: what a contract demands, and the robots.
+
+Nothing is decided here: places come from the references the checker measures against.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, MultiLineString, Point
+from shapely.geometry.base import BaseGeometry
+
+from .draw_canvas import (
+    ALLOWED,
+    FINDING,
+    FORBIDDEN,
+    INK,
+    PAPER,
+    ROBOT,
+    TARGET,
+    WHITE,
+    Canvas,
+    Labels,
+)
+from .errors import ToolError
+from .formation.contract import CENTRE_SHARE, OUTSIDE, Contract
+from .formation.place import Site, reference_curve
+from .formation.verdict import Part, parts_of
+from .geometry.curves import Curve
+from .geometry.outline import FloatArray, Outline, distances
+from .geometry.sampling import corner_points, nearest
+
+OUTLINE_DETAIL = 0.3
+"""Units of the page by which a drawn outline may differ from the measured one."""
+LABEL = 17.0
+NUMBERED = 60
+"""Up to so many robots bear their numbers."""
+SIZES = ((NUMBERED, (5.5, 14.0)), (400, (3.0, 8.0)), (np.inf, (1.3, 4.0)))
+"""Up to so many robots: least and greatest radius they are drawn with."""
+NEIGHBOUR_SHARE = 0.42
+"""Greatest radius as a share of the distance to the nearest neighbour."""
+NUMBER_RADIUS = 9.5
+"""Units of the page; on a smaller disc no number is legible."""
+
+
+@dataclass(frozen=True)
+class Opening:
+    """The widest gap of a ring: where its middle is, image pixels, and how wide, px."""
+
+    middle: FloatArray
+    width: float
+
+
+def draw_areas(canvas: Canvas, contract: Contract, site: Site, points: FloatArray) -> None:
+    """Tint where robots may stand and where none may, then draw every target's outline."""
+    picture = shapely.box(-0.5, -0.5, site.width - 0.5, site.height - 0.5)
+    for part in parts_of(contract, points, site):
+        area = _allowed(part)
+        if area is not None:
+            shown = area.intersection(picture)
+            canvas.tint(shown, ALLOWED, 0.26)
+            canvas.strokes(_rings(shown), ALLOWED, 1.0, 0.8)
+    for name in contract.keep_out:
+        canvas.tint(site.outlines[name].filled, FORBIDDEN, 0.35)
+    for name in contract.target_ids:
+        draw_outline(canvas, site.outlines[name])
+
+
+def draw_outline(canvas: Canvas, outline: Outline, colour: tuple[int, int, int] = TARGET) -> None:
+    """The outline and its holes as a light line with dark seams."""
+    simple = outline.polygon.simplify(OUTLINE_DETAIL / canvas.page_length(1.0))
+    canvas.cased(_rings(simple), colour, 2.6)
+
+
+def draw_guides(canvas: Canvas, contract: Contract, site: Site, points: FloatArray) -> None:
+    """Dashes along what robots stand on: gaps of a ring, a side or line, ways to corners."""
+    for part in parts_of(contract, points, site):
+        if not len(part.points):
+            continue
+        if part.group.relation == "corners":
+            corners = corner_points(part.outline, part.group.robots)
+            canvas.dashes([np.concatenate([corners, corners[:1]])], WHITE, 0.8)
+            canvas.cased(_corner_links(part, corners), WHITE, 1.5)
+            for corner in corners:
+                canvas.disc(corner, 2.0, INK, 1.2)
+        elif part.group.relation == "centre":
+            canvas.cross(np.asarray(part.outline.centre), 6, WHITE, 1.6)
+        else:
+            canvas.dashes(_guides(part), WHITE, 1.5)
+
+
+def label_openings(
+    canvas: Canvas, contract: Contract, site: Site, points: FloatArray, labels: Labels
+) -> None:
+    """The widest gap of every ring in px, where the checker measures it."""
+    for part in parts_of(contract, points, site):
+        opening = _opening(part)
+        if opening is None:
+            continue
+        text = f"{opening.width:.{0 if opening.width >= 10 else 1}f} px"
+        middle = canvas.at(opening.middle[None])[0]
+        away = middle - canvas.at(np.array([part.outline.centre]))[0]
+        size = canvas.chip_size(text, LABEL)
+        where = labels.place(middle, size, away, 6 * canvas.unit)
+        canvas.chip(where, text, LABEL, INK, PAPER)
+
+
+def robot_size(canvas: Canvas, points: FloatArray, room: float = np.inf) -> float:
+    """Radius robots are drawn with, units of the page, so that neighbours stay apart.
+
+    Args:
+        canvas: what they are drawn on.
+        points: (n, 2), where they stand, image pixels.
+        room: to keep clear of other things, source px, as far as a disc remains visible.
+    """
+    count = len(points)
+    least, most = next(size for limit, size in SIZES if count <= limit)
+    if count > 1:
+        # A quantile, because a few robots that stand wrongly must not shrink all.
+        apart = np.quantile(nearest(points, points, 2)[0][:, 1], 0.1)
+        room = min(room, NEIGHBOUR_SHARE * float(apart))
+    return float(np.clip(canvas.page_length(room), least, most))
+
+
+def target_room(contract: Contract, site: Site, points: FloatArray) -> float:
+    """How far most robots outside a target stand from its edge, half as far as from a corner, px.
+
+    Infinite where no robot stands outside a target.
+    """
+    away: list[FloatArray] = []
+    for part in parts_of(contract, points, site):
+        if part.group.relation not in OUTSIDE or not len(part.points):
+            continue
+        away.append(distances(part.outline.polygon.boundary, part.points))
+        if part.group.relation == "corners":
+            corners = corner_points(part.outline, part.group.robots)
+            away.append(nearest(corners, part.points, 1)[0] / 2)
+    return float(np.quantile(np.concatenate(away), 0.2)) if away else np.inf
+
+
+def draw_robots(
+    canvas: Canvas, points: Mapping[int, FloatArray], radius: float, flagged: Collection[int] = ()
+) -> None:
+    """Discs on the robots' exact places.
+
+    Args:
+        canvas: what to draw on.
+        points: robot, from 1, to its place, (2,), image pixels.
+        radius: of the discs, units of the page.
+        flagged: robots to draw in red with a cross, above the others.
+    """
+    rim = float(np.clip(0.17 * radius, 0.6, 1.9))
+    for robot in sorted(points, key=lambda r: r in flagged):
+        if robot in flagged:
+            canvas.disc(points[robot], radius, FINDING, rim)
+            canvas.cross(points[robot], 0.45 * radius, WHITE, max(0.2 * radius, 0.8))
+        else:
+            canvas.disc(points[robot], radius, ROBOT, rim)
+
+
+def number_robots(
+    canvas: Canvas,
+    points: Mapping[int, FloatArray],
+    radius: float,
+    labels: Labels,
+    away: Mapping[int, FloatArray],
+    flagged: Collection[int] = (),
+) -> None:
+    """Numbers in the discs where they fit and no cross is, else beside them.
+
+    Args:
+        canvas, points, radius, flagged: as of draw_robots.
+        labels: where there is room beside.
+        away: robot to the direction its number may best stand in.
+    """
+    reach = 1.4 * radius * canvas.unit
+    on_page = {robot: canvas.at(point[None])[0] for robot, point in points.items()}
+    if on_page:
+        centres = np.stack(list(on_page.values()))
+        labels.take(np.concatenate([centres - reach, centres + reach], axis=1))
+    if len(points) > NUMBERED:
+        return
+    for robot, centre in on_page.items():
+        if radius >= NUMBER_RADIUS and robot not in flagged:
+            canvas.text(centre, str(robot), 1.25 * radius, WHITE, ROBOT)
+        else:
+            size = canvas.text_size(str(robot), LABEL)
+            where = labels.place(centre, size, away[robot], reach)
+            canvas.text(where, str(robot), LABEL, WHITE, INK)
+
+
+def directions(contract: Contract, site: Site, points: FloatArray) -> dict[int, FloatArray]:
+    """Robot, from 1, to the way off its target, (2,), zero where there is none such."""
+    ways: dict[int, FloatArray] = {}
+    for part in parts_of(contract, points, site):
+        off = part.group.relation in OUTSIDE
+        for k, point in enumerate(part.points):
+            way = point - np.asarray(part.outline.centre) if off else np.zeros(2)
+            ways[part.first + k + 1] = way
+    return ways
+
+
+def _allowed(part: Part) -> BaseGeometry | None:
+    """Where the centres of a group's robots may be, image pixels, as far as it is an area."""
+    group, radius = part.group, part.radius
+    if group.relation == "centre":
+        outline = part.outline
+        return Point(outline.centre).buffer(CENTRE_SHARE * outline.size)
+    if group.relation == "inside":
+        return part.outline.polygon.buffer(-(part.clearance[0] + radius))
+    if group.relation not in ("around", "cage", "along"):
+        return None
+    least, greatest = (limit + radius for limit in part.clearance)
+    solid = part.outline.filled
+    # What lies far outside the picture is never seen, and costs time to make.
+    reach = min(greatest, part.site.width + part.site.height)
+    ring = solid.buffer(reach).difference(solid.buffer(least))
+    curve = _curve(part) if group.relation == "along" else None
+    if curve is None:
+        return ring
+    return ring.intersection(curve.geometry().buffer(reach, cap_style="flat"))
+
+
+def _curve(part: Part) -> Curve | None:
+    """What the group stands on; None where nothing of it is left."""
+    try:
+        curve = reference_curve(part.group, part.site, part.radius)
+    except ToolError:
+        return None
+    return curve if curve.lines else None
+
+
+def _guides(part: Part) -> list[FloatArray]:
+    """Polylines to dash, image pixels: straight across a cage's gaps, else the reference curve."""
+    if part.group.relation == "inside" or _is_free(part):
+        return []
+    curve = _curve(part)
+    if curve is None:
+        return []
+    if part.group.relation != "cage":
+        return list(curve.lines)
+    ordered = part.points[np.argsort(_stations(part.points, curve), kind="stable")]
+    return list(np.stack([ordered, np.roll(ordered, -1, axis=0)], axis=1))
+
+
+def _is_free(part: Part) -> bool:
+    return part.group.relation == "shape" and part.group.line is None
+
+
+def _opening(part: Part) -> Opening | None:
+    """A cage's straight between robots' edges, another ring's along the curve."""
+    if part.group.relation not in ("around", "cage") or len(part.points) < 2:
+        return None
+    curve = _curve(part)
+    if curve is None:
+        return None
+    stations = _stations(part.points, curve)
+    order = np.argsort(stations, kind="stable")
+    points, after = part.points[order], np.roll(part.points[order], -1, axis=0)
+    if part.group.relation == "cage":
+        across = np.linalg.norm(after - points, axis=1)
+        k = int(np.argmax(across))
+        return Opening((points[k] + after[k]) / 2, max(float(across[k]) - 2 * part.radius, 0.0))
+    return _gap_along(points, stations[order], curve)
+
+
+def _gap_along(points: FloatArray, stations: FloatArray, curve: Curve) -> Opening | None:
+    """The widest gap between robots in order along a ring in one piece."""
+    if len(curve.lines) != 1:
+        return None
+    cut = 0.0 if curve.closed else curve.cut(len(points))
+    gaps = np.diff(stations)
+    if cut is not None:
+        gaps = np.append(gaps, stations[0] + curve.length + cut - stations[-1])
+    k = int(np.argmax(gaps))
+    line = LineString(curve.lines[0])
+    station = np.array([(stations[k] + gaps[k] / 2) % (curve.length + (cut or 0.0))])
+    middle = shapely.get_coordinates(shapely.line_interpolate_point(line, station))[0]
+    return Opening(middle, float(gaps[k]))
+
+
+def _stations(points: FloatArray, curve: Curve) -> FloatArray:
+    """Arc length of each point's foot on the curve, (n,), px."""
+    feet = shapely.line_locate_point(curve.geometry(), shapely.points(points))
+    return np.asarray(feet, dtype=float)
+
+
+def _corner_links(part: Part, corners: FloatArray) -> list[FloatArray]:
+    """From each robot to the corner it is matched with."""
+    from scipy.optimize import linear_sum_assignment
+
+    distance = np.linalg.norm(part.points[:, None] - corners[None], axis=2)
+    robots, matched = linear_sum_assignment(distance)
+    return list(np.stack([part.points[robots], corners[matched]], axis=1))
+
+
+def _rings(geometry: BaseGeometry) -> list[FloatArray]:
+    """Every boundary line of an area, closed, (k, 2) each."""
+    lines = shapely.get_parts(shapely.boundary(geometry))
+    return [
+        shapely.get_coordinates(x) for x in lines if isinstance(x, LineString | MultiLineString)
+    ]

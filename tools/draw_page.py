@@ -1,0 +1,85 @@
+"""The page around a photograph: a title above it, a line of text below.
+
+Neither hides any of the photograph. Lengths are units of the page, see Canvas.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .draw_canvas import FINE, INK, MUTED, PAPER, Canvas, Colour, shown_size
+from .draw_text import font, wrapped
+from .perception.image import Picture
+
+TITLE, FOOTER = 25.0, 19.0
+LINE, PAD = 1.35, 12.0
+"""Line height as a multiple of the text's size; room above, below and beside text."""
+FOOTER_HEIGHT = FOOTER * LINE + 2 * PAD
+
+
+@dataclass(frozen=True)
+class Page:
+    """A canvas with a title of some lines and an empty footer."""
+
+    canvas: Canvas
+    title: list[str]
+
+
+def make_page(
+    picture: Picture, long: int, unit: float, title: str, lines: int, narrowest: float
+) -> Page:
+    """Lay out a page.
+
+    Args:
+        picture: the photograph.
+        long: its long side on the page, page px.
+        unit: page px per unit of strokes and text.
+        title: any text; none takes no room.
+        lines: of title at most.
+        narrowest: the page's least width, units; the photograph is centred on it.
+    """
+    width = shown_size(picture, long)[0]
+    side = max(round(narrowest * unit) - width, 0)
+    face = font(max(round(TITLE * unit), 6) * FINE)
+    kept = wrapped(title, (width + side - 2 * PAD * unit) * FINE, face, lines)
+    top = round((len(kept) * TITLE * LINE + 2 * PAD) * unit) if kept else 0
+    margins = (side // 2, top, side - side // 2, round(FOOTER_HEIGHT * unit))
+    return Page(Canvas(picture, long, unit, margins), kept)
+
+
+def draw_bars(page: Page) -> None:
+    """Title and footer grounds, over whatever was drawn beyond the photograph's edge."""
+    canvas, unit = page.canvas, page.canvas.unit
+    x0, top, x1, bottom = canvas.photo
+    width, height = canvas.size
+    for box in ((0, 0, width, top), (0, bottom, width, height), (0, top, x0, bottom),
+                (x1, top, width, bottom)):  # fmt: skip
+        if box[2] > box[0] and box[3] > box[1]:
+            canvas.box(box, INK)
+    for row, line in enumerate(page.title):
+        y = (PAD + (row + 0.5) * TITLE * LINE) * unit
+        left_text(canvas, PAD * unit, y, line, TITLE, PAPER)
+
+
+def footer_middle(canvas: Canvas) -> float:
+    """The middle of the footer from the page's top, page px."""
+    return (canvas.photo[3] + canvas.size[1]) / 2
+
+
+def left_text(canvas: Canvas, x: float, y: float, text: str, size: float, colour: Colour) -> None:
+    """Text that begins at x and has its middle at y, page px."""
+    width = canvas.text_size(text, size)[0]
+    canvas.text(np.array([x + width / 2, y]), text, size, colour)
+
+
+def draw_footer(canvas: Canvas, badge: str, ground: Colour, items: list[str]) -> None:
+    """A badge and after it as many of the items, most important first, as fit."""
+    y, pad = footer_middle(canvas), PAD * canvas.unit
+    width, _ = canvas.chip_size(badge, FOOTER)
+    canvas.chip(np.array([pad + width / 2, y]), badge, FOOTER, PAPER, ground)
+    x = 2 * pad + width
+    room = canvas.size[0] - x - pad
+    kept = list(items)
+    while len(kept) > 1 and canvas.text_size("   ·   ".join(kept), FOOTER)[0] > room:
+        kept.pop()
+    left_text(canvas, x, y, canvas.shortened("   ·   ".join(kept), FOOTER, room), FOOTER, MUTED)

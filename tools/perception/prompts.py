@@ -1,0 +1,93 @@
+"""How a thing is pointed at: a box, points or a rough outline, checked against the picture."""
+
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from shapely.geometry import Polygon
+
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+_PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+_FOUR = {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}
+Point = Annotated[tuple[_Number, _Number], WithJsonSchema(_PAIR)]
+Box = Annotated[tuple[_Number, _Number, _Number, _Number], WithJsonSchema(_FOUR)]
+
+MIN_SIDE = 2.0
+"""Smallest side of a box, px."""
+
+
+class TargetPrompt(BaseModel):
+    """Points at one thing: give a box, or points, or an outline (the most exact); image pixels."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    id: str = Field(default="t1", pattern=r"^t[0-9]{1,4}$", description="Target id to give it: t1")
+    label: str = Field(default="", max_length=200, description="What it is, in a few words")
+    box: Box | None = Field(default=None, description="x0, y0, x1, y1 close around it, px")
+    points: tuple[Point, ...] | None = Field(
+        default=None, min_length=1, max_length=20, description="Points (x, y) on it, px"
+    )
+    negative: tuple[Point, ...] = Field(
+        default=(), max_length=20, description="Points (x, y) that are not part of it, px"
+    )
+    outline: tuple[Point, ...] | None = Field(
+        default=None,
+        min_length=3,
+        max_length=30,
+        description="Rough outline, 3 to 30 vertices (x, y) in order around it, px",
+    )
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.box is None and self.points is None and self.outline is None:
+            raise ValueError("give a box, points or an outline")
+        if self.box is not None and self.outline is not None:
+            raise ValueError("give a box or an outline, not both")
+        return self
+
+    @property
+    def how(self) -> str:
+        """The way of pointing that leads: outline, box or point."""
+        if self.outline is not None:
+            return "outline"
+        return "box" if self.box is not None else "point"
+
+    def problems(self, width: int, height: int) -> list[str]:
+        """All that makes it unusable on a picture of this size; each one sentence."""
+        allowed = f"the picture is {width} x {height} px (x 0 to {width - 1}, y 0 to {height - 1})"
+        found = [
+            f"The point ({x:g}, {y:g}) lies outside the picture; {allowed}."
+            for x, y in (*(self.points or ()), *self.negative)
+            if not (0 <= x <= width - 1 and 0 <= y <= height - 1)
+        ]
+        if self.box is not None:
+            found += _box_problems(self.box, width, height, allowed)
+        if self.outline is not None:
+            found += _outline_problems(self.outline, width, height, allowed)
+        return found
+
+
+def _box_problems(box: Box, width: int, height: int, allowed: str) -> list[str]:
+    x0, y0, x1, y1 = box
+    shown = f"The box ({x0:g}, {y0:g}, {x1:g}, {y1:g})"
+    if x1 < x0 or y1 < y0:
+        return [f"{shown} is inverted; give x0,y0,x1,y1 with x0 < x1 and y0 < y1."]
+    if x1 - x0 < MIN_SIDE or y1 - y0 < MIN_SIDE:
+        return [f"{shown} is empty; it must be {MIN_SIDE:g} px or more on each side."]
+    left, top = max(x0, 0), max(y0, 0)
+    if min(x1, width - 1) - left < MIN_SIDE or min(y1, height - 1) - top < MIN_SIDE:
+        return [f"{shown} lies outside the picture; {allowed}."]
+    return []
+
+
+def _outline_problems(
+    outline: tuple[Point, ...], width: int, height: int, allowed: str
+) -> list[str]:
+    region = Polygon(outline)
+    if not region.is_valid:
+        return ["The outline crosses itself; give its vertices in order around the thing."]
+    if region.area < MIN_SIDE**2:
+        return [f"The outline is empty: it encloses {region.area:.1f} square px; 4 are needed."]
+    frame = Polygon([(0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)])
+    if region.intersection(frame).area < MIN_SIDE**2:
+        return [f"The outline lies outside the picture; {allowed}."]
+    return []

@@ -1,0 +1,198 @@
+"""A workspace as JSON and back: the state file of single tool calls, and plan.json.
+
+Pictures are not stored but named, with their hash; reading refuses one that has changed.
+"""
+
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from .errors import ImageError, InputError
+from .formation.plan import Plan
+from .geometry.outline import make_outline
+from .perception.image import load_picture
+from .perception.prompts import Box, Point, TargetPrompt
+from .scene import Scene, Target
+from .tool import violations
+from .workspace import Settings, Workspace
+
+FORMAT = "formup/1"
+
+
+class _Value(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class StoredTarget(_Value):
+    """A target with its outline as rings of points."""
+
+    id: str
+    label: str
+    box: Box
+    confidence: float
+    prompt: str
+    parts: dict[str, float]
+    outline: tuple[Point, ...]
+    holes: tuple[tuple[Point, ...], ...]
+
+
+class StoredImage(_Value):
+    """Where the picture lies and what it must be."""
+
+    path: str | None
+    sha256: str
+    width: int
+    height: int
+
+
+class Stored(_Value):
+    """All of a workspace but its settings; `plan_id` names the plan a plan.json is for."""
+
+    format: str = FORMAT
+    plan_id: str | None = None
+    instruction: str | None = None
+    image: StoredImage
+    targets: tuple[StoredTarget, ...] = ()
+    pointed: tuple[TargetPrompt, ...] = ()
+    samples: dict[str, tuple[Point, ...]] = {}
+    plans: dict[str, Plan] = {}
+
+
+def store(
+    workspace: Workspace,
+    image: Path | None,
+    *,
+    plan_id: str | None = None,
+    instruction: str | None = None,
+) -> Stored:
+    """The workspace as a value; with a plan id only that plan is kept."""
+    picture = workspace.scene.picture
+    plans = workspace.plans if plan_id is None else {plan_id: workspace.plans[plan_id]}
+    return Stored(
+        plan_id=plan_id,
+        instruction=instruction,
+        image=StoredImage(
+            path=None if image is None else str(image.resolve()),
+            sha256=picture.sha256,
+            width=picture.width,
+            height=picture.height,
+        ),
+        targets=tuple(_stored_target(t) for t in workspace.scene.targets),
+        pointed=workspace.pointed,
+        samples={name: tuple(map(tuple, p.tolist())) for name, p in workspace.samples.items()}
+        if plan_id is None
+        else {},
+        plans=plans,
+    )
+
+
+def read_stored(path: Path) -> Stored:
+    """Read a state file or a plan.json.
+
+    Raises:
+        InputError: missing, no JSON, of another format, or altered.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}.") from None
+    except ValueError:
+        raise InputError(f"{path} is not JSON; a file written by formup is needed.") from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError(f"{path} is no formup file of format {FORMAT!r}.")
+    try:
+        stored = Stored.model_validate(data)
+    except ValidationError as error:
+        raise InputError(f"{path} is damaged: {violations(error)}") from None
+    for name, plan in stored.plans.items():
+        if plan.id != name:
+            raise InputError(
+                f"{path}: plan {name} does not match its hash ({plan.id}): it was altered after "
+                "it was certified; make the plan again."
+            )
+    return stored
+
+
+def restore(stored: Stored, image: Path | None, settings: Settings) -> Workspace:
+    """The workspace again, its picture loaded from `image` or from where it lay.
+
+    Raises:
+        ImageError: the picture cannot be loaded.
+        InputError: the picture has changed since.
+    """
+    path = image or (Path(stored.image.path) if stored.image.path else None)
+    if path is None:
+        raise ImageError("The stored scene names no picture file; give one.")
+    picture = load_picture(path)
+    if picture.sha256 != stored.image.sha256:
+        raise InputError(
+            f"{path} is not the picture this was made for, or it has changed since, which voids "
+            "its targets and plans; run again on the new picture."
+        )
+    return Workspace(
+        scene=Scene(picture, tuple(_target(t) for t in stored.targets)),
+        settings=settings,
+        pointed=stored.pointed,
+        plans=dict(stored.plans),
+        samples={name: np.asarray(p, dtype=float) for name, p in stored.samples.items()},
+    )
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file at once or not at all.
+
+    Raises:
+        InputError: it cannot be written there.
+    """
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            Path(name).replace(path)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
+
+
+def rings(target: Target) -> tuple[list[list[float]], list[list[list[float]]]]:
+    """A target's exterior and holes as JSON, rounded to what they are known to."""
+    polygon = target.outline.polygon
+    shapes: list[Any] = [polygon.exterior, *polygon.interiors]
+    points = [[[round(x, 3), round(y, 3)] for x, y in ring.coords[:-1]] for ring in shapes]
+    return points[0], points[1:]
+
+
+def _stored_target(target: Target) -> StoredTarget:
+    polygon = target.outline.polygon
+    return StoredTarget(
+        id=target.id,
+        label=target.label,
+        box=target.box,
+        confidence=target.confidence,
+        prompt=target.prompt,
+        parts=dict(target.parts),
+        outline=tuple((float(x), float(y)) for x, y in polygon.exterior.coords[:-1]),
+        holes=tuple(
+            tuple((float(x), float(y)) for x, y in ring.coords[:-1]) for ring in polygon.interiors
+        ),
+    )
+
+
+def _target(stored: StoredTarget) -> Target:
+    return Target(
+        id=stored.id,
+        label=stored.label,
+        box=stored.box,
+        confidence=stored.confidence,
+        outline=make_outline(stored.outline, stored.holes),
+        prompt=stored.prompt,
+        parts=tuple(stored.parts.items()),
+    )

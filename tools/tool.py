@@ -1,0 +1,137 @@
+"""A tool is a typed function with a docstring; its JSON Schema is read from both, once.
+
+The first parameter is the Workspace the call works on; the rest is what the model fills in.
+Every parameter must be described, with unit and frame where it has one: this fails at import.
+"""
+
+import inspect
+import json
+import re
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from .errors import ToolError
+from .workspace import Workspace
+
+Kind = Literal["read", "commit", "actuate", "ask", "end"]
+"""read: changes nothing outside the workspace; commit: makes a plan; actuate: moves robots;
+ask: a person answers; end: closes the run."""
+
+
+@dataclass(frozen=True)
+class ToolResult:
+    """What a tool gives back.
+
+    Attributes:
+        data: JSON object; what the model reads.
+        images: PNG files, for models that see.
+    """
+
+    data: dict[str, Any]
+    images: tuple[bytes, ...] = field(default=(), repr=False)
+
+    @property
+    def text(self) -> str:
+        """The data as compact JSON."""
+        return json.dumps(self.data, separators=(",", ":"), ensure_ascii=False)
+
+
+ToolFunction = Callable[..., ToolResult | Awaitable[ToolResult]]
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A named function a model may call."""
+
+    name: str
+    description: str
+    kind: Kind
+    arguments: type[BaseModel]
+    function: ToolFunction
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """JSON Schema of the arguments (draft 2020-12)."""
+        return self.arguments.model_json_schema()
+
+    def parse(self, arguments: Mapping[str, Any]) -> BaseModel:
+        """Validated arguments.
+
+        Raises:
+            ToolError: naming every violation at once.
+        """
+        try:
+            return self.arguments.model_validate(dict(arguments))
+        except ValidationError as error:
+            raise ToolError(f"{self.name}: {violations(error)}") from None
+
+    async def call(self, workspace: Workspace, arguments: Mapping[str, Any]) -> ToolResult:
+        """Validate and run.
+
+        Raises:
+            ToolError: the arguments or what they ask for are not possible; for the model.
+        """
+        parsed = self.parse(arguments)
+        values = {name: getattr(parsed, name) for name in type(parsed).model_fields}
+        result = self.function(workspace, **values)
+        return await result if inspect.isawaitable(result) else result
+
+
+def tool(kind: Kind) -> Callable[[ToolFunction], Tool]:
+    """Make a Tool of a function: name, types and docstring become name, schema and description.
+
+    Raises:
+        TypeError: at import, when a parameter has no type or no line under `Args:`.
+    """
+
+    def wrap(function: ToolFunction) -> Tool:
+        name = getattr(function, "__name__", "tool")
+        description, documented = _docstring(inspect.getdoc(function) or "")
+        hints = get_type_hints(function, include_extras=True)
+        fields: dict[str, Any] = {}
+        for parameter in list(inspect.signature(function).parameters.values())[1:]:
+            if parameter.name not in documented or parameter.name not in hints:
+                raise TypeError(
+                    f"{name}: parameter {parameter.name!r} lacks a type or a line in Args"
+                )
+            default = ... if parameter.default is parameter.empty else parameter.default
+            info = Field(default, description=documented[parameter.name])
+            fields[parameter.name] = (hints[parameter.name], info)
+        arguments = create_model(
+            f"{name}_arguments", __config__=ConfigDict(extra="forbid", frozen=True), **fields
+        )
+        return Tool(name, description, kind, arguments, function)
+
+    return wrap
+
+
+def violations(error: ValidationError) -> str:
+    """All violations of a validation as one line a model or a person can act on."""
+    lines: list[str] = []
+    for item in error.errors(include_url=False):
+        where = ".".join(str(part) for part in item["loc"]) or "arguments"
+        given = repr(item["input"])
+        shown = given if len(given) <= 60 else given[:57] + "..."
+        text = item["msg"].removeprefix("Value error, ")
+        lines.append(
+            f"{where}: {text} (got {shown})"
+            if item["type"] != "missing"
+            else f"{where}: is missing"
+        )
+    return "; ".join(dict.fromkeys(lines)) + "."
+
+
+def _docstring(text: str) -> tuple[str, dict[str, str]]:
+    """A docstring's description and its `Args:` lines by name."""
+    head, _, tail = text.partition("\nArgs:\n")
+    body = re.split(r"\n(?=\S)", tail)[0]
+    documented = {
+        match["name"]: " ".join(match["text"].split())
+        for match in re.finditer(
+            r"^ {4}(?P<name>\w+): (?P<text>.*(?:\n {5,}.*)*)", body, flags=re.MULTILINE
+        )
+    }
+    return " ".join(head.split()), documented

@@ -1,0 +1,174 @@
+"""What one conversation works on: the scene, the plans made in it, and the person's settings.
+
+The one mutable object of the tools; they read it and put new values in, so that a plan id or a
+target id means the same in the next call.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from .errors import InputError, ToolError
+from .fleet.deploy import Arrival, Fleet
+from .fleet.simulated import MAX_ROBOTS, SimulatedFleet, checked_starts, spread_starts
+from .formation.contract import Contract
+from .formation.motion import obstacles
+from .formation.place import Site
+from .formation.plan import Plan
+from .geometry.outline import FloatArray
+from .perception.contours import outline_of_mask
+from .perception.prompts import TargetPrompt
+from .perception.segmenters import segmenter_named
+from .scene import Scene, Target
+
+Descriptor = Literal["edges", "edges+vertices", "matrix"]
+FLEETS = ("simulated",)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the person fixed; code holds the model to it.
+
+    Attributes:
+        robots: how many, or None where the person left it open.
+        robot_radius: px; 0 is a point.
+        clearance: exact distance wanted from the target, px, or None for the default.
+        segmenter: name of the segmenter.
+        threshold: t, the least confidence a mask is used at; None for the segmenter's own.
+        descriptor: how describe_shape puts shapes into text.
+        fleet: name of the fleet.
+        starts: (n, 2) starting positions of simulated robots, px, or None to spread them.
+        seed: of everything random in the simulator.
+        may_deploy: whether robots may be moved at all in this run.
+    """
+
+    robots: int | None = None
+    robot_radius: float = 0.0
+    clearance: float | None = None
+    segmenter: str = "grabcut"
+    threshold: float | None = None
+    descriptor: Descriptor = "edges"
+    fleet: str = "simulated"
+    starts: FloatArray | None = None
+    seed: int = 0
+    may_deploy: bool = True
+
+    def check(self) -> None:
+        """Refuse names that do not exist.
+
+        Raises:
+            InputError: unknown segmenter or fleet; the text lists those there are.
+        """
+        segmenter_named(self.segmenter)
+        if self.fleet not in FLEETS:
+            raise InputError(f"Unknown fleet {self.fleet!r}. There are: {', '.join(FLEETS)}.")
+
+
+@dataclass
+class Workspace:
+    """The state tools share.
+
+    Attributes:
+        pointed: what the person pointed at, in order t1, t2, ...
+        samples: positions kept by the sampling tools under s1, s2, ...
+        arrivals: by plan id, what was observed after a deployment, and the way there.
+    """
+
+    scene: Scene
+    settings: Settings = field(default_factory=Settings)
+    pointed: tuple[TargetPrompt, ...] = ()
+    plans: dict[str, Plan] = field(default_factory=dict[str, Plan])
+    samples: dict[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    arrivals: dict[str, Arrival] = field(default_factory=dict[str, Arrival])
+    frames: dict[str, list[FloatArray]] = field(default_factory=dict[str, list[FloatArray]])
+
+    def __post_init__(self) -> None:
+        self.settings.check()
+        problems = [p for q in self.pointed for p in q.problems(*self.scene.picture.size)]
+        if problems:
+            raise InputError(" ".join(problems))
+
+    def segment(self, prompt: TargetPrompt) -> Target:
+        """Find the outline of the thing pointed at and keep it as a target.
+
+        Raises:
+            ToolError: the prompt does not fit the picture, or the mask is not to be believed.
+        """
+        picture = self.scene.picture
+        problems = prompt.problems(picture.width, picture.height)
+        if problems:
+            raise ToolError(" ".join(problems))
+        segmenter = segmenter_named(self.settings.segmenter)
+        found = segmenter.run(picture.pixels, prompt)
+        chosen = self.settings.threshold
+        threshold = segmenter.thresholds[prompt.how] if chosen is None else chosen
+        if found.confidence < threshold or not found.mask.any():
+            raise ToolError(_insufficient(found.confidence, threshold, prompt.how))
+        try:
+            outline = outline_of_mask(found.mask)
+        except InputError as error:
+            raise ToolError(f"Insufficient segmentation accuracy. {error}") from None
+        target = Target(
+            id=prompt.id,
+            label=prompt.label or "the thing pointed at",
+            box=outline.bounds,
+            confidence=round(found.confidence, 3),
+            outline=outline,
+            prompt=prompt.how,
+            parts=tuple((name, round(value, 3)) for name, value in found.parts.items()),
+        )
+        self.scene = self.scene.with_target(target)
+        return target
+
+    def keep_sample(self, points: FloatArray) -> str:
+        """Store sampled positions, (n, 2), and name them."""
+        name = f"s{len(self.samples) + 1}"
+        self.samples[name] = points
+        return name
+
+    def current_plan(self, plan_id: str) -> Plan:
+        """The plan with an id, if the scene is still the one it was certified in.
+
+        Raises:
+            ToolError: no such plan, or the scene has changed since.
+        """
+        if plan_id not in self.plans:
+            known = ", ".join(self.plans) or "none yet: propose a formation first"
+            raise ToolError(f"There is no plan {plan_id!r}. Plans: {known}.")
+        plan = self.plans[plan_id]
+        if plan.formation.scene_version != self.scene.version:
+            raise ToolError(
+                f"The scene has changed since plan {plan_id} was certified, which voids it: "
+                "propose the formation again."
+            )
+        return plan
+
+    def fleet_for(self, contract: Contract, site: Site) -> Fleet:
+        """The robots that would move.
+
+        Raises:
+            ToolError: more robots than are simulated.
+            InputError: starting positions that cannot be.
+        """
+        if contract.robots > MAX_ROBOTS:
+            raise ToolError(
+                f"{contract.robots} robots can be placed and certified, but motion is simulated "
+                f"only up to {MAX_ROBOTS} so far: the plan stands, nothing was moved."
+            )
+        solid, radius = obstacles(contract, site), contract.robot_radius
+        if self.settings.starts is None:
+            starts = spread_starts(contract.robots, site, solid, radius)
+        else:
+            starts = checked_starts(self.settings.starts, contract.robots, site, solid, radius)
+        return SimulatedFleet(starts, seed=self.settings.seed)
+
+
+def _insufficient(confidence: float, threshold: float, how: str) -> str:
+    advice = {
+        "point": "draw a box close around the thing, or better a rough outline",
+        "box": "draw a rough outline of 4 to 12 vertices around the thing",
+        "outline": "draw the outline closer, with more vertices, or name points that do not belong",
+    }[how]
+    return (
+        f"Insufficient segmentation accuracy. The mask's confidence is {confidence:.2f}, below the "
+        f"threshold {threshold:.2f}; {advice}."
+    )
