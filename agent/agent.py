@@ -16,7 +16,7 @@ from ..tools.scene import Scene
 from ..tools.store import rings
 from ..tools.tool import Tool
 from ..tools.workspace import Settings, Workspace
-from .loop import Limits, run
+from .loop import DEFAULT_LIMITS, Limits, run
 from .messages import History, Reply, Result, User
 from .model import Model
 from .models import model_named
@@ -55,7 +55,7 @@ class Agent:
         *,
         tools: tuple[Tool, ...] = TOOLS,
         system: str = "",
-        limits: Limits | None = None,
+        limits: Limits = DEFAULT_LIMITS,
     ) -> None:
         self.model = model_named(model) if isinstance(model, str) else model
         self.tools, self.system, self.limits = tools, system, limits

@@ -20,6 +20,9 @@ class Limits:
     tool_calls: int = 60
 
 
+DEFAULT_LIMITS = Limits()
+
+
 def _nothing(message: User | Reply | Result) -> None:
     """Shows nobody anything."""
 
@@ -31,23 +34,20 @@ async def run(
     messages: History,
     *,
     system: str = "",
-    limits: Limits | None = None,
+    limits: Limits = DEFAULT_LIMITS,
     allowed: Callable[[Call], bool] = lambda call: True,
     show: Callable[[User | Reply | Result], None] = _nothing,
 ) -> Outcome:
     """Run a conversation until it is answered, paused, stopped or cancelled.
 
     Args:
-        model: who decides.
-        tools: what it may call.
-        workspace: what the tools work on.
         messages: the history so far; unanswered calls at its end are answered first.
         system: the prompt.
         limits: bounds of the whole history.
         allowed: whether an actuating call may go ahead without a person.
         show: is given every new message, for display and traces.
     """
-    history, bounds = messages, limits or Limits()
+    history = messages
     try:
         while True:
             for call in unanswered(history):
@@ -58,14 +58,11 @@ async def run(
                 history = (*history, result)
                 show(result)
                 if result.error and failed_before(history, call):
-                    return Stopped(
-                        history,
-                        "repeat",
-                        f"The model repeated a failing call to {call.name}: {result.text}",
-                    )
+                    reason = f"The model repeated a failing call to {call.name}: {result.text}"
+                    return Stopped(history, "repeat", reason)
                 if tool and tool.kind == "end" and not result.error:
                     return Answered(history, result.text)
-            if reason := _exhausted(history, bounds):
+            if reason := _exhausted(history, limits):
                 return Stopped(history, "limit", reason)
             reply = await model.reply(Request(system, history, tools))
             history = (*history, reply)

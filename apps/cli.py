@@ -50,7 +50,7 @@ def run(
     starts: o.Starts = None,
     robot_radius: o.Radius = None,
     clearance: o.Clearance = None,
-    seed: o.Seed = 0,
+    seed: o.Seed = "0",
 ) -> None:
     """Carry out an instruction on a picture."""
     settings = Settings(
@@ -62,7 +62,7 @@ def run(
         descriptor=inputs.descriptor(descriptor),
         fleet=fleet,
         starts=inputs.starts(starts),
-        seed=seed,
+        seed=inputs.whole("--seed", seed, least=0),
         may_deploy=not plan_only,
     )
     settings.check()

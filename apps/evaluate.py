@@ -10,8 +10,8 @@ from rich.table import Table
 
 from ..evals.pointed import Row, as_json, evaluate, mode_named, one_target, summary
 from ..evals.suite import load_tasks
-from ..tools.errors import InputError
 from ..tools.store import write_whole
+from . import inputs
 from . import options as o
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -26,23 +26,22 @@ def group() -> None:
 def photos(
     data: o.DataFolder = None,
     mode: o.Mode = "box",
-    seeds: o.Seeds = 3,
+    seeds: o.Seeds = "3",
     out: o.JsonFile = Path("photos-eval.json"),
 ) -> None:
     """Success over all one-target tasks of a folder of photographs; the shipped ones by default."""
-    if seeds < 1:
-        raise InputError(f"--seeds {seeds} cannot be used; give 1 or more.")
     chosen, tasks = mode_named(mode), one_target(load_tasks(data))
-    count = len(tasks) * (seeds if chosen in ("box", "outline") else 1)
+    jitters = inputs.whole("--seeds", seeds, least=1)
+    count = len(tasks) * (jitters if chosen in ("box", "outline") else 1)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task(f"{chosen}, {len(tasks)} tasks", total=count)
-        rows = evaluate(tasks, chosen, seeds, lambda row: progress.advance(bar))
+        rows = evaluate(tasks, chosen, jitters, lambda row: progress.advance(bar))
     means = summary(rows)
     _print(means, rows, chosen)
     if out is not None:
         content = {
             "mode": chosen,
-            "seeds": seeds,
+            "seeds": jitters,
             "data": str(data) if data else "shipped",
             "summary": means,
             "rows": [as_json(row) for row in rows],

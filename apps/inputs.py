@@ -24,15 +24,24 @@ def robots(text: str | None) -> int | None:
     """
     if text is None:
         return None
+    return whole("--robots", text.replace(",", ""), least=1, most=MAX_ROBOTS)
+
+
+def whole(name: str, text: str, *, least: int, most: int = 1_000_000) -> int:
+    """A whole number in a range.
+
+    Raises:
+        InputError: not such a number.
+    """
     try:
-        count = int(text.replace(",", "").strip())
+        value = int(text)
     except ValueError:
-        count = 0
-    if not 1 <= count <= MAX_ROBOTS:
+        value = least - 1
+    if not least <= value <= most:
         raise InputError(
-            f"--robots {text!r} cannot be used; give a whole number from 1 to {MAX_ROBOTS:,}."
+            f"{name} {text!r} cannot be used; give a whole number from {least} to {most:,}."
         )
-    return count
+    return value
 
 
 def length(name: str, text: str | None) -> float | None:

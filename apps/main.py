@@ -4,6 +4,8 @@ import signal
 import sys
 from types import FrameType
 
+INTERRUPTED = 130
+
 
 def main() -> None:
     """Run the command line and exit."""
@@ -13,7 +15,7 @@ def main() -> None:
         sys.exit(_run())
     except KeyboardInterrupt:
         print("formup: interrupted; nothing more was done.", file=sys.stderr)  # noqa: T201
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
@@ -27,7 +29,10 @@ def _run() -> int:
     from .cli import app
 
     try:
-        return app(standalone_mode=False) or 0
+        code = app(standalone_mode=False) or 0
+        if code == INTERRUPTED:  # typer turns Ctrl-C into an exit code
+            raise KeyboardInterrupt
+        return code
     except typer.TyperException as error:
         print(f"formup: {error.format_message()} (--help shows what there is)", file=sys.stderr)  # noqa: T201
         return 2

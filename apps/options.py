@@ -42,7 +42,7 @@ Radius = Annotated[str | None, typer.Option("--robot-radius", help="Radius of a 
 Clearance = Annotated[
     str | None, typer.Option("--clearance", help="Exact distance from the target, px.")
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Of the simulator.")]
+Seed = Annotated[str, typer.Option("--seed", help="Of the simulator.")]
 Arguments = Annotated[str, typer.Option("--args", help="The tool's arguments as JSON.")]
 StateFile = Annotated[Path | None, typer.Option("--state", help="Keeps the scene between calls.")]
 PlanFile = Annotated[Path, typer.Argument(help="A plan.json that formup wrote.")]
@@ -52,4 +52,4 @@ DataFolder = Annotated[
 ]
 Mode = Annotated[str, typer.Option("--mode", help="How to point: box, outline, truth or words.")]
 JsonFile = Annotated[Path | None, typer.Option("--out", help="Where to write the rows as JSON.")]
-Seeds = Annotated[int, typer.Option("--seeds", help="Jitters of every task.")]
+Seeds = Annotated[str, typer.Option("--seeds", help="Jitters of every task.")]

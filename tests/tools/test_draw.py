@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formup.tools.draw import draw_deployment, draw_look, draw_plan, save_gif
-from formup.tools.draw_text import drawable
+from formup.tools.draw.text import drawable
 from formup.tools.errors import InputError, ToolError
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import Plan, make_plan

@@ -1,5 +1,7 @@
 """A kinematic simulator: robots that follow their paths but slip, so that arrival is earned."""
 
+import math
+
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -72,7 +74,7 @@ def spread_starts(n: int, site: Site, solid: BaseGeometry, radius: float) -> Flo
     points = (
         np.empty((0, 2))
         if part is None or part.area < 4
-        else inside(outline_of(part), n, 0.0, spacing)
+        else inside(outline_of(part), n, 0.0, math.inf, spacing)
     )
     if len(points) < n:
         raise InputError(

@@ -10,6 +10,8 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
+from ..errors import InputError
+from ..geometry.curves import Curve
 from ..geometry.outline import FloatArray, distances
 from ..geometry.sampling import coverage_radius, inside, min_spacing
 from . import spacing
@@ -20,6 +22,8 @@ from .verdict import TOLERANCE, Audit, Part, Verdict, parts_of
 SPACING_SHARE, COVER_SHARE = 0.6, 1.4
 """inside, even: against a Lloyd tessellation of the same region at least this share of its
 smallest spacing, at most this multiple of its coverage radius."""
+FARTHEST = 1e6
+"""Coordinates beyond this, px, are refused before anything is computed with them."""
 LINE_SHARE = 0.03
 """How far off a straight line a robot may stand, as a share of the line's length."""
 
@@ -31,15 +35,20 @@ def certify(positions: ArrayLike, contract: Contract, site: Site) -> Verdict:
         positions: (N, 2) image pixels, robots in order over all groups.
         contract: what they must satisfy.
         site: outlines of every target the contract names, and the picture's size.
+
+    Raises:
+        InputError: the positions are no (N, 2) array.
     """
     audit = Audit()
-    points = np.asarray(positions, dtype=float).reshape(-1, 2)
+    points = np.asarray(positions, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise InputError(f"Positions must be (x, y) pairs, shape (N, 2); got {points.shape}.")
     if len(points) != contract.robots:
         text = f"The contract wants {contract.robots} positions; {len(points)} were given."
         audit.whole("count", len(points), contract.robots, text, "robots")
         return audit.verdict()
-    for i in np.flatnonzero(~np.isfinite(points).all(axis=1)):
-        audit.robot("not_finite", int(i), 0.0, 0.0, "has a coordinate that is no finite number")
+    for i in np.flatnonzero(~(np.abs(points) <= FARTHEST).all(axis=1)):
+        audit.robot("no_place", int(i), 0.0, 0.0, "has a coordinate that is no place in a picture")
     if audit.findings:
         return audit.verdict()
     if len(points) > 1:
@@ -124,6 +133,8 @@ def _outside(part: Part, audit: Audit) -> None:
 def _around(part: Part, audit: Audit) -> None:
     _outside(part, audit)
     curve = reference_curve(part.group, part.site, part.radius)
+    if _nowhere(curve, "the ring", audit):
+        return
     if not curve.closed:
         share = curve.length / curve.whole_length
         audit.least("ring_in_picture", share)
@@ -136,9 +147,19 @@ def _around(part: Part, audit: Audit) -> None:
         spacing.evenness(part, curve, audit)
 
 
+def _nowhere(curve: Curve, name: str, audit: Audit) -> bool:
+    """Whether nothing of a curve lies inside the picture, which is a finding."""
+    if curve.length > 0:
+        return False
+    audit.whole("out_of_picture", 0.0, 0.0, f"Nothing of {name} lies inside the picture.")
+    return True
+
+
 def _along(part: Part, audit: Audit) -> None:
     _outside(part, audit)
     curve = reference_curve(part.group, part.site, part.radius)
+    if _nowhere(curve, "that side", audit):
+        return
     if curve.length < 0.995 * curve.whole_length:
         share = curve.length / curve.whole_length
         audit.notes.append(
@@ -159,6 +180,8 @@ def _line(part: Part, audit: Audit) -> None:
         audit.notes.append("A free shape: bounds, spacing and named targets were checked.")
         return
     curve = reference_curve(part.group, part.site, part.radius)
+    if _nowhere(curve, "the line", audit):
+        return
     spacing.on_curve(part, curve, max(LINE_SHARE * curve.whole_length, 2.0), "the line", audit)
     if part.group.spacing == "even":
         spacing.evenness(part, curve, audit)
@@ -173,7 +196,7 @@ def _inside(part: Part, audit: Audit) -> None:
     polygon, name = part.outline.polygon, part.group.targets[0]
     sign = np.where(shapely.intersects_xy(polygon, part.points), 1.0, -1.0)
     depth = sign * distances(polygon.boundary, part.points) - part.radius
-    least = part.clearance[0]
+    least, greatest = part.clearance
     audit.least("min_clearance_px", depth.min())
     for i in np.flatnonzero(depth < least - TOLERANCE):
         where = "outside" if sign[i] < 0 else f"{depth[i]:.1f} px from the edge of"
@@ -184,13 +207,17 @@ def _inside(part: Part, audit: Audit) -> None:
             least,
             f"is {where} {name}; it must be {least:.1f} px or more inside",
         )
+    for i in np.flatnonzero(depth > greatest + TOLERANCE):
+        text = f"is {depth[i]:.1f} px inside {name}; {greatest:.1f} px at most are allowed"
+        audit.robot("too_deep", part.first + int(i), depth[i], greatest, text)
     if part.group.spacing == "even" and len(part.points) > 1:
         _evenly_inside(part, audit)
 
 
 def _evenly_inside(part: Part, audit: Audit) -> None:
-    margin, floor = part.clearance[0] + part.radius, part.group.min_spacing or 0.0
-    ideal = inside(part.outline, part.group.robots, margin, floor)
+    margin, depth = (bound + part.radius for bound in part.clearance)
+    floor = part.group.min_spacing or 0.0
+    ideal = inside(part.outline, part.group.robots, margin, depth, floor)
     apart, cover = min_spacing(part.points), coverage_radius(part.outline, part.points)
     ideal_apart = min_spacing(ideal) if len(ideal) > 1 else 0.0
     audit.greatest("coverage_radius_px", cover)

@@ -77,8 +77,10 @@ class Group(_Frozen):
         default=None,
         description="along: side of the target in the picture, or its long/short side.",
     )
-    edges: tuple[int, ...] | None = Field(
-        default=None, description="along: edge numbers from describe_shape, instead of a side."
+    edges: tuple[Annotated[int, Field(ge=0)], ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="along: edge numbers from describe_shape, instead of a side.",
     )
     layout: Literal["line", "divider"] = Field(
         default="line",
@@ -99,8 +101,11 @@ class Group(_Frozen):
             problems.append(f"{self.relation} takes {wanted} target(s), got {len(self.targets)}")
         if self.relation == "along" and (self.side is None) == (self.edges is None):
             problems.append("along takes either a side or edges")
-        if self.clearance is not None and self.clearance[0] > self.clearance[1]:
-            problems.append(f"clearance {self.clearance} must be (least, greatest)")
+        if self.clearance is not None:
+            if not self.clearance[0] <= self.clearance[1] > 0:
+                problems.append(f"clearance {self.clearance} must be (least, greatest > 0)")
+            if self.relation in ("between", "centre", "shape"):
+                problems.append(f"clearance does not apply to {self.relation}")
         for name, only in (
             ("side", "along"),
             ("edges", "along"),
@@ -195,6 +200,4 @@ def _default_range(
     if group.relation == "inside":
         least = min(INSIDE_SHARE * outline.size, 0.1 * outline.min_width)
         return (least, outline.size)
-    if group.relation == "centre":
-        return (0.0, outline.size)
     return None

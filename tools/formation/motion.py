@@ -5,6 +5,7 @@ are shortest ones around the targets on a visibility graph (Lozano-Perez and Wes
 Frame: image pixels. Robots do not yet avoid each other.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from ..errors import FleetError
 from ..geometry.curves import Frame
 from ..geometry.outline import FloatArray, distances
 from .contract import Contract
@@ -20,6 +22,8 @@ from .place import Site
 
 MAX_NODES = 60
 """Vertices kept of an obstacle: enough for a path within a percent of the shortest."""
+BEND_SEGMENTS = 2
+"""Segments of a quarter circle around an obstacle's corner."""
 ROOM_SHARE = 0.7
 """How much of the smallest clearance at starts and goals paths keep on their way."""
 
@@ -62,6 +66,9 @@ def routes(
 
     Returns:
         n polylines, (k, 2) each.
+
+    Raises:
+        FleetError: a goal is walled off.
     """
     straight = shapely.linestrings(np.stack([starts, goals], axis=1))
     paths = list(np.stack([starts, goals], axis=1))
@@ -76,10 +83,14 @@ def routes(
         return paths
     nodes = _nodes(solid, keep)
     inside = shapely.intersects_xy(frame.box, nodes)
-    for graph in (_Visibility(nodes[inside], barrier), _Visibility(nodes, barrier)):
-        for i in blocked:
-            if len(paths[i]) == 2:
-                paths[i] = graph.path(starts[i], goals[i])
+    within, anywhere = _Visibility(nodes[inside], barrier), _Visibility(nodes, barrier)
+    for i in blocked:
+        path = within.path(starts[i], goals[i])
+        path = anywhere.path(starts[i], goals[i]) if path is None else path
+        if path is None:
+            x, y = goals[i]
+            raise FleetError(f"There is no way around the target to place ({x:.0f}, {y:.0f}).")
+        paths[i] = path
     return paths
 
 
@@ -96,15 +107,16 @@ def _interpolated(path: FloatArray, share: float) -> FloatArray:
 
 
 def _nodes(solid: BaseGeometry, keep: float) -> FloatArray:
-    """Corners to bend around: the vertices of the obstacles grown a little past the barrier."""
-    grown = solid.buffer(keep, quad_segs=2).buffer(0.02 * keep + 0.05, join_style="mitre")
+    """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
+    dip = math.cos(math.pi / (4 * BEND_SEGMENTS))
     tolerance = 0.0
-    coordinates = shapely.get_coordinates(grown)
-    while len(coordinates) > MAX_NODES:
+    while True:
+        reach = (1.01 * keep + 0.05 + 1.05 * tolerance) / dip
+        grown = solid.buffer(reach, quad_segs=BEND_SEGMENTS).simplify(tolerance)
+        coordinates = shapely.get_coordinates(grown)
+        if len(coordinates) <= MAX_NODES:
+            return np.unique(coordinates, axis=0)
         tolerance = max(1.5 * tolerance, 0.25)
-        wider = solid.buffer(keep + 1.1 * tolerance, quad_segs=2)
-        coordinates = shapely.get_coordinates(wider.simplify(tolerance))
-    return np.unique(coordinates, axis=0)
 
 
 class _Visibility:
@@ -119,14 +131,14 @@ class _Visibility:
         lengths = np.stack([self._sight(node) for node in nodes])
         self._length, self._before = shortest_path(lengths, return_predecessors=True)
 
-    def path(self, start: FloatArray, goal: FloatArray) -> FloatArray:
-        """The shortest path, or the straight line where none is found."""
+    def path(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
+        """The shortest path, (k, 2), or None where there is none."""
         if not len(self._nodes):
-            return np.stack([start, goal])
+            return None
         total = self._sight(start)[:, None] + self._length + self._sight(goal)[None, :]
         first, last = np.unravel_index(int(np.argmin(total)), total.shape)
         if not np.isfinite(total[first, last]):
-            return np.stack([start, goal])
+            return None
         chain = [int(last)]
         while chain[-1] != first:
             chain.append(int(self._before[first, chain[-1]]))

@@ -83,6 +83,10 @@ def reference_curve(group: Group, site: Site, radius: float) -> Curve:
     if group.relation != "along":
         return ring(outline, offset, frame, keep=group.clearance[0] + radius)
     if group.edges is not None:
+        last = len(outline.edges) - 1
+        if max(group.edges) > last:
+            name = group.targets[0]
+            raise ToolError(f"There is no edge {max(group.edges)}: {name} has edges 0 to {last}.")
         return edge_curve(outline, group.edges, offset, frame)
     return side(outline, side_direction(group, outline, site), offset, frame)
 
@@ -122,14 +126,15 @@ def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
 
 def _place_at_target(group: Group, site: Site, radius: float) -> tuple[FloatArray, str]:
     outline = site.outlines[group.targets[0]]
-    assert group.clearance is not None
     n, spacing = group.robots, group.min_spacing or 0.0
-    if group.relation == "corners":
-        standoff = nominal(group.clearance) + radius
-        return at_corners(outline, n, standoff), "the target has no more corners"
-    if group.relation == "inside":
-        points = inside(outline, n, group.clearance[0] + radius, spacing)
-        return points, f"spaced {spacing:g} px and {group.clearance[0]:.1f} px from the edge"
+    if group.relation != "centre":
+        assert group.clearance is not None
+        least, greatest = group.clearance
+        if group.relation == "corners":
+            standoff = nominal(group.clearance) + radius
+            return at_corners(outline, n, standoff), "the target has no more corners"
+        points = inside(outline, n, least + radius, greatest + radius, spacing)
+        return points, f"spaced {spacing:g} px and {least:.1f} px from the edge"
     pitch = max(spacing * 1.05, min(0.1 * outline.size, CENTRE_SHARE * outline.size / n**0.5))
     points = around_point(outline.centre, n, pitch)
     reach = np.linalg.norm(points - outline.centre, axis=1) <= CENTRE_SHARE * outline.size
@@ -156,7 +161,7 @@ def _between(group: Group, site: Site, frame: Frame) -> Curve:
         raise ToolError("The two targets touch or overlap: nothing lies between them.")
     a, b = shapely.get_coordinates(max(pieces, key=lambda g: g.length))
     if group.layout == "line":
-        inset = (b - a) / (group.robots + 1)
+        inset = (b - a) / (group.robots + 1) * (group.robots > 1)
         return segment(a + inset, b - inset, frame)
     across = np.array([-(b - a)[1], (b - a)[0]]) / np.linalg.norm(b - a)
     middle = (a + b) / 2

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
+from ..errors import ToolError
 from ..geometry.outline import FloatArray
 from .check import certify
 from .contract import Contract, with_defaults
@@ -71,11 +72,13 @@ def make_plan(
         positions: (N, 2) image pixels, robots in order over all groups; None to place them here.
 
     Raises:
-        ToolError: no positions were given and the contract cannot be satisfied.
+        ToolError: the positions are no pairs, or none were given and the contract cannot be met.
     """
     full = with_defaults(contract, site.outlines, site.room)
     points = place(full, site) if positions is None else np.asarray(positions, dtype=float)
-    rounded = np.round(points.reshape(-1, 2), DECIMALS) + 0.0  # + 0.0: no negative zeros
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ToolError(f"Positions must be (x, y) pairs, shape (N, 2); got {points.shape}.")
+    rounded = np.round(points, DECIMALS) + 0.0  # + 0.0: no negative zeros
     formation = Formation(
         positions=tuple((float(x), float(y)) for x, y in rounded),
         contract=full,

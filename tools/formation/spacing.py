@@ -1,5 +1,6 @@
 """How robots are spread along the curve or over the corners a contract refers to."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -14,20 +15,21 @@ from .verdict import TOLERANCE, Audit, Part
 
 WIDEST, NARROWEST = 1.5, 0.5
 """Even spacing: a gap between neighbours as a multiple of the mean gap."""
-CORNER_SHARE = 0.15
-"""How far from its corner a robot may stand, as a share of the target's size."""
+REFLEX = 1.5
+"""A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
+square root of 2 in a right-angled reflex one."""
 
 
 def evenness(part: Part, curve: Curve, audit: Audit) -> None:
     """Gaps between neighbours, measured along the curve, against their mean."""
-    if len(part.points) < 2 or curve.length <= 0:
+    if len(part.points) < 2:
         return
-    gaps, pairs, ends = _gaps(part, curve)
-    mean = float(np.mean(gaps or [curve.length]))
-    if gaps:
-        audit.least("spacing_ratio", min(gaps) / mean)
-        audit.greatest("worst_gap_px", max(gaps))
-    for gap, (i, j) in zip(gaps, pairs, strict=True):
+    spread = _spread(part, curve)
+    mean = float(np.mean(spread.gaps or [curve.length]))
+    if spread.gaps:
+        audit.least("spacing_ratio", min(spread.gaps) / mean)
+        audit.greatest("worst_gap_px", max(spread.gaps))
+    for gap, (i, j) in zip(spread.gaps, spread.pairs, strict=True):
         apart = f"and robot {j + 1} are {gap:.1f} px apart along the curve"
         if gap > WIDEST * mean + TOLERANCE:
             text = f"{apart}; even spacing allows {WIDEST * mean:.1f} px"
@@ -35,10 +37,14 @@ def evenness(part: Part, curve: Curve, audit: Audit) -> None:
         elif gap < NARROWEST * mean - TOLERANCE:
             text = f"{apart}; even spacing needs {NARROWEST * mean:.1f} px"
             audit.robot("crowded", i, gap, NARROWEST * mean, text)
-    for i, stretch in ends:
+    for i, stretch in spread.ends:
         if stretch > mean + TOLERANCE:
             text = f"is the last before {stretch:.1f} px without a robot; {mean:.1f} px are allowed"
             audit.robot("bare_end", i, stretch, mean, text)
+    for stretch in spread.bare:
+        if stretch > mean + TOLERANCE:
+            text = f"A stretch of {stretch:.1f} px has no robot; even spacing allows {mean:.1f} px."
+            audit.whole("bare_stretch", stretch, mean, text)
 
 
 def on_curve(part: Part, curve: Curve, reach: float, name: str, audit: Audit) -> None:
@@ -103,21 +109,23 @@ def corner_matching(part: Part, audit: Audit) -> None:
             "robots",
         )
         return
-    reach = max(CORNER_SHARE * part.outline.size, 1.5 * (part.clearance[1] + part.radius))
+    # A rounded outline falls short of its corners; a reflex one is reached along its bisector.
+    short = distances(part.outline.filled, corners)
+    reach = REFLEX * (part.clearance[1] + part.radius) + short
     distance = np.linalg.norm(part.points[:, None] - corners[None], axis=2)
     cost = distance + 1e6 * (distance > reach)
     robots, matched = linear_sum_assignment(cost)
     audit.greatest("max_from_corner_px", distance[robots, matched].max())
     for i, k in zip(robots, matched, strict=True):
-        if distance[i, k] > reach + TOLERANCE:
+        if distance[i, k] > reach[k] + TOLERANCE:
             x, y = corners[k]
             audit.robot(
                 "off_corner",
                 part.first + int(i),
                 distance[i, k],
-                reach,
+                reach[k],
                 f"is {distance[i, k]:.1f} px from its corner ({x:.0f}, {y:.0f}); "
-                f"{reach:.1f} px at most are allowed",
+                f"{reach[k]:.1f} px at most are allowed",
             )
 
 
@@ -136,28 +144,36 @@ def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.
     return starts[piece] + along[piece, np.arange(len(points))], piece
 
 
-def _gaps(
-    part: Part, curve: Curve
-) -> tuple[list[float], list[tuple[int, int]], list[tuple[int, float]]]:
-    """Gaps of successive robots, who stands on either side, and bare ends of open pieces."""
+@dataclass(frozen=True)
+class _Spread:
+    """Robots along a curve: gaps and who is on either side, ends past the last, bare pieces."""
+
+    gaps: list[float]
+    pairs: list[tuple[int, int]]
+    ends: list[tuple[int, float]]
+    bare: list[float]
+
+
+def _spread(part: Part, curve: Curve) -> _Spread:
     station, piece = _stations(part.points, curve)
     order = np.argsort(station, kind="stable")
     names = [int(i) + part.first for i in order]
     cut = 0.0 if curve.closed else curve.cut(len(part.points))
     if cut is not None:
         around = np.diff(station[order], append=station[order[0]] + curve.length + cut)
-        return [float(g) for g in around], list(zip(names, names[1:] + names[:1], strict=True)), []
-    gaps: list[float] = []
-    pairs: list[tuple[int, int]] = []
-    ends: list[tuple[int, float]] = []
+        pairs = list(zip(names, names[1:] + names[:1], strict=True))
+        return _Spread([float(g) for g in around], pairs, [], [])
+    spread = _Spread([], [], [], [])
     start = 0.0
     for k, line in enumerate(curve.lines):
-        mine = [(station[i] - start, int(i) + part.first) for i in order if piece[i] == k]
+        mine = [(float(station[i]) - start, int(i) + part.first) for i in order if piece[i] == k]
         length = float(LineString(line).length)
         start += length
+        if not mine:
+            spread.bare.append(length)
+            continue
         for (a, i), (b, j) in pairwise(mine):
-            gaps.append(float(b - a))
-            pairs.append((i, j))
-        if mine:
-            ends += [(mine[0][1], float(mine[0][0])), (mine[-1][1], float(length - mine[-1][0]))]
-    return gaps, pairs, ends
+            spread.gaps.append(b - a)
+            spread.pairs.append((i, j))
+        spread.ends.extend([(mine[0][1], mine[0][0]), (mine[-1][1], length - mine[-1][0])])
+    return spread

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import LineString, MultiLineString, Polygon
+from shapely.geometry import LineString, MultiLineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from .outline import FloatArray, Outline, distances
+from .outline import FloatArray, Outline, distances, largest_part
 
 QUAD_SEGMENTS = 16
 ROUND_JOIN_DIP = 1 / math.cos(math.pi / (4 * QUAD_SEGMENTS))
@@ -93,12 +93,12 @@ def ring(outline: Outline, offset: float, frame: Frame | None = None, keep: floa
         keep: parts of the border run that come nearer to the outline than this are cut out, px.
     """
     swept = outline.filled.buffer(2 * offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
-    closed = swept.buffer(-offset, quad_segs=QUAD_SEGMENTS)
-    assert isinstance(closed, Polygon)
+    closed = largest_part(swept.buffer(-offset, quad_segs=QUAD_SEGMENTS))
+    assert closed is not None  # a grown region is not empty
     whole = closed.exterior
     if frame is None or frame.box.contains(closed):
         return Curve((shapely.get_coordinates(whole),), True, float(whole.length))
-    inside = shapely.boundary(_filled_parts(closed.intersection(frame.box)))
+    inside = _filled_parts(closed.intersection(frame.box)).boundary
     near = outline.filled.buffer(keep * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
     lines = _lines(inside.difference(near))
     is_loop = len(lines) == 1 and bool(np.allclose(lines[0][0], lines[0][-1]))
@@ -153,7 +153,7 @@ def edge_curve(
     _ = [sides[i] for i in edges]
     solid = shapely.make_valid(Polygon(vertices))
     loop = _filled_parts(solid.buffer(offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS))
-    dense = shapely.get_coordinates(shapely.segmentize(shapely.boundary(loop), offset / 20))
+    dense = shapely.get_coordinates(shapely.segmentize(loop.boundary, max(offset / 20, 0.1)))
     nearest = np.argmin(np.stack([distances(s, dense) for s in sides]), axis=0)
     chosen = np.isin(nearest, edges)
     if chosen.all():
@@ -192,7 +192,7 @@ def _clip(lines: list[FloatArray], frame: Frame | None) -> Curve:
 
 def _lines(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
     """Polylines of any geometry, pieces that touch joined, dust under half a pixel dropped."""
-    parts = [g for g in shapely.get_parts(geometry) if isinstance(g, LineString)]
+    parts = [g for g in shapely.get_parts(geometry) if isinstance(g, LineString) and g.length]
     merged = shapely.line_merge(MultiLineString(parts)) if parts else MultiLineString()
     lines = (shapely.get_coordinates(g) for g in shapely.get_parts(merged))
     return tuple(x for x in lines if np.linalg.norm(np.diff(x, axis=0), axis=1).sum() > 0.5)
@@ -200,7 +200,5 @@ def _lines(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
 
 def _filled_parts(geometry: BaseGeometry) -> BaseGeometry:
     """The geometry's polygons without their holes."""
-    parts: list[BaseGeometry] = [
-        Polygon(g.exterior) for g in shapely.get_parts(geometry) if isinstance(g, Polygon)
-    ]
-    return shapely.union_all(parts)
+    parts = [Polygon(g.exterior) for g in shapely.get_parts(geometry) if isinstance(g, Polygon)]
+    return MultiPolygon(parts) if parts else Polygon()

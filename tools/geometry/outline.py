@@ -82,8 +82,7 @@ class Outline:
     @cached_property
     def rectangle(self) -> FloatArray:
         """Corners of the minimum-area rectangle, (4, 2), in the exterior's direction."""
-        corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(self.polygon))[:4]
-        return corners if Polygon(corners).exterior.is_ccw else corners[::-1]
+        return _rectangle(self.polygon)
 
     @property
     def min_width(self) -> float:
@@ -205,9 +204,13 @@ def _simplify(ring: FloatArray) -> tuple[FloatArray, Kind, float]:
 
 def _douglas_peucker(line: shapely.LineString, tolerance: float) -> FloatArray:
     simple = shapely.get_coordinates(line.simplify(tolerance, preserve_topology=False))[:-1]
-    if len(simple) < 3:
-        return shapely.get_coordinates(shapely.minimum_rotated_rectangle(line))[:4]
-    return simple
+    return simple if len(simple) > 2 else _rectangle(line)
+
+
+def _rectangle(geometry: BaseGeometry) -> FloatArray:
+    """Corners of the minimum-area rectangle, (4, 2), counter-clockwise in (x, y)."""
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(geometry))[:4]
+    return corners if Polygon(corners).exterior.is_ccw else corners[::-1]
 
 
 def _noise(closed: FloatArray) -> float:

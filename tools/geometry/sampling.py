@@ -42,7 +42,8 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
     cut = curve.cut(n)
     if cut is not None:  # the cut is one of n equal gaps, its middle the start
         step = (curve.length + cut) / n
-        return _interpolate(LineString(curve.lines[0]), (step - cut) / 2 + step * np.arange(n))
+        stations: FloatArray = (step - cut) / 2 + step * np.arange(n, dtype=float)
+        return _interpolate(LineString(curve.lines[0]), stations)
     pieces = [LineString(x) for x in curve.lines]
     shares = _shares(np.array([p.length for p in pieces]), n)
     return np.concatenate(
@@ -82,7 +83,7 @@ def corner_points(outline: Outline, n: int) -> FloatArray:
     return outline.rectangle if n == 4 and len(corners) != 4 else corners
 
 
-def inside(outline: Outline, n: int, margin: float, spacing: float) -> FloatArray:
+def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float) -> FloatArray:
     """N points spread evenly over a region, holes and concavities respected.
 
     Lloyd's iteration to a centroidal Voronoi tessellation, best of a few lattice starts;
@@ -92,12 +93,15 @@ def inside(outline: Outline, n: int, margin: float, spacing: float) -> FloatArra
         outline: the region.
         n: how many.
         margin: distance kept from the region's boundary, px.
+        depth: greatest distance from it, px; beyond the region's half-width it means nothing.
         spacing: smallest distance allowed between two robots, px.
 
     Returns:
         (k, 2), k < n when no more fit.
     """
-    region = outline.polygon.buffer(-margin)
+    region = outline.polygon.buffer(-margin).difference(
+        outline.polygon.buffer(-min(depth, outline.perimeter))
+    )
     if region.is_empty:
         return np.empty((0, 2))
     cells = _cells(region, n)

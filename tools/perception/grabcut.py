@@ -22,12 +22,16 @@ Point = tuple[float, float]
 
 # Masks from 160 px windows measured as good as those from 224 or 320 px and cost half as much.
 WORK_SIDE = 160
+# Small things need pixels for the smoothing to act on, but hold no more detail than this.
 MAX_UPSCALE = 3.0
 # Surroundings seen beyond the prompt, in its own size: enough to learn the background's colours.
 MARGIN = 0.3
+# Averaging so many samples a side for one working pixel is plenty; more cost seconds at 50 MP.
+SAMPLES = 4
 # Even a prompt of one pixel needs some surroundings.
 MIN_MARGIN_PX = 3.0
-ITERATIONS = 5
+# A fifth iteration changed no measured mask for the better.
+ITERATIONS = 4
 # Lightness counts half and chroma one and a half: a shadow changes lightness much more than hue.
 LAB_WEIGHTS = (0.5, 1.5, 1.5)
 # A prompt that leaves less surroundings than this share of the window takes its rim as a sample.
@@ -112,7 +116,9 @@ def open_window(pixels: Bytes, box: Box, side: int) -> Window:
     scale = min(MAX_UPSCALE, side / max(x1 - x0, y1 - y0))
     size = max(1, round((x1 - x0) * scale)), max(1, round((y1 - y0) * scale))
     how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    small = cv2.resize(np.ascontiguousarray(pixels[y0:y1, x0:x1]), size, interpolation=how)
+    step = max(1, int(1 / (scale * SAMPLES)))
+    sampled = pixels[y0 + step // 2 : y1 : step, x0 + step // 2 : x1 : step]
+    small = cv2.resize(np.ascontiguousarray(sampled), size, interpolation=how)
     return Window(features(small), (x0, y0), (x1 - x0, y1 - y0), (height, width))
 
 
@@ -196,23 +202,23 @@ def clean(mask: Mask, keep: Points) -> Mask:
     opened = np.asarray(cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel)) > 0
     if not opened.any():
         return mask
-    pieces, areas = _pieces(opened, connectivity=8)
+    labels, areas = pieces(opened, connectivity=8)
     kept = areas >= MIN_PIECE * areas[1:].max()
     height, width = mask.shape
     x, y = np.round(keep).astype(np.int64).clip(0, (width - 1, height - 1)).T
-    kept[pieces[y, x]] = True
+    kept[labels[y, x]] = True
     kept[0] = False
-    return _close_small_holes(kept[pieces])
+    return _close_small_holes(kept[labels])
 
 
 def _close_small_holes(mask: Mask) -> Mask:
-    gaps, areas = _pieces(~mask, connectivity=4)
+    gaps, areas = pieces(~mask, connectivity=4)
     small = areas < MIN_HOLE * np.count_nonzero(mask)
     small[0] = False
     return mask | small[gaps]
 
 
-def _pieces(mask: Mask, connectivity: int) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int64]]:
+def pieces(mask: Mask, connectivity: int) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int64]]:
     """Connected components: labels (h, w), 0 outside the mask, and the area of each label."""
     found = cv2.connectedComponents(mask.astype(np.uint8), connectivity=connectivity)[1]
     labels = np.asarray(found, dtype=np.int32)

@@ -83,10 +83,10 @@ def _outline_problems(
     outline: tuple[Point, ...], width: int, height: int, allowed: str
 ) -> list[str]:
     region = Polygon(outline)
+    if region.convex_hull.area < MIN_SIDE**2:
+        return ["The outline is empty: its vertices enclose less than 4 square px."]
     if not region.is_valid:
         return ["The outline crosses itself; give its vertices in order around the thing."]
-    if region.area < MIN_SIDE**2:
-        return [f"The outline is empty: it encloses {region.area:.1f} square px; 4 are needed."]
     frame = Polygon([(0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)])
     if region.intersection(frame).area < MIN_SIDE**2:
         return [f"The outline lies outside the picture; {allowed}."]

@@ -73,25 +73,28 @@ def propose(pixels: Bytes, points: Sequence[Point], count: int) -> list[Region]:
 def pin(image: Bytes, labels: Bytes, positive: Points, negative: Points) -> Bytes:
     """GrabCut labels (h, w) with discs around the points forced to be the thing or background.
 
-    A disc alone is too few pixels to change a colour model, so that the connected pixels of like
-    colour become probably what the point is, wherever the prompt left that open.
+    A disc alone is too few pixels to change a colour model, so the connected pixels of like colour
+    become probably what the point is, wherever the labels are not surely otherwise.
     """
     height, width = labels.shape
     radius = max(1, round(PIN_RADIUS * max(height, width)))
     pinned = labels.copy()
-    likely, sure = (cv2.GC_PR_FGD, cv2.GC_PR_BGD), (cv2.GC_FGD, cv2.GC_BGD)
-    seeds = [
+    on, off = (
         np.round(p).astype(np.int64).clip(0, (width - 1, height - 1)) for p in (positive, negative)
-    ]
-    for points, label in zip(seeds, likely, strict=True):
-        for seed in points:
-            distance = _colour_distance(image, seed[None])
-            alike = _pieces_at(distance <= PIN_TOLERANCE, seed[None])
-            pinned[alike & (labels != cv2.GC_BGD)] = label
-    for points, label in zip(seeds, sure, strict=True):
-        for x, y in points:
+    )
+    for seed in on:
+        pinned[_alike(image, seed) & (labels == cv2.GC_PR_BGD)] = cv2.GC_PR_FGD
+    for seed in off:
+        pinned[_alike(image, seed) & (labels != cv2.GC_BGD)] = cv2.GC_PR_BGD
+    for seeds, label in ((on, cv2.GC_FGD), (off, cv2.GC_BGD)):
+        for x, y in seeds:
             cv2.circle(pinned, (int(x), int(y)), radius, (int(label),), -1)
     return pinned
+
+
+def _alike(image: Bytes, seed: npt.NDArray[np.int64]) -> Mask:
+    """The connected pixels (h, w) of the seed's colour."""
+    return _pieces_at(_colour_distance(image, seed[None]) <= PIN_TOLERANCE, seed[None])
 
 
 def box_iou(one: Box, other: Box) -> float:

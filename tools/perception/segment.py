@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from . import grabcut as gc
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
+from .openings import cut_openings
 from .region_growing import Region, box_iou, pin, propose
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
@@ -133,7 +134,8 @@ def segment_points(
     found = propose(pixels, points, PROPOSALS)
     if not found:
         return _nothing((pixels.shape[0], pixels.shape[1]), _around(points))
-    prompts = [_region_prompt(pixels, region, points, negative) for region in found]
+    off = list(negative)
+    prompts = [_region_prompt(pixels, region, points, off) for region in found]
     tried = [(prompt, _cut(prompt, prompt.trimaps[0])) for prompt in prompts]
     prompt, mask = max(tried, key=lambda pair: _standing_out(*pair))
     return _judged(prompt, mask, _echo(pixels, prompt, mask))
@@ -161,8 +163,9 @@ def _cut(prompt: _Prompt, trimap: Bytes) -> Mask:
 
 def _judged(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
     window = prompt.window
-    if not mask.any():
+    if not mask.any() or mask.all():
         return _nothing(window.picture, prompt.box)
+    mask = cut_openings(window.features, mask, prompt.positive)
     flooded = gc.watershed(window.features, prompt.core, prompt.trimaps[0])
     parts = {
         "stability": stability,
@@ -224,11 +227,11 @@ def _moved_outlines(outline: Points) -> list[Points]:
 
 
 def _region_prompt(
-    pixels: Bytes, region: Region, points: Sequence[Point], negative: Iterable[Point]
+    pixels: Bytes, region: Region, points: Sequence[Point], negative: Sequence[Point]
 ) -> _Prompt:
     """The box around a grown region, with the region's inside as sure object."""
     window = gc.window_around(pixels, region.box)
-    on, off = window.to_work(points), window.to_work(list(negative))
+    on, off = window.to_work(points), window.to_work(negative)
     drawn = window.to_work((region.box[:2], region.box[2:])).ravel()
     core = _eroded(region.window.transfer(region.mask, window))
     trimap = _box_trimap(window.shape, drawn)

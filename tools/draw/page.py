@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .draw_canvas import FINE, INK, MUTED, PAPER, Canvas, Colour, shown_size
-from .draw_text import font, wrapped
-from .perception.image import Picture
+from ..perception.image import Picture
+from .canvas import FINE, INK, MUTED, PAPER, Canvas, Colour, shown_size
+from .text import font, wrapped
 
 TITLE, FOOTER = 25.0, 19.0
 LINE, PAD = 1.35, 12.0
@@ -52,8 +52,12 @@ def draw_bars(page: Page) -> None:
     canvas, unit = page.canvas, page.canvas.unit
     x0, top, x1, bottom = canvas.photo
     width, height = canvas.size
-    for box in ((0, 0, width, top), (0, bottom, width, height), (0, top, x0, bottom),
-                (x1, top, width, bottom)):  # fmt: skip
+    for box in (
+        (0, 0, width, top),
+        (0, bottom, width, height),
+        (0, top, x0, bottom),
+        (x1, top, width, bottom),
+    ):
         if box[2] > box[0] and box[3] > box[1]:
             canvas.box(box, INK)
     for row, line in enumerate(page.title):

@@ -7,7 +7,14 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from .draw_canvas import (
+from ..errors import InputError
+from ..fleet.deploy import ARRIVED_PX, ARRIVED_SHARE
+from ..formation.plan import Plan
+from ..geometry.outline import FloatArray
+from ..geometry.sampling import nearest
+from ..perception.image import Picture
+from ..scene import Scene
+from .canvas import (
     ALLOWED,
     CERTIFIED,
     FINDING,
@@ -20,8 +27,8 @@ from .draw_canvas import (
     Canvas,
     Colour,
 )
-from .draw_marks import draw_outline, draw_robots, robot_size
-from .draw_page import (
+from .marks import draw_outline, draw_robots, robot_size
+from .page import (
     FOOTER,
     FOOTER_HEIGHT,
     LINE,
@@ -33,13 +40,6 @@ from .draw_page import (
     left_text,
     make_page,
 )
-from .errors import InputError
-from .fleet.deploy import ARRIVED_PX, ARRIVED_SHARE
-from .formation.plan import Plan
-from .geometry.outline import FloatArray
-from .geometry.sampling import nearest
-from .perception.image import Picture
-from .scene import Scene
 
 SIDE = 640
 """Greatest side of a frame, page px."""
@@ -55,7 +55,17 @@ GIF_FRAMES, GIF_BYTES = 48, 3_000_000
 GIF_SIDES = (640, 520, 420, 320)
 """Sides tried in turn until the file is small enough."""
 TICK_MS, LAST_MS = 80, 2000
-STYLE: tuple[Colour, ...] = (ROBOT, WHITE, INK, TARGET, PAPER, MUTED, CERTIFIED, FINDING, ALLOWED)
+STYLE: tuple[Colour, ...] = (
+    ROBOT,
+    WHITE,
+    INK,
+    TARGET,
+    PAPER,
+    MUTED,
+    CERTIFIED,
+    FINDING,
+    ALLOWED,
+)
 """Colours a palette made from the photograph alone would lose."""
 
 

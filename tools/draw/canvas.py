@@ -13,10 +13,10 @@ from PIL import Image, ImageDraw
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from .draw_text import font, shortened
-from .geometry.outline import FloatArray
-from .perception.image import Picture
-from .scene import Box
+from ..geometry.outline import FloatArray
+from ..perception.image import Picture
+from ..scene import Box
+from .text import font, shortened
 
 Colour = tuple[int, int, int]
 Margins = tuple[int, int, int, int]
@@ -165,8 +165,9 @@ class Canvas:
         x, y = self._fine(centre[None])[0]
         d = reach * self.unit * FINE
         for slope in (-1, 1):
-            self._draw.line([(x - d, y - slope * d), (x + d, y + slope * d)], colour,
-                            self._thick(width))  # fmt: skip
+            self._draw.line(
+                [(x - d, y - slope * d), (x + d, y + slope * d)], colour, self._thick(width)
+            )
 
     def text_size(self, text: str, size: float) -> tuple[float, float]:
         """Width and height a line of text takes, page px."""
@@ -192,9 +193,14 @@ class Canvas:
         x, y = (where + 0.5) * FINE - 0.5
         width = 0 if seam is None else max(round(size * self.unit * FINE * 0.13), 1)
         self._draw.text(
-            (x - (x0 + x1) / 2, y - (top + bottom) / 2), text, (*colour, 255), face, anchor="ls",
-            stroke_width=width, stroke_fill=(*(seam or colour), 255),
-        )  # fmt: skip
+            (x - (x0 + x1) / 2, y - (top + bottom) / 2),
+            text,
+            (*colour, 255),
+            face,
+            anchor="ls",
+            stroke_width=width,
+            stroke_fill=(*(seam or colour), 255),
+        )
 
     def box(self, box: Box, colour: Colour, corner: float = 0.0, strength: float = 1.0) -> None:
         """A filled box of the page, page px, with rounded corners of a radius in units."""

@@ -10,9 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from .draw_canvas import CERTIFIED, FINDING, INK, MARKS, PAPER, Canvas, Colour, Labels, Margins
-from .draw_film import draw_deployment, save_gif
-from .draw_marks import (
+from ..formation.place import Site
+from ..formation.plan import Plan
+from ..formation.verdict import Verdict
+from ..geometry.outline import FloatArray
+from ..perception.image import Picture
+from ..scene import Box, Scene
+from .canvas import CERTIFIED, FINDING, INK, MARKS, PAPER, Canvas, Colour, Labels, Margins
+from .marks import (
     directions,
     draw_areas,
     draw_guides,
@@ -23,16 +28,8 @@ from .draw_marks import (
     robot_size,
     target_room,
 )
-from .draw_page import draw_bars, draw_footer, make_page
-from .draw_text import drawable
-from .formation.place import Site
-from .formation.plan import Plan
-from .formation.verdict import Verdict
-from .geometry.outline import FloatArray
-from .perception.image import Picture
-from .scene import Box, Scene
-
-__all__ = ["draw_deployment", "draw_look", "draw_plan", "save_gif"]
+from .page import draw_bars, draw_footer, make_page
+from .text import drawable
 
 LEAST_LONG, MOST_LONG = 1200, 1500
 """The photograph's long side on the page, page px."""

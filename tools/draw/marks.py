@@ -11,7 +11,14 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Point
 from shapely.geometry.base import BaseGeometry
 
-from .draw_canvas import (
+from ..errors import ToolError
+from ..formation.contract import CENTRE_SHARE, OUTSIDE, Contract
+from ..formation.place import Site, reference_curve
+from ..formation.verdict import Part, parts_of
+from ..geometry.curves import Curve
+from ..geometry.outline import FloatArray, Outline, distances
+from ..geometry.sampling import corner_points, nearest
+from .canvas import (
     ALLOWED,
     FINDING,
     FORBIDDEN,
@@ -23,13 +30,6 @@ from .draw_canvas import (
     Canvas,
     Labels,
 )
-from .errors import ToolError
-from .formation.contract import CENTRE_SHARE, OUTSIDE, Contract
-from .formation.place import Site, reference_curve
-from .formation.verdict import Part, parts_of
-from .geometry.curves import Curve
-from .geometry.outline import FloatArray, Outline, distances
-from .geometry.sampling import corner_points, nearest
 
 OUTLINE_DETAIL = 0.3
 """Units of the page by which a drawn outline may differ from the measured one."""

@@ -1,0 +1,225 @@
+"""The loop with scripted and function models on a real picture with real tools."""
+
+import asyncio
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from formup.agent.loop import Limits, run
+from formup.agent.messages import HISTORY, Call, History, Reply, Result, User, unanswered
+from formup.agent.model import Request
+from formup.agent.models.doubles import FunctionModel, ScriptedModel
+from formup.agent.outcomes import Answered, Cancelled, Outcome, Paused, Stopped
+from formup.tools.doors import TOOLS
+from formup.tools.errors import ModelError
+from formup.tools.perception.image import picture_from_array
+from formup.tools.scene import Scene
+from formup.tools.workspace import Settings, Workspace
+
+START: History = (User(text="go"),)
+ALONG: dict[str, Any] = {
+    "contract": {"groups": [{"relation": "around", "targets": ["t1"], "robots": 6}]},
+    "targets": [{"id": "t1", "box": [55, 35, 125, 95]}],
+}
+
+
+def workspace(**settings: Any) -> Workspace:
+    pixels = np.full((140, 200, 3), 60, np.uint8)
+    pixels[40:90, 60:120] = (200, 40, 40)
+    return Workspace(Scene(picture_from_array(pixels)), Settings(**settings))
+
+
+def call(name: str, arguments: dict[str, Any] | None = None, id: str = "c1") -> Reply:
+    return Reply(calls=(Call(id=id, name=name, arguments=arguments or {}),))
+
+
+def go(model: ScriptedModel | FunctionModel, messages: History = START, **more: Any) -> Outcome:
+    work = more.pop("work", None) or workspace()
+    return asyncio.run(run(model, TOOLS, work, messages, **more))
+
+
+def test_a_reply_without_calls_is_the_answer() -> None:
+    model = ScriptedModel([Reply(text="done")])
+    outcome = go(model)
+    assert isinstance(outcome, Answered)
+    assert outcome.text == "done"
+    assert outcome.messages == (*START, Reply(text="done"))
+    model.assert_complete()
+
+
+def test_the_model_sees_prompt_history_and_tools() -> None:
+    model = ScriptedModel([Reply(text="done")])
+    go(model, system="be brief")
+    assert model.requests == [Request("be brief", START, TOOLS)]
+
+
+def test_calls_run_in_order_and_results_come_back() -> None:
+    both = Reply(
+        calls=(
+            Call(id="a", name="segment", arguments={"box": [55, 35, 125, 95]}),
+            Call(id="b", name="describe_shape", arguments={"target": "t1"}),
+        )
+    )
+    outcome = go(ScriptedModel([both, Reply(text="done")]))
+    results = [m for m in outcome.messages if isinstance(m, Result)]
+    assert [r.call_id for r in results] == ["a", "b"]
+    assert all(r.error is None for r in results)
+    assert json.loads(results[1].text)["length_px"] == pytest.approx(60, abs=4)
+
+
+def test_unknown_tool_goes_back_with_the_names_there_are() -> None:
+    outcome = go(ScriptedModel([call("fly"), Reply(text="sorry")]))
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert result.error == "unknown_tool"
+    assert "'fly'" in result.text
+    assert "propose_formation" in result.text
+
+
+def test_all_argument_mistakes_go_back_at_once() -> None:
+    wrong = {"target": 7, "n": 0, "side": "north", "extra": 1}
+    outcome = go(ScriptedModel([call("sample_along_edges", wrong), Reply(text="sorry")]))
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert result.error == "arguments"
+    for word in ("target", "n", "side", "extra"):
+        assert f"{word}:" in result.text
+
+
+def test_what_a_tool_cannot_do_goes_back() -> None:
+    outcome = go(ScriptedModel([call("describe_shape", {"target": "t9"}), Reply(text="sorry")]))
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert (result.error, "'t9'" in result.text) == ("tool", True)
+
+
+def test_our_own_bugs_are_not_hidden() -> None:
+    def broken(request: Request) -> Reply:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        go(FunctionModel(broken))
+
+
+def test_the_same_failing_call_twice_stops_the_run() -> None:
+    replies = [call("fly", id="a"), call("fly", id="b"), Reply(text="never")]
+    outcome = go(ScriptedModel(replies))
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "repeat"
+    assert "fly" in outcome.reason
+
+
+def test_a_failing_call_mended_goes_on() -> None:
+    replies = [
+        call("check_point", {"target": "t1", "points": [[1, 1]]}, "a"),
+        call("segment", {"box": [55, 35, 125, 95]}, "b"),
+        call("check_point", {"target": "t1", "points": [[1, 1]]}, "c"),
+        Reply(text="done"),
+    ]
+    model = ScriptedModel(replies)
+    assert isinstance(go(model), Answered)
+    model.assert_complete()
+
+
+def test_a_limit_is_an_outcome_that_keeps_the_messages() -> None:
+    def ever(request: Request) -> Reply:
+        return call("locate_object", id=f"c{len(request.messages)}")
+
+    outcome = go(FunctionModel(ever), limits=Limits(requests=3))
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "limit"
+    assert "3 requests" in outcome.reason
+    assert len(outcome.messages) == 1 + 2 * 3
+    many = go(FunctionModel(ever), limits=Limits(tool_calls=2))
+    assert isinstance(many, Stopped)
+    assert "2 tool calls" in many.reason
+
+
+def test_a_failing_model_keeps_the_messages() -> None:
+    outcome = go(ScriptedModel([call("locate_object")]))
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "model"
+    assert len(outcome.messages) == 3
+
+
+def test_a_question_pauses_and_its_answer_resumes_in_another_process() -> None:
+    asked = go(ScriptedModel([call("ask_user", {"question": "Which one?"})]))
+    assert isinstance(asked, Paused)
+    assert asked.call.arguments["question"] == "Which one?"
+    history = HISTORY.validate_json(HISTORY.dump_json(asked.messages))
+    assert history == asked.messages
+    assert unanswered(history) == (asked.call,)
+    answer = Result(call_id=asked.call.id, name="ask_user", text="the red one")
+    resumed = go(ScriptedModel([Reply(text="thanks")]), (*history, answer))
+    assert isinstance(resumed, Answered)
+
+
+def test_a_malformed_question_does_not_trouble_the_person() -> None:
+    outcome = go(ScriptedModel([call("ask_user", {}), Reply(text="sorry")]))
+    assert isinstance(outcome, Answered)
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert "question: is missing" in result.text
+
+
+def test_robots_that_need_leave_wait_for_it_and_then_move() -> None:
+    work = workspace()
+    proposed = go(ScriptedModel([call("propose_formation", ALONG), Reply(text="ok")]), work=work)
+    assert isinstance(proposed, Answered)
+    (plan_id,) = work.plans
+    replies = [call("deploy", {"plan_id": plan_id}, "d"), Reply(text="there")]
+    paused = go(ScriptedModel(replies[:1]), work=work, allowed=lambda call: False)
+    assert isinstance(paused, Paused)
+    assert paused.call.name == "deploy"
+    assert not work.arrivals
+    moved = go(ScriptedModel(replies[1:]), paused.messages, work=work)
+    assert isinstance(moved, Answered)
+    assert work.arrivals[plan_id].arrived
+
+
+def test_report_impossible_ends_the_run() -> None:
+    outcome = go(ScriptedModel([call("report_impossible", {"reason": "it is too small"})]))
+    assert isinstance(outcome, Answered)
+    assert "too small" in outcome.text
+
+
+def test_cancelling_keeps_the_messages() -> None:
+    async def scenario() -> Outcome:
+        started = asyncio.Event()
+
+        class Slow:
+            name = "slow"
+
+            async def reply(self, request: Request) -> Reply:
+                if len(request.messages) > 1:
+                    started.set()
+                    await asyncio.sleep(60)
+                return call("locate_object")
+
+        task = asyncio.create_task(run(Slow(), TOOLS, workspace(), START))
+        await started.wait()
+        task.cancel()
+        return await task
+
+    outcome = asyncio.run(scenario())
+    assert isinstance(outcome, Cancelled)
+    assert len(outcome.messages) == 3
+
+
+def test_every_new_message_is_shown_once_in_order() -> None:
+    seen: list[User | Reply | Result] = []
+    outcome = go(ScriptedModel([call("locate_object"), Reply(text="x")]), show=seen.append)
+    assert (*START, *seen) == outcome.messages
+
+
+def test_unused_script_fails() -> None:
+    model = ScriptedModel([Reply(text="a"), Reply(text="b")])
+    go(model)
+    with pytest.raises(AssertionError, match="1 of 2"):
+        model.assert_complete()
+
+
+def test_a_script_that_runs_out_is_a_model_error() -> None:
+    with pytest.raises(ModelError):
+        asyncio.run(ScriptedModel([]).reply(Request("", START, ())))

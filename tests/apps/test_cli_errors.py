@@ -1,0 +1,191 @@
+"""Every mistake a user can make on the command line: exit code 2 and one clear sentence."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formup.apps.main import main
+from PIL import Image
+
+Cli = Callable[..., tuple[int, str, str]]
+CAR = ("Surround the car at the corners",)
+POINT = ("--point", "90,65")
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    pixels = np.full((140, 200, 3), 60, np.uint8)
+    pixels[40:90, 60:120] = (200, 40, 40)
+    path = tmp_path / "scene.png"
+    Image.fromarray(pixels).save(path)
+    return path
+
+
+@pytest.fixture
+def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Cli:
+    def run(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["formup", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capsys.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return code, out, err
+
+    return run
+
+
+def refused(outcome: tuple[int, str, str], *words: str) -> None:
+    """Exit 2, nothing on stdout, one sentence on stderr with these words."""
+    code, out, err = outcome
+    assert code == 2, err
+    assert out == ""
+    assert err.startswith("formup: ")
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    for word in words:
+        assert word in err, err
+
+
+def test_missing_picture(cli: Cli) -> None:
+    refused(cli("run", "nowhere.png", *CAR), "nowhere.png")
+
+
+def test_folder_for_a_picture(cli: Cli, tmp_path: Path) -> None:
+    refused(cli("run", tmp_path, *CAR), tmp_path.name, "folder")
+
+
+@pytest.mark.parametrize(
+    ("content", "word"), [(b"", "empty"), (b"hello, I am text", "not"), (b"%PDF-1.7", "PDF")]
+)
+def test_no_picture_in_the_file(cli: Cli, tmp_path: Path, content: bytes, word: str) -> None:
+    path = tmp_path / "x.png"
+    path.write_bytes(content)
+    refused(cli("run", path, *CAR), "x.png", word)
+
+
+def test_truncated_picture(cli: Cli, picture: Path) -> None:
+    picture.write_bytes(picture.read_bytes()[:150])
+    refused(cli("run", picture, *CAR), "scene.png")
+
+
+@pytest.mark.parametrize("count", ["0", "-1", "10001", "2.5", "nan", "many", "", "1e3"])
+def test_no_number_of_robots(cli: Cli, picture: Path, count: str) -> None:
+    refused(cli("run", picture, *CAR, "-n", count, *POINT), repr(count), "1 to 10,000")
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--point", "900,60", ("(900, 60)", "outside", "200 x 140")),
+        ("--point", "-1,60", ("(-1, 60)", "outside")),
+        ("--point", "nan,60", ("'nan,60'", "X,Y")),
+        ("--point", "a,b", ("'a,b'", "X,Y")),
+        ("--point", "60", ("'60'", "X,Y")),
+        ("--point", "", ("X,Y",)),
+        ("--box", "300,10,400,50", ("outside", "200 x 140")),
+        ("--box", "120,90,60,40", ("inverted", "x0 < x1")),
+        ("--box", "60,40,60,90", ("empty",)),
+        ("--box", "60,40,120", ("X0,Y0,X1,Y1",)),
+        ("--box", "60,40,120,inf", ("X0,Y0,X1,Y1",)),
+        ("--outline", "60,40,120,40", ("3 to 30",)),
+        ("--outline", "60,40,120,40,90", ("5 numbers",)),
+        ("--outline", "60,40,120,90,120,40,60,90", ("crosses itself",)),
+        ("--outline", "60,40,90,40,120,40", ("empty",)),
+        ("--outline", "360,40,420,40,420,90", ("outside",)),
+        ("--threshold", "2", ("'2'", "0 to 1")),
+        ("--threshold", "high", ("'high'",)),
+        ("--robot-radius", "-3", ("'-3'", "pixels")),
+        ("--clearance", "nan", ("'nan'", "pixels")),
+        ("--model", "gpt-9", ("'gpt-9'", "offline")),
+        ("--segmenter", "magic", ("'magic'", "grabcut")),
+        ("--prompt", "former@v999", ("'former@v999'", "former@v001")),
+        ("--fleet", "navy", ("'navy'", "simulated")),
+        ("--descriptor", "poem", ("'poem'", "edges+vertices")),
+        ("--starts", "nowhere.csv", ("nowhere.csv",)),
+        ("--seed", "x", ("'x'", "0 to")),
+        ("--nonsense", "x", ("--nonsense",)),
+    ],
+)
+def test_unusable_option(
+    cli: Cli, picture: Path, option: str, value: str, words: tuple[str, ...]
+) -> None:
+    refused(cli("run", picture, *CAR, "-n", 4, option, value), *words)
+
+
+@pytest.mark.parametrize("text", ["", "   ", "\n\t"])
+def test_empty_instruction(cli: Cli, picture: Path, text: str) -> None:
+    refused(cli("run", picture, text, "-n", 4, *POINT), "empty")
+
+
+@pytest.mark.parametrize("out", ["scene.png/x", "/proc/formup"])
+def test_output_folder_that_cannot_be_written(cli: Cli, picture: Path, out: str) -> None:
+    refused(cli("run", picture, *CAR, "-n", 4, *POINT, "--out", out), "cannot be written", "--out")
+
+
+def test_errors_leave_no_folder_behind(cli: Cli, picture: Path, tmp_path: Path) -> None:
+    refused(cli("run", picture, *CAR, "-n", 4, "--point", "900,60"))
+    assert not (tmp_path / "formup-runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("1,2\n3,4\n", ("2 positions", "4 robots")),
+        ("[[1,2],[3]]", ("x,y",)),
+        ("a,b", ("x,y",)),
+        ("1,nan\n" * 4, ("x,y",)),
+        ("10,10\n20,10\n30,10\n90,65\n", ("Robot 4", "on the target")),
+        ("10,10\n20,10\n30,10\n900,65\n", ("Robot 4", "outside the picture")),
+    ],
+)
+def test_unusable_starts(
+    cli: Cli, picture: Path, tmp_path: Path, content: str, words: tuple[str, ...]
+) -> None:
+    (tmp_path / "starts.csv").write_text(content)
+    box = ("--box", "55,35,125,95")
+    refused(cli("run", picture, *CAR, "-n", 4, *box, "--starts", "starts.csv"), *words)
+
+
+def test_unusable_plan_files(cli: Cli, picture: Path, tmp_path: Path) -> None:
+    refused(cli("deploy", "nowhere.json"), "nowhere.json")
+    (tmp_path / "text.json").write_text("hello")
+    refused(cli("deploy", "text.json"), "not JSON")
+    (tmp_path / "other.json").write_text("{}")
+    refused(cli("deploy", "other.json"), "formup/1")
+    code, _, _ = cli(
+        "run", picture, *CAR, "-n", 4, "--box", "55,35,125,95", "--plan-only", "--out", "o"
+    )
+    assert code == 0
+    plan = json.loads((tmp_path / "o/plan.json").read_text())
+    name = plan["plan_id"]
+    formation = plan["plans"][name]["formation"]
+    formation["positions"][0][0] += 5
+    (tmp_path / "altered.json").write_text(json.dumps(plan))
+    refused(cli("deploy", "altered.json"), name, "altered")
+    Image.new("RGB", (200, 140)).save(picture)
+    refused(cli("deploy", "o/plan.json"), "changed")
+
+
+def test_tools_by_hand_say_what_is_wrong(cli: Cli, picture: Path) -> None:
+    refused(cli("tools", "call", "fly", "--image", picture), "'fly'", "propose_formation")
+    refused(cli("tools", "call", "look"), "--image")
+    refused(cli("tools", "call", "look", "--image", picture, "--args", "{"), "not JSON")
+    refused(cli("tools", "call", "look", "--image", picture, "--args", "[1]"), "JSON object")
+    refused(
+        cli("tools", "call", "check_point", "--image", picture, "--args", '{"target": 3}'),
+        "target:",
+        "points: is missing",
+    )
+
+
+def test_eval_says_what_is_wrong(cli: Cli, tmp_path: Path) -> None:
+    refused(cli("eval", "photos", "--mode", "psychic"), "'psychic'", "outline")
+    refused(cli("eval", "photos", "--data", tmp_path), "annotations.json")
+    refused(cli("eval", "photos", "--seeds", 0), "--seeds '0'")
+    (tmp_path / "annotations.json").write_text("[{}]")
+    refused(cli("eval", "photos", "--data", tmp_path), "required")

@@ -1,0 +1,121 @@
+"""The house rules that a reader should be able to rely on: who imports whom, and sizes."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROOMS = ("tools", "prompts", "agent", "evals", "apps")
+MAY_IMPORT = {
+    "tools": {"tools"},
+    "prompts": {"prompts"},
+    "agent": {"agent", "tools", "prompts"},
+    "evals": {"evals", "agent", "tools", "prompts"},
+    "apps": {"apps", "evals", "agent", "tools", "prompts"},
+}
+WITHIN_TOOLS = {
+    "geometry": {"geometry", "errors"},
+    "perception": {"perception", "geometry", "errors"},
+    "formation": {"formation", "geometry", "errors"},
+    "fleet": {"fleet", "formation", "geometry", "errors"},
+}
+GEOMETRY_LIBRARIES = {"numpy", "scipy", "shapely"}
+HEAVY = {"torch", "transformers", "ray", "mcp", "pygame", "stable_baselines3", "scipy"}
+SOURCES = sorted(p for room in ROOMS for p in (ROOT / room).rglob("*.py"))
+EVERYTHING = [*SOURCES, *ROOT.glob("*.py"), *(ROOT / "tests").rglob("*.py")]
+
+
+def names(paths: list[Path]) -> list[str]:
+    return [str(p.relative_to(ROOT)) for p in paths]
+
+
+def imports(path: Path, *, top_level: bool = False) -> Iterator[tuple[int, str]]:
+    """(relative level, dotted module) of every import of a file."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = ast.iter_child_nodes(tree) if top_level else ast.walk(tree)
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from ((0, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            module = node.module or ""
+            if module:
+                yield node.level, module
+            else:
+                yield from ((node.level, alias.name) for alias in node.names)
+
+
+def resolved(path: Path) -> Iterator[tuple[str, ...]]:
+    """Modules of this package a file imports, as paths from the root."""
+    here = path.relative_to(ROOT).parts
+    for level, module in imports(path):
+        if level:
+            yield (*here[: len(here) - level], *module.split("."))
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=names(SOURCES))
+def test_data_flows_one_way(path: Path) -> None:
+    room = path.relative_to(ROOT).parts[0]
+    for target in resolved(path):
+        assert target[0] in MAY_IMPORT[room], f"{room} must not import {'.'.join(target)}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=names(SOURCES))
+def test_within_tools_data_goes_from_picture_to_fleet(path: Path) -> None:
+    parts = path.relative_to(ROOT).parts
+    if parts[0] != "tools" or parts[1] not in WITHIN_TOOLS:
+        return
+    for target in resolved(path):
+        assert target[1] in WITHIN_TOOLS[parts[1]], f"{parts[1]} must not import {target}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=names(SOURCES))
+def test_libraries_stay_in_their_rooms(path: Path) -> None:
+    place = path.relative_to(ROOT).as_posix()
+    modules = {module.partition(".")[0] for level, module in imports(path) if not level}
+    if not place.startswith(("tools/perception/", "evals/bench")):
+        assert "cv2" not in modules
+    if not place.startswith("agent/models/"):
+        assert not modules & {"httpx", "httpx2", "requests", "aiohttp"}
+    if place.startswith("tools/geometry/"):
+        outside = modules - GEOMETRY_LIBRARIES - set(__import__("sys").stdlib_module_names)
+        assert not outside
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=names(SOURCES))
+def test_heavy_libraries_are_imported_where_they_are_used(path: Path) -> None:
+    if path.relative_to(ROOT).parts[0] == "evals":
+        return  # nothing a user waits for imports the graders
+    modules = {m.partition(".")[0] for _, m in imports(path, top_level=True)}
+    assert not modules & HEAVY
+
+
+@pytest.mark.parametrize("path", EVERYTHING, ids=names(EVERYTHING))
+def test_no_absolute_import_of_a_room(path: Path) -> None:
+    """It would load a second copy of the module beside formup's."""
+    absolute = {module.partition(".")[0] for level, module in imports(path) if not level}
+    assert not absolute & set(ROOMS)
+
+
+@pytest.mark.parametrize("path", EVERYTHING, ids=names(EVERYTHING))
+def test_files_and_functions_stay_small(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 400
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            assert node.end_lineno is not None
+            assert node.end_lineno - node.lineno < 50, f"{node.name} is too long"
+
+
+def test_modules_say_why_they_exist_in_five_lines() -> None:
+    for path in SOURCES:
+        docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+        assert docstring, f"{path} does not say why it exists"
+        if path.name != "errors.py":  # opens with the tree of exceptions drawn out
+            assert len(docstring.splitlines()) <= 6, f"{path} says it at length"
+
+
+def test_traps_of_a_root_package_are_kept_out() -> None:
+    assert not (ROOT / "conftest.py").exists()
+    assert not list((ROOT / "tests").rglob("__init__.py"))
