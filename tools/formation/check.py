@@ -217,14 +217,15 @@ def _inside(part: Part, audit: Audit) -> None:
 def _evenly_inside(part: Part, audit: Audit) -> None:
     margin, depth = (bound + part.radius for bound in part.clearance)
     floor = part.group.min_spacing or 0.0
-    ideal = inside(part.outline, part.group.robots, margin, depth, floor)
-    apart, cover = min_spacing(part.points), coverage_radius(part.outline, part.points)
+    region = part.site.visible(part.group.targets[0])
+    ideal = inside(region, part.group.robots, margin, depth, floor)
+    apart, cover = min_spacing(part.points), coverage_radius(region, part.points)
     ideal_apart = min_spacing(ideal) if len(ideal) > 1 else 0.0
     audit.greatest("coverage_radius_px", cover)
     if ideal_apart:
         audit.least("spacing_ratio", apart / ideal_apart)
     least = SPACING_SHARE * ideal_apart
-    most = COVER_SHARE * coverage_radius(part.outline, ideal) if len(ideal) else np.inf
+    most = COVER_SHARE * coverage_radius(region, ideal) if len(ideal) else np.inf
     if apart < least - TOLERANCE:
         audit.whole(
             "uneven",

@@ -101,6 +101,8 @@ class Group(_Frozen):
             problems.append(f"{self.relation} takes {wanted} target(s), got {len(self.targets)}")
         if self.relation == "along" and (self.side is None) == (self.edges is None):
             problems.append("along takes either a side or edges")
+        if self.relation == "cage" and self.robots < 3:
+            problems.append(f"a cage takes 3 or more robots, got {self.robots}")
         if self.clearance is not None:
             if not self.clearance[0] <= self.clearance[1] > 0:
                 problems.append(f"clearance {self.clearance} must be (least, greatest > 0)")

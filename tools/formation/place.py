@@ -13,7 +13,7 @@ from shapely.geometry import LineString
 
 from ..errors import ToolError
 from ..geometry.curves import Curve, Frame, edge_curve, ring, segment, side
-from ..geometry.outline import FloatArray, Outline
+from ..geometry.outline import MIN_AREA, FloatArray, Outline, distances, largest_part, outline_of
 from ..geometry.sampling import (
     along_curve,
     around_point,
@@ -38,6 +38,21 @@ class Site:
     def room(self) -> tuple[float, float]:
         """Width and height, px."""
         return self.width, self.height
+
+    def visible(self, name: str) -> Outline:
+        """The part of a target inside the picture.
+
+        Raises:
+            ToolError: there is none.
+        """
+        outline = self.outlines[name]
+        picture = shapely.box(-0.5, -0.5, self.width - 0.5, self.height - 0.5)  # whole pixels
+        if picture.covers(outline.polygon):
+            return outline
+        seen = largest_part(outline.polygon.intersection(picture))
+        if seen is None or seen.area < MIN_AREA:
+            raise ToolError(f"{name} lies outside the picture.")
+        return outline_of(seen)
 
     def frame(self, radius: float) -> Frame:
         """Where robots of a radius stand wholly inside the picture."""
@@ -81,7 +96,8 @@ def reference_curve(group: Group, site: Site, radius: float) -> Curve:
     assert group.clearance is not None
     offset = nominal(group.clearance) + radius
     if group.relation != "along":
-        return ring(outline, offset, frame, keep=group.clearance[0] + radius)
+        least, greatest = (bound + radius for bound in group.clearance)
+        return ring(outline, offset, greatest, frame, keep=least)
     if group.edges is not None:
         last = len(outline.edges) - 1
         if max(group.edges) > last:
@@ -125,20 +141,38 @@ def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
 
 
 def _place_at_target(group: Group, site: Site, radius: float) -> tuple[FloatArray, str]:
-    outline = site.outlines[group.targets[0]]
+    outline = site.visible(group.targets[0])
     n, spacing = group.robots, group.min_spacing or 0.0
-    if group.relation != "centre":
+    if group.relation == "corners":
+        why = "no more corners can be taken inside the picture"
+        return _corners(group, site, radius), why
+    if group.relation == "inside":
         assert group.clearance is not None
         least, greatest = group.clearance
-        if group.relation == "corners":
-            standoff = nominal(group.clearance) + radius
-            return at_corners(outline, n, standoff), "the target has no more corners"
         points = inside(outline, n, least + radius, greatest + radius, spacing)
         return points, f"spaced {spacing:g} px and {least:.1f} px from the edge"
     pitch = max(spacing * 1.05, min(0.1 * outline.size, CENTRE_SHARE * outline.size / n**0.5))
     points = around_point(outline.centre, n, pitch)
     reach = np.linalg.norm(points - outline.centre, axis=1) <= CENTRE_SHARE * outline.size
     return points[reach], f"within {CENTRE_SHARE * outline.size:.0f} px of the centre"
+
+
+def _corners(group: Group, site: Site, radius: float) -> FloatArray:
+    """Places at the corners, drawn in from the picture's border; what cannot be taken is left out."""
+    assert group.clearance is not None
+    outline, box = site.outlines[group.targets[0]], site.frame(radius).box
+    points = at_corners(outline, group.robots, nominal(group.clearance) + radius)
+    if box.is_empty:
+        return points[:0]
+    x0, y0, x1, y1 = box.bounds
+    points = np.clip(points, (x0, y0), (x1, y1))
+    free = distances(outline.filled, points) >= group.clearance[0] + radius
+    taken: list[FloatArray] = []
+    for point in points[free]:
+        apart = [float(np.linalg.norm(point - other)) for other in taken]
+        if not apart or min(apart) >= (group.min_spacing or 0.0):
+            taken.append(point)
+    return np.asarray(taken).reshape(-1, 2)
 
 
 def _fit(curve: Curve, n: int, spacing: float) -> FloatArray:
@@ -155,8 +189,9 @@ def _between(group: Group, site: Site, frame: Frame) -> Curve:
     """The gap between two targets: joined along their centroids, or parted across the middle."""
     first, second = (site.outlines[t] for t in group.targets)
     ends = [shapely.get_coordinates(o.filled.centroid)[0] for o in (first, second)]
-    free = LineString(ends).difference(shapely.union(first.filled, second.filled))
-    pieces = [g for g in shapely.get_parts(free) if isinstance(g, LineString)]
+    solid = shapely.union(first.filled, second.filled)
+    free = LineString(ends).difference(solid)
+    pieces = [g for g in shapely.get_parts(free) if isinstance(g, LineString) and g.length]
     if not pieces:
         raise ToolError("The two targets touch or overlap: nothing lies between them.")
     a, b = shapely.get_coordinates(max(pieces, key=lambda g: g.length))
@@ -170,4 +205,4 @@ def _between(group: Group, site: Site, frame: Frame) -> Curve:
     if high - low < 0.3 * min(np.ptp(s) for s in spans):
         low, high = min(s.min() for s in spans), max(s.max() for s in spans)
     start, end = sorted((middle + low * across, middle + high * across), key=lambda p: (p[1], p[0]))
-    return segment(start, end, frame)
+    return segment(start, end, frame, solid.buffer(frame.margin + 1.0))

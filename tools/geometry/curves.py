@@ -81,19 +81,27 @@ class Frame:
         return shapely.box(self.margin, self.margin, far_x, far_y)
 
 
-def ring(outline: Outline, offset: float, frame: Frame | None = None, keep: float = 0.0) -> Curve:
+def ring(
+    outline: Outline,
+    offset: float,
+    farthest: float,
+    frame: Frame | None = None,
+    keep: float = 0.0,
+) -> Curve:
     """The loop around an outline at a distance, led along the picture's border where that cuts it.
 
-    Concavities narrower than about four offsets are bridged, as a ring of robots would.
+    Concavities are bridged, as a ring of robots would, but never further out than allowed.
 
     Args:
         outline: what to go around; its holes do not matter.
         offset: distance from the outline, px, > 0.
+        farthest: greatest distance where a concavity is bridged, px, >= offset.
         frame: where robots may stand; None for the whole plane.
         keep: parts of the border run that come nearer to the outline than this are cut out, px.
     """
-    swept = outline.filled.buffer(2 * offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
-    closed = largest_part(swept.buffer(-offset, quad_segs=QUAD_SEGMENTS))
+    reach = max(farthest, offset * ROUND_JOIN_DIP)
+    swept = outline.filled.buffer(reach, quad_segs=QUAD_SEGMENTS)
+    closed = largest_part(swept.buffer(offset * ROUND_JOIN_DIP - reach, quad_segs=QUAD_SEGMENTS))
     assert closed is not None  # a grown region is not empty
     whole = closed.exterior
     if frame is None or frame.box.contains(closed):
@@ -142,7 +150,7 @@ def edge_curve(
     Args:
         outline: the thing, with its graph G = (V, E).
         edges: indices into E.
-        offset: distance from the simplified outline, px, > 0.
+        offset: distance from the outline, px, > 0.
         frame: parts outside are cut off.
 
     Raises:
@@ -151,8 +159,7 @@ def edge_curve(
     vertices, pairs = outline.graph()
     sides = [LineString(vertices[list(pair)]) for pair in pairs]
     _ = [sides[i] for i in edges]
-    solid = shapely.make_valid(Polygon(vertices))
-    loop = _filled_parts(solid.buffer(offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS))
+    loop = _filled_parts(outline.filled.buffer(offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS))
     dense = shapely.get_coordinates(shapely.segmentize(loop.boundary, max(offset / 20, 0.1)))
     nearest = np.argmin(np.stack([distances(s, dense) for s in sides]), axis=0)
     chosen = np.isin(nearest, edges)
@@ -163,9 +170,16 @@ def edge_curve(
     return _clip(_runs(rolled, flags), frame)
 
 
-def segment(start: FloatArray, end: FloatArray, frame: Frame | None = None) -> Curve:
-    """The straight line between two points, (2,) each, image pixels."""
-    return _clip([np.stack([start, end])], frame)
+def segment(
+    start: FloatArray,
+    end: FloatArray,
+    frame: Frame | None = None,
+    solid: BaseGeometry | None = None,
+) -> Curve:
+    """The straight line between two points, (2,) each, image pixels, less what is solid."""
+    line = LineString([start, end])
+    free = _lines(line if solid is None else line.difference(solid))
+    return _clip(list(free), frame)
 
 
 def _runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
