@@ -3,7 +3,7 @@
 import asyncio
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import typer
 
@@ -60,12 +60,12 @@ def call_tool(
 
 def _arguments(text: str) -> dict[str, Any]:
     try:
-        arguments = json.loads(text)
+        arguments: Any = json.loads(text)
     except ValueError as error:
         raise InputError(f"--args is not JSON: {error}.") from None
     if not isinstance(arguments, dict):
         raise InputError(f'--args must be a JSON object such as {{"target": "t1"}}, not {text!r}.')
-    return arguments
+    return cast(dict[str, Any], arguments)
 
 
 def _workspace(image: Path | None, state: Path | None) -> Workspace:

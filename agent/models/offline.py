@@ -58,7 +58,7 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
         return f"How many robots? {reading.odd_count!r} names no whole number above 0."
     if not robots:
         return "How many robots? Say it in the words or with -n."
-    if reading.relations[0] == "between" and things < 2:
+    if "between" in reading.relations and things < 2:
         return "Between which two things? Point at both: --point X,Y --point X,Y."
     if things == 0:
         return (
@@ -69,13 +69,13 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
 
 
 def _group(task: Task, reading: Reading, robots: int) -> dict[str, Any]:
-    relation = reading.relations[0]
+    (relation,) = reading.relations
     group: dict[str, Any] = {
         "relation": relation,
         "targets": _target_ids(task)[: 2 if relation == "between" else 1],
         "robots": robots,
         "fit": reading.fit,
-        "spacing": reading.spacing,
+        "spacing": "even" if relation == "cage" else reading.spacing,
     }
     if relation == "along":
         group["side"] = reading.side or "long"

@@ -152,7 +152,7 @@ def test_a_look_shows_candidates_targets_and_robots_without_rulers() -> None:
 GROUPS: list[dict[str, object]] = [
     {"relation": "around"},
     {"relation": "around", "robots": 1},
-    {"relation": "cage", "robots": 3, "spacing": "free"},
+    {"relation": "around", "robots": 3, "spacing": "free"},
     {"relation": "corners", "robots": 4},
     {"relation": "corners", "robots": 1},
     {"relation": "along", "side": "bottom"},

@@ -9,7 +9,7 @@ from ..errors import FleetError, ToolError
 from ..formation.motion import assign, obstacles, routes
 from ..formation.place import Site
 from ..formation.plan import Plan, Point
-from ..geometry.outline import FloatArray
+from ..geometry.outline import FloatArray, distances
 
 CORRECTIONS = 5
 ARRIVED_SHARE, ARRIVED_PX = 0.001, 0.5
@@ -71,6 +71,9 @@ async def deploy(plan: Plan, site: Site, fleet: Fleet) -> Arrival:
     if len(poses) != len(goals):
         raise FleetError(f"The fleet has {len(poses)} robots; the plan needs {len(goals)}.")
     solid, frame = obstacles(contract, site), site.frame(contract.robot_radius)
+    if not solid.is_empty and distances(solid, poses).min() <= contract.robot_radius:
+        robot = int(np.argmin(distances(solid, poses))) + 1
+        raise FleetError(f"Robot {robot} stands on the target; move it off before deploying.")
     takes = assign(poses, goals)
     tolerance = max(ARRIVED_PX, ARRIVED_SHARE * float(np.hypot(*site.room)))
     corrections = -1

@@ -90,10 +90,12 @@ def checked_starts(
     """A user's starting poses, refused where a robot could not stand.
 
     Raises:
-        InputError: another number than n, outside the picture, or on a target.
+        InputError: another number than n, not finite, outside the picture, or on a target.
     """
     if len(starts) != n:
         raise InputError(f"The starts give {len(starts)} positions for {n} robots.")
+    if not np.isfinite(starts).all():
+        raise InputError("A starting position is not a finite number.")
     away = distances(site.frame(0).box, starts)
     if away.max() > 0:
         i = int(np.argmax(away))

@@ -11,19 +11,17 @@ import shapely
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..geometry.curves import Curve
-from ..geometry.outline import FloatArray, distances
+from ..geometry.curves import ROUND_JOIN_DIP, Curve
+from ..geometry.outline import FARTHEST, FloatArray, distances
 from ..geometry.sampling import coverage_radius, inside, min_spacing
 from . import spacing
 from .contract import CENTRE_SHARE, Contract
-from .place import Site, reference_curve
+from .place import Site, reference_curve, side_direction
 from .verdict import TOLERANCE, Audit, Part, Verdict, parts_of
 
 SPACING_SHARE, COVER_SHARE = 0.6, 1.4
 """inside, even: against a Lloyd tessellation of the same region at least this share of its
 smallest spacing, at most this multiple of its coverage radius."""
-FARTHEST = 1e6
-"""Coordinates beyond this, px, are refused before anything is computed with them."""
 LINE_SHARE = 0.03
 """How far off a straight line a robot may stand, as a share of the line's length."""
 
@@ -120,7 +118,7 @@ def _outside(part: Part, audit: Audit) -> None:
                 least,
                 f"is {value:.1f} px from {name}; {least:.1f} px or more are needed",
             )
-        elif value > greatest + TOLERANCE and part.group.relation != "corners":
+        elif value > greatest * ROUND_JOIN_DIP + TOLERANCE and part.group.relation != "corners":
             audit.robot(
                 "too_far",
                 i,
@@ -165,8 +163,11 @@ def _along(part: Part, audit: Audit) -> None:
         audit.notes.append(
             f"Only {share:.0%} of that side lies inside the picture; the robots spread over that."
         )
-    reach = max(0.1 * part.outline.size, part.clearance[1] - part.clearance[0])
-    spacing.on_curve(part, curve, reach, "the side asked for", audit)
+    if part.group.edges is not None:
+        spacing.on_edges(part, part.group.edges, audit)
+    else:
+        direction = side_direction(part.group, part.outline, part.site)
+        spacing.on_side(part, direction, audit)
     if part.group.spacing == "even":
         spacing.evenness(part, curve, audit)
 

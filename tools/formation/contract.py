@@ -6,7 +6,7 @@ outline to the robot's edge, so a robot of radius r keeps its centre r further a
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
@@ -19,7 +19,7 @@ MIN_SPACING = 2.0
 CLEARANCE_SHARE, MIN_CLEARANCE = 0.16, 6.0
 """Default clearance: this share of the target's size (square root of its area), at least 6 px."""
 CORNER_SHARE, MIN_STANDOFF = 0.045, 3.0
-INSIDE_SHARE = 0.03
+INSIDE_SHARE = 0.05
 CENTRE_SHARE = 0.2
 
 Relation = Literal["around", "cage", "corners", "along", "inside", "between", "centre", "shape"]
@@ -95,31 +95,41 @@ class Group(_Frozen):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        problems: list[str] = []
-        wanted = {"between": 2, "shape": 0}.get(self.relation, 1)
-        if len(self.targets) != wanted and not (self.relation == "shape" and self.targets):
-            problems.append(f"{self.relation} takes {wanted} target(s), got {len(self.targets)}")
-        if self.relation == "along" and (self.side is None) == (self.edges is None):
-            problems.append("along takes either a side or edges")
-        if self.relation == "cage" and self.robots < 3:
-            problems.append(f"a cage takes 3 or more robots, got {self.robots}")
-        if self.clearance is not None:
-            if not self.clearance[0] <= self.clearance[1] > 0:
-                problems.append(f"clearance {self.clearance} must be (least, greatest > 0)")
-            if self.relation in ("between", "centre", "shape"):
-                problems.append(f"clearance does not apply to {self.relation}")
-        for name, only in (
-            ("side", "along"),
-            ("edges", "along"),
-            ("max_gap", "cage"),
-            ("closure", "cage"),
-            ("line", "shape"),
-        ):
-            if getattr(self, name) is not None and self.relation != only:
-                problems.append(f"{name} belongs to {only}, not to {self.relation}")
+        problems = [*self._missing(), *self._misplaced()]
         if problems:
             raise ValueError("; ".join(problems))
         return self
+
+    def _missing(self) -> Iterator[str]:
+        wanted = {"between": 2, "shape": 0}.get(self.relation, 1)
+        if self.relation != "shape" and len(self.targets) != wanted:
+            yield f"{self.relation} takes {wanted} target(s), got {len(self.targets)}"
+        if len(set(self.targets)) < len(self.targets):
+            yield f"targets {self.targets} must differ"
+        if self.relation == "along" and (self.side is None) == (self.edges is None):
+            yield "along takes either a side or edges"
+        if self.relation == "cage" and self.robots < 3:
+            yield f"a cage takes 3 or more robots, got {self.robots}"
+        if self.clearance is not None and not self.clearance[0] <= self.clearance[1] > 0:
+            yield f"clearance {self.clearance} must be (least, greatest > 0)"
+
+    def _misplaced(self) -> Iterator[str]:
+        if self.clearance is not None and self.relation in ("between", "centre", "shape"):
+            yield f"clearance does not apply to {self.relation}"
+        if self.relation == "cage" and self.spacing != "even":
+            yield "a cage is evenly spaced"
+        for name, only in _ONLY_IN.items():
+            if getattr(self, name) is not None and self.relation != only:
+                yield f"{name} belongs to {only}, not to {self.relation}"
+
+
+_ONLY_IN = {
+    "side": "along",
+    "edges": "along",
+    "max_gap": "cage",
+    "closure": "cage",
+    "line": "shape",
+}
 
 
 class Contract(_Frozen):
@@ -200,6 +210,6 @@ def _default_range(
         aim = max(CORNER_SHARE * outline.size, MIN_STANDOFF) * FIT_FACTOR[group.fit]
         return (aim / 3, aim * 3)
     if group.relation == "inside":
-        least = min(INSIDE_SHARE * outline.size, 0.1 * outline.min_width)
+        least = min(INSIDE_SHARE * outline.size, 0.15 * outline.min_width)
         return (least, outline.size)
     return None

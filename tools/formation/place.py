@@ -20,6 +20,7 @@ from ..geometry.sampling import (
     at_corners,
     inside,
     min_spacing,
+    spread_subset,
 )
 from .contract import CENTRE_SHARE, Contract, Group, nominal
 
@@ -158,7 +159,7 @@ def _place_at_target(group: Group, site: Site, radius: float) -> tuple[FloatArra
 
 
 def _corners(group: Group, site: Site, radius: float) -> FloatArray:
-    """Places at the corners, drawn in from the picture's border; what cannot be taken is left out."""
+    """Places at the corners, drawn in from the picture's border, less those without room."""
     assert group.clearance is not None
     outline, box = site.outlines[group.targets[0]], site.frame(radius).box
     points = at_corners(outline, group.robots, nominal(group.clearance) + radius)
@@ -166,9 +167,11 @@ def _corners(group: Group, site: Site, radius: float) -> FloatArray:
         return points[:0]
     x0, y0, x1, y1 = box.bounds
     points = np.clip(points, (x0, y0), (x1, y1))
-    free = distances(outline.filled, points) >= group.clearance[0] + radius
+    free = points[distances(outline.filled, points) >= group.clearance[0] + radius]
+    if len(free) > group.robots:
+        free = free[spread_subset(free, group.robots)]
     taken: list[FloatArray] = []
-    for point in points[free]:
+    for point in free:
         apart = [float(np.linalg.norm(point - other)) for other in taken]
         if not apart or min(apart) >= (group.min_spacing or 0.0):
             taken.append(point)

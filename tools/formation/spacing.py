@@ -8,13 +8,17 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
-from ..geometry.curves import Curve
+from ..geometry.curves import Curve, side
 from ..geometry.outline import FloatArray, distances
 from ..geometry.sampling import corner_points
 from .verdict import TOLERANCE, Audit, Part
 
 WIDEST, NARROWEST = 1.5, 0.5
 """Even spacing: a gap between neighbours as a multiple of the mean gap."""
+FACING_OFFSET = 0.5
+"""How far off the outline, px, the part of it that faces a direction is traced."""
+SIDE_SLACK = 0.1
+"""At a corner two sides are as near; a robot may be nearer to the other one by this share."""
 REFLEX = 1.5
 """A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
 square root of 2 in a right-angled reflex one."""
@@ -27,7 +31,7 @@ def evenness(part: Part, curve: Curve, audit: Audit) -> None:
     spread = _spread(part, curve)
     mean = float(np.mean(spread.gaps or [curve.length]))
     if spread.gaps:
-        audit.least("spacing_ratio", min(spread.gaps) / mean)
+        audit.least("spacing_ratio", min(spread.gaps) / mean if mean > 0 else 0.0)
         audit.greatest("worst_gap_px", max(spread.gaps))
     for gap, (i, j) in zip(spread.gaps, spread.pairs, strict=True):
         apart = f"and robot {j + 1} are {gap:.1f} px apart along the curve"
@@ -58,6 +62,26 @@ def on_curve(part: Part, curve: Curve, reach: float, name: str, audit: Audit) ->
             reach,
             f"is {distance[i]:.1f} px from {name}; {reach:.1f} px at most are allowed",
         )
+
+
+def on_side(part: Part, direction: tuple[float, float], audit: Audit) -> None:
+    """Every robot's nearest part of the target is the side asked for."""
+    facing = side(part.outline, direction, FACING_OFFSET).geometry()
+    away = distances(part.outline.filled, part.points)
+    off = distances(facing, part.points) - away
+    for i in np.flatnonzero(off > np.maximum(SIDE_SLACK * away, 2 * FACING_OFFSET)):
+        text = "stands nearer to another side of the target than to the one asked for"
+        audit.robot("wrong_side", part.first + int(i), off[i], 0.0, text)
+
+
+def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
+    """Every robot's nearest edge is one of those asked for."""
+    vertices, pairs = part.outline.graph()
+    off = np.stack([distances(LineString(vertices[list(p)]), part.points) for p in pairs])
+    nearest, chosen = off.min(axis=0), off[list(edges)].min(axis=0)
+    for i in np.flatnonzero(chosen > nearest * (1 + SIDE_SLACK) + TOLERANCE):
+        text = f"stands nearer to edge {int(np.argmin(off[:, i]))} than to those asked for"
+        audit.robot("wrong_side", part.first + int(i), chosen[i] - nearest[i], 0.0, text)
 
 
 def enclosure(part: Part, curve: Curve, audit: Audit) -> None:

@@ -101,7 +101,8 @@ def ring(
     """
     reach = max(farthest, offset * ROUND_JOIN_DIP)
     swept = outline.filled.buffer(reach, quad_segs=QUAD_SEGMENTS)
-    closed = largest_part(swept.buffer(offset * ROUND_JOIN_DIP - reach, quad_segs=QUAD_SEGMENTS))
+    inward = (reach - offset * ROUND_JOIN_DIP) / ROUND_JOIN_DIP
+    closed = largest_part(swept.buffer(-inward, quad_segs=QUAD_SEGMENTS))
     assert closed is not None  # a grown region is not empty
     whole = closed.exterior
     if frame is None or frame.box.contains(closed):

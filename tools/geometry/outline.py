@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
@@ -27,6 +27,11 @@ SMOOTH_SLOPE = -0.40
 """Vertex count falls as eps**-1/2 on smooth curves and stays put on polygons; this divides them."""
 CORNER_TURN = math.radians(25)
 """A vertex turning less than this is a bend of the contour, not a corner."""
+MAX_VERTICES = 5_000
+FARTHEST = 1e6
+"""Coordinates beyond this, px, are no place in a picture."""
+KNOB_SHARE, BULK_SHARE = 0.05, 0.93
+"""What an opening by this share of the size removes is a knob, if this share of the area stays."""
 MIN_AREA = 4.0
 """Square pixels below which an outline has no usable shape."""
 
@@ -81,8 +86,14 @@ class Outline:
 
     @cached_property
     def rectangle(self) -> FloatArray:
-        """Corners of the minimum-area rectangle, (4, 2), in the exterior's direction."""
-        return _rectangle(self.polygon)
+        """Corners of the minimum-area rectangle, (4, 2), in the exterior's direction.
+
+        Thin things that stick out of a bulky one, such as a car's mirrors, are left out of it.
+        """
+        reach = KNOB_SHARE * self.size
+        bulk = self.filled.buffer(-reach, join_style="mitre").buffer(reach, join_style="mitre")
+        kept = bulk.intersection(self.filled)
+        return _rectangle(kept if kept.area >= BULK_SHARE * self.filled.area else self.polygon)
 
     @property
     def min_width(self) -> float:
@@ -146,23 +157,39 @@ def make_outline(exterior: ArrayLike, holes: tuple[ArrayLike, ...] = ()) -> Outl
         holes: rings of the same form.
 
     Raises:
-        InputError: fewer than 3 points, not finite, or enclosing under 4 square pixels.
+        InputError: no pairs of numbers, fewer than 3, or enclosing under 4 square pixels.
     """
-    rings = [np.asarray(ring, dtype=float) for ring in (exterior, *holes)]
-    for ring in rings:
-        if ring.ndim != 2 or ring.shape[1:] != (2,) or len(ring) < 3:
-            raise InputError(f"An outline needs 3 or more (x, y) points; got shape {ring.shape}.")
-        if not np.isfinite(ring).all():
-            raise InputError("An outline's coordinates must be finite numbers.")
-    return outline_of(Polygon(rings[0], rings[1:]))
+    outer, *inner = (_ring(ring) for ring in (exterior, *holes))
+    region = shapely.make_valid(Polygon(outer))
+    for hole in inner:
+        region = region.difference(shapely.make_valid(Polygon(hole)))
+    return outline_of(region)
 
 
-def outline_of(polygon: Polygon | MultiPolygon) -> Outline:
+def _ring(points: ArrayLike) -> FloatArray:
+    try:
+        ring = np.asarray(points, dtype=float)
+    except (ValueError, TypeError):
+        raise InputError("An outline's points must be (x, y) pairs of numbers.") from None
+    if ring.ndim != 2 or ring.shape[1:] != (2,) or len(ring) < 3:
+        raise InputError(f"An outline needs 3 or more (x, y) points; got shape {ring.shape}.")
+    if not (np.abs(ring) <= FARTHEST).all():
+        raise InputError(f"An outline's coordinates must lie within {FARTHEST:g} px.")
+    return ring
+
+
+def outline_of(polygon: BaseGeometry) -> Outline:
     """Build an outline from a polygon; an invalid one is mended, of several parts the largest kept.
+
+    More than 5,000 vertices are thinned out, moving the boundary by a fraction of a pixel.
 
     Raises:
         InputError: the region has under 4 square pixels.
     """
+    tolerance = 0.05
+    while shapely.get_num_coordinates(polygon) > MAX_VERTICES:
+        polygon = polygon.simplify(tolerance, preserve_topology=False)
+        tolerance *= 2
     region = largest_part(shapely.make_valid(polygon))
     if region is None or region.area < MIN_AREA:
         area = 0.0 if region is None else region.area

@@ -21,7 +21,9 @@ PHASES = 24
 CELLS_PER_ROBOT = 150
 MIN_CELLS, MAX_CELLS = 6_000, 300_000
 LLOYD_STEPS = 40
-LATTICE_TURNS = (0.0, math.pi / 12, math.pi / 6, math.pi / 4)
+THIN = 0.25
+"""Area over boundary length, px, below which a region is treated as a line."""
+LATTICE_TURNS = (0.0, math.pi / 12, math.pi / 6)
 
 
 def along_curve(curve: Curve, n: int) -> FloatArray:
@@ -52,18 +54,15 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
 
 
 def at_corners(outline: Outline, n: int, standoff: float) -> FloatArray:
-    """N of the outline's corners, each pushed outward by a distance.
-
-    Four robots on an outline with another number of corners take the minimum-area
-    rectangle's; fewer robots than corners take those furthest apart.
+    """A place off every corner that n robots may be sent to, pushed outward by a distance.
 
     Args:
         outline: the thing.
-        n: how many, at most the number of corners.
+        n: how many robots; see `corner_points`.
         standoff: distance from the outline, px.
 
     Returns:
-        (min(n, corners), 2).
+        (k, 2), in the corners' order.
     """
     corners = corner_points(outline, n)
     before = _unit(corners - np.roll(corners, 1, axis=0))
@@ -71,14 +70,14 @@ def at_corners(outline: Outline, n: int, standoff: float) -> FloatArray:
     outward = _unit(before - after)
     reflex = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0
     outward[reflex] *= -1
-    pushed = np.stack(
-        [_push(outline, c, u, standoff) for c, u in zip(corners, outward, strict=True)]
-    )
-    return pushed if n >= len(corners) else pushed[_spread_subset(pushed, n)]
+    return np.stack([_push(outline, c, u, standoff) for c, u in zip(corners, outward, strict=True)])
 
 
 def corner_points(outline: Outline, n: int) -> FloatArray:
-    """The corners that n robots are matched with, (k, 2); see `at_corners`."""
+    """The corners that n robots are matched with, (k, 2).
+
+    Four robots on an outline with another number of corners take the minimum-area rectangle's.
+    """
     corners = outline.corners
     return outline.rectangle if n == 4 and len(corners) != 4 else corners
 
@@ -104,14 +103,17 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
     )
     if region.is_empty:
         return np.empty((0, 2))
+    if region.area < THIN * region.length:
+        return _on_axis(region, n, spacing)
     cells = _cells(region, n)
-    starts = [_lattice(region, n, turn) for turn in (LATTICE_TURNS if n <= 100 else (0.0,))]
+    turns = (_long_angle(region), *LATTICE_TURNS)
+    starts = [_lattice(region, n, turn) for turn in (turns if n <= 100 else turns[:1])]
     relaxed = [_lloyd(cells, region, start) for start in starts]
     best = max(relaxed, key=min_spacing)
     if min_spacing(best) >= spacing:
         return best
-    packed = max((_pack(region, spacing, turn) for turn in LATTICE_TURNS), key=len)
-    return packed[_spread_subset(packed, n)] if len(packed) > n else packed
+    packed = max((_pack(region, spacing, turn) for turn in turns), key=len)
+    return packed[spread_subset(packed, n)] if len(packed) > n else packed
 
 
 def around_point(centre: tuple[float, float], n: int, spacing: float) -> FloatArray:
@@ -190,7 +192,7 @@ def _push(outline: Outline, corner: FloatArray, outward: FloatArray, standoff: f
     return place
 
 
-def _spread_subset(points: FloatArray, n: int) -> NDArray[np.intp]:
+def spread_subset(points: FloatArray, n: int) -> NDArray[np.intp]:
     """Indices of n points far apart, by farthest-point selection, in their given order."""
     distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
     chosen = [int(np.argmax(distance))]
@@ -228,6 +230,34 @@ def _hex(region: BaseGeometry, pitch: float, turn: float) -> FloatArray:
     return points[shapely.intersects_xy(region, points)]
 
 
+def _long_angle(region: BaseGeometry) -> float:
+    """Direction of the longer side of the minimum-area rectangle, radians."""
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(region))
+    sides = np.diff(corners, axis=0)
+    x, y = sides[int(np.argmax(np.linalg.norm(sides, axis=1)))]
+    return math.atan2(y, x)
+
+
+def _on_axis(region: BaseGeometry, n: int, spacing: float) -> FloatArray:
+    """Up to n points along a region that is little more than a line."""
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(region))[:4]
+    if len(corners) < 4:
+        return shapely.get_coordinates(region.representative_point())
+    a, b, c, d = corners
+    ends = (
+        [(a + b) / 2, (c + d) / 2]
+        if np.ptp([a, b]) < np.ptp([b, c])
+        else [(b + c) / 2, (d + a) / 2]
+    )
+    inner = LineString(ends).intersection(region)
+    lines = [g for g in shapely.get_parts(inner) if isinstance(g, LineString) and g.length > 0]
+    if not lines:
+        return shapely.get_coordinates(region.representative_point())
+    line = max(lines, key=lambda g: g.length)
+    fits = n if spacing <= 0 else min(n, int(line.length / spacing) + 1)
+    return _open_points(line, fits)
+
+
 def _pack(region: BaseGeometry, spacing: float, turn: float) -> FloatArray:
     """The densest regular packing at a spacing: as many robots as fit."""
     shapely.prepare(region)
@@ -242,7 +272,7 @@ def _lattice(region: BaseGeometry, n: int, turn: float) -> FloatArray:
     for _ in range(60):
         points = _hex(region, pitch, turn)
         if len(points) >= n:
-            return points[_spread_subset(points, n)] if n < 2000 else points[_every(len(points), n)]
+            return points[spread_subset(points, n)] if n < 2000 else points[_every(len(points), n)]
         pitch *= 0.97
     return _grid(region, pitch)[:n]
 

@@ -14,14 +14,14 @@ from ..geometry.outline import Outline, largest_part, outline_of
 def outline_of_mask(mask: NDArray[np.bool_]) -> Outline:
     """The outline of a mask's largest connected part, holes kept.
 
-    OpenCV traces pixel centres; growing the polygon by half a pixel gives the pixels' borders,
-    so that the outline's area is the mask's (Suzuki and Abe 1985 for the tracing).
+    OpenCV traces pixel centres (Suzuki and Abe 1985); growing the polygon by half a pixel gives
+    the pixels' borders: exact for upright edges, up to half a pixel wide of slanted ones.
 
     Args:
         mask: (H, W).
 
     Raises:
-        InputError: fewer than 4 pixels are set.
+        InputError: nothing in the mask is wide enough to have an area.
     """
     contours, hierarchy = cv2.findContours(
         mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE
@@ -35,7 +35,7 @@ def outline_of_mask(mask: NDArray[np.bool_]) -> Outline:
         parts.append(shapely.make_valid(region).buffer(0.5, join_style="mitre"))
     largest = largest_part(shapely.union_all(parts)) if parts else None
     if largest is None:
-        raise InputError(f"The mask has {int(mask.sum())} pixels set; too few to have a shape.")
+        raise InputError(f"The mask's {int(mask.sum())} pixels form lines or specks, no shape.")
     return outline_of(largest)
 
 

@@ -6,7 +6,7 @@ their edge are the proposals that the segmentation proper then has to confirm.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
@@ -61,8 +61,13 @@ def propose(pixels: Bytes, points: Sequence[Point], count: int) -> list[Region]:
 
     Best first; empty where nothing with an edge around the points fits in the picture.
     """
+    return distinct(_grown(pixels, points), count)
+
+
+def distinct(regions: Iterable[Region], count: int) -> list[Region]:
+    """The best `count` regions whose boxes differ, best first."""
     chosen: list[Region] = []
-    for region in sorted(_grown(pixels, points), key=lambda r: r.score, reverse=True):
+    for region in sorted(regions, key=lambda r: r.score, reverse=True):
         if all(box_iou(region.box, other.box) < SAME_BOX for other in chosen):
             chosen.append(region)
             if len(chosen) == count:
@@ -107,18 +112,24 @@ def box_iou(one: Box, other: Box) -> float:
 
 
 def _grown(pixels: Bytes, points: Sequence[Point]) -> Iterator[Region]:
-    for window in _windows(pixels, points):
-        height, width = window.shape
-        seeds = np.round(window.to_work(points)).astype(np.int64)
-        seeds = seeds.clip(0, (width - 1, height - 1))
+    for window in windows(pixels, points):
+        seeds = seeds_of(window, points)
         distance = _colour_distance(window.features, seeds)
         for tolerance in TOLERANCES:
-            mask = _region(distance <= tolerance, seeds)
-            if np.count_nonzero(mask) >= MIN_PIXELS and _fits(mask, window):
-                yield Region(window, mask, _score(mask, window))
+            mask = pieces_grown(distance <= tolerance, seeds)
+            if np.count_nonzero(mask) >= MIN_PIXELS and ends_inside(mask, window):
+                yield Region(window, mask, region_score(mask, window))
 
 
-def _windows(pixels: Bytes, points: Sequence[Point]) -> Iterator[Window]:
+def seeds_of(window: Window, points: Sequence[Point]) -> npt.NDArray[np.int64]:
+    """The pixels (n, 2) of the window under the points."""
+    height, width = window.shape
+    seeds = np.round(window.to_work(points)).astype(np.int64)
+    return seeds.clip(0, (width - 1, height - 1))
+
+
+def windows(pixels: Bytes, points: Sequence[Point]) -> Iterator[Window]:
+    """Windows around the points, from the whole picture down by halves."""
     height, width = pixels.shape[:2]
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     smallest = max(MIN_WINDOW_PX, 2 * float(np.max(high - low)))
@@ -143,11 +154,11 @@ def _colour_distance(image: Bytes, seeds: npt.NDArray[np.int64]) -> Floats:
     return distance
 
 
-def _region(near: Mask, seeds: npt.NDArray[np.int64]) -> Mask:
+def pieces_grown(near: Mask, seeds: npt.NDArray[np.int64]) -> Mask:
     """The pieces of `near` at the seeds, holes filled and hair-thin leaks cut off."""
-    filled = _filled(_pieces_at(near, seeds)).astype(np.uint8)
+    solid = filled(_pieces_at(near, seeds)).astype(np.uint8)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
-    return _pieces_at(np.asarray(cv2.morphologyEx(filled, cv2.MORPH_OPEN, kernel)) > 0, seeds)
+    return _pieces_at(np.asarray(cv2.morphologyEx(solid, cv2.MORPH_OPEN, kernel)) > 0, seeds)
 
 
 def _pieces_at(mask: Mask, seeds: npt.NDArray[np.int64]) -> Mask:
@@ -156,35 +167,37 @@ def _pieces_at(mask: Mask, seeds: npt.NDArray[np.int64]) -> Mask:
     return np.isin(labels, wanted[wanted > 0])
 
 
-def _filled(mask: Mask) -> Mask:
+def filled(mask: Mask) -> Mask:
+    """The mask (h, w) with its holes filled."""
     outside = np.pad(~mask, 1, constant_values=True).astype(np.uint8)
     cv2.floodFill(outside, None, (0, 0), (2,))
     return outside[1:-1, 1:-1] != 2
 
 
-def _touched(mask: Mask) -> npt.NDArray[np.bool_]:
+def touches_border(mask: Mask) -> npt.NDArray[np.bool_]:
     """Whether the mask touches the left, right, top and bottom side of its window."""
     return np.array([side.any() for side in (mask[:, 0], mask[:, -1], mask[0], mask[-1])])
 
 
-def _fits(mask: Mask, window: Window) -> bool:
+def ends_inside(mask: Mask, window: Window) -> bool:
     """Whether the region ends within its window, or at a border of the picture."""
     (x0, y0), (width, height) = window.origin, window.extent
     rows, columns = window.picture
     open_sides = np.array((x0 > 0, x0 + width < columns, y0 > 0, y0 + height < rows))
-    touched = _touched(mask)
+    touched = touches_border(mask)
     small = window.picture_area(mask) < MAX_SHARE * rows * columns
     return small and touched.sum() <= 2 and not (touched & open_sides).any()
 
 
-def _score(mask: Mask, window: Window) -> float:
+def region_score(mask: Mask, window: Window) -> float:
+    """How much a region looks like a thing: edge contrast, compactness and, weakly, size."""
     contrast = _edge_contrast(window.features.astype(np.float32), mask)
     points = np.argwhere(mask).astype(np.int32)
     hull = cv2.convexHull(points)
     # Pixels reach half a pixel beyond their centres.
     hull_area = cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1
     compact = len(points) / hull_area
-    inside = BORDER_DISCOUNT ** int(_touched(mask).sum())
+    inside = BORDER_DISCOUNT ** int(touches_border(mask).sum())
     clear = contrast / (contrast + CLEAR_CONTRAST)
     return clear * compact * inside * window.picture_area(mask) ** SIZE_PREFERENCE
 

@@ -6,7 +6,7 @@ real photographs, so formup runs with no download and no GPU.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -17,6 +17,7 @@ from . import grabcut as gc
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
 from .openings import cut_openings
 from .region_growing import Region, box_iou, pin, propose
+from .wholes import on_plain_ground, propose_wholes, solidity
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
 RING = 0.1
@@ -38,9 +39,14 @@ THIN = 0.5
 TURN = np.pi * (3 - 5**0.5)
 # Different regions a point may mean that are tried; a fourth was right now and then.
 PROPOSALS = 4
+# A whole holds this share of its part, is this many times as large (a thing with its shadow is
+# less) and stands out this much of it; it is taken for a thing when it fills its hull this far.
+HELD, MUCH_LARGER, RIVAL, SOLID = 0.85, 2.2, 0.6, 0.88
 # Other points of a mask that should lead back to it, and how deep inside it they lie at least.
 ECHOES = 4
 DEPTH = 0.35
+
+Proposer = Callable[[Bytes, Sequence[Point], int], list[Region]]
 
 
 @dataclass(frozen=True)
@@ -131,14 +137,25 @@ def segment_points(
     stands out most in colour is taken. Its stability is whether other points of the mask lead
     back to it. A thing of several colours needs points on each, or a box.
     """
-    found = propose(pixels, points, PROPOSALS)
-    if not found:
-        return _nothing((pixels.shape[0], pixels.shape[1]), _around(points))
     off = list(negative)
-    prompts = [_region_prompt(pixels, region, points, off) for region in found]
-    tried = [(prompt, _cut(prompt, prompt.trimaps[0])) for prompt in prompts]
-    prompt, mask = max(tried, key=lambda pair: _standing_out(*pair))
-    return _judged(prompt, mask, _echo(pixels, prompt, mask))
+    parts = _tried(pixels, propose(pixels, points, PROPOSALS), points, off)
+    best = max(parts, key=lambda tried: tried.standing, default=None)
+    if best is not None and on_plain_ground(best.prompt.window, best.mask):
+        return _judged(best.prompt, best.mask, _echo(pixels, best.prompt, best.mask, propose))
+    wholes = _tried(pixels, propose_wholes(pixels, points, PROPOSALS), points, off)
+    if best is not None:
+        wholes = [tried for tried in wholes if _is_whole_of(tried, best)]
+    solid = [tried for tried in wholes if solidity(tried.mask) >= SOLID]
+    chosen = max(solid, key=lambda tried: tried.standing, default=best)
+    if chosen is None:
+        return _nothing((pixels.shape[0], pixels.shape[1]), _around(points))
+    proposer = propose if chosen is best else propose_wholes
+    echo = _echo(pixels, chosen.prompt, chosen.mask, proposer)
+    found = _judged(chosen.prompt, chosen.mask, echo)
+    if chosen is best and wholes:  # it may well be a part of one of them
+        rival = max(tried.standing for tried in wholes)
+        return _doubted(found, chosen.standing / (chosen.standing + rival))
+    return found
 
 
 def _segment(prompt: _Prompt) -> Segmentation:
@@ -226,6 +243,45 @@ def _moved_outlines(outline: Points) -> list[Points]:
     return list(outline + OUTLINE_ERROR * np.sqrt(area) * moves)
 
 
+@dataclass(frozen=True)
+class _Tried:
+    """A proposal, the mask GrabCut made of it, and how much that stands out."""
+
+    prompt: _Prompt
+    mask: Mask
+    standing: float
+
+    @property
+    def area(self) -> float:
+        return self.prompt.window.picture_area(self.mask)
+
+
+def _tried(
+    pixels: Bytes, regions: Iterable[Region], points: Sequence[Point], negative: Sequence[Point]
+) -> list[_Tried]:
+    found: list[_Tried] = []
+    for region in regions:
+        prompt = _region_prompt(pixels, region, points, negative)
+        mask = _cut(prompt, prompt.trimaps[0])
+        if mask.any() and not mask.all():
+            found.append(_Tried(prompt, mask, _standing_out(prompt, mask)))
+    return found
+
+
+def _is_whole_of(outer: _Tried, part: _Tried) -> bool:
+    """Whether a mask holds another, is much larger (not just its shadow), and stands out too."""
+    shared = part.prompt.window.transfer(part.mask, outer.prompt.window)
+    held = int(np.count_nonzero(shared & outer.mask)) >= HELD * int(np.count_nonzero(shared))
+    larger = outer.area >= MUCH_LARGER * part.area
+    return held and larger and outer.standing >= RIVAL * part.standing
+
+
+def _doubted(found: Segmentation, share: float) -> Segmentation:
+    parts = {**found.parts, "unrivalled": share}
+    confidence = float(np.prod(list(parts.values())) ** (1 / len(parts)))
+    return Segmentation(found.mask, confidence, parts, found.box)
+
+
 def _region_prompt(
     pixels: Bytes, region: Region, points: Sequence[Point], negative: Sequence[Point]
 ) -> _Prompt:
@@ -244,13 +300,13 @@ def _standing_out(prompt: _Prompt, mask: Mask) -> float:
     return _fit(prompt, mask) * gc.colour_separation(prompt.window.features, mask)
 
 
-def _echo(pixels: Bytes, prompt: _Prompt, mask: Mask) -> float:
+def _echo(pixels: Bytes, prompt: _Prompt, mask: Mask, proposer: Proposer) -> float:
     """Mean overlap of the mask with the likest region proposed from other points well inside."""
     window = prompt.window
     overlaps: list[float] = []
     for point in _far_inside(mask, prompt.positive):
         ((x, y),) = window.to_picture_points(point[None])
-        regions = propose(pixels, [(float(x), float(y))], PROPOSALS)
+        regions = proposer(pixels, [(float(x), float(y))], PROPOSALS)
         shared = [gc.iou(mask, region.window.transfer(region.mask, window)) for region in regions]
         overlaps.append(max(shared, default=0.0))
     return float(np.mean(overlaps)) if overlaps else 0.0

@@ -55,4 +55,6 @@ def _grabcut(pixels: Pixels, prompt: TargetPrompt) -> Segmentation:
     return segment_points(pixels, positive, negative=negative)
 
 
-SEGMENTERS = {"grabcut": Segmenter("grabcut", _grabcut, {"point": 0.5, "box": 0.5, "outline": 0.5})}
+SEGMENTERS = {
+    "grabcut": Segmenter("grabcut", _grabcut, {"point": 0.75, "box": 0.6, "outline": 0.55})
+}

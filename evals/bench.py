@@ -1,0 +1,243 @@
+"""`make bench`: CPU time of each tool on a 2-megapixel photograph beside the bare library calls.
+
+The bare call is the part no implementation of the tool could do without, made directly with
+OpenCV, shapely, scipy or Pillow on the same data; the ratio is what formup adds around it.
+"""
+
+import asyncio
+import io
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+import shapely
+from PIL import Image
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from ..tools.doors import TOOLS
+from ..tools.geometry.outline import FloatArray, distances, outline_of
+from ..tools.perception.contours import mask_of_outline
+from ..tools.perception.image import load_picture, picture_from_array
+from ..tools.perception.prompts import TargetPrompt
+from ..tools.scene import Scene
+from ..tools.workspace import Workspace
+from .suite import load_tasks
+
+SIZE = (1920, 1080)
+REPEATS = 5
+ROBOTS, INSIDE, PROBES = 24, 24, 1000
+Work = Callable[[], object]
+
+
+def main() -> None:
+    """Print the table."""
+    workspace = _workspace()
+    print(f"{SIZE[0]} x {SIZE[1]} px, CPU milliseconds, best of {REPEATS}")  # noqa: T201
+    print(f"{'tool':20} {'formup':>9} {'bare':>9} {'ratio':>7}  bare calls")  # noqa: T201
+    for name, arguments, (words, bare) in _cases(workspace):
+        tool = next(t for t in TOOLS if t.name == name)
+
+        def call(tool: Any = tool, arguments: dict[str, Any] = arguments) -> object:
+            return asyncio.run(tool.call(_anew(workspace), arguments))
+
+        ours, theirs = _best(call), _best(bare)
+        print(f"{name:20} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.1f}  {words}")  # noqa: T201
+
+
+def _best(work: Work) -> float:
+    """Least CPU milliseconds over the repeats, after one to warm up."""
+    work()
+    times: list[float] = []
+    for _ in range(REPEATS):
+        began = time.process_time()
+        work()
+        times.append(1000 * (time.process_time() - began))
+    return max(min(times), 1e-3)
+
+
+def _anew(workspace: Workspace) -> Workspace:
+    """The workspace with outlines that have nothing computed and kept from an earlier call."""
+    targets = (replace(t, outline=outline_of(t.outline.polygon)) for t in workspace.scene.targets)
+    return replace(workspace, scene=replace(workspace.scene, targets=tuple(targets)))
+
+
+def _workspace() -> Workspace:
+    """The two cars at 2 megapixels, the red one segmented as t1, the other as t2."""
+    task = next(t for t in load_tasks() if t.image.stem == "cars_two" and t.other)
+    photo = load_picture(task.image)
+    scale = np.array([SIZE[0] / photo.width, SIZE[1] / photo.height])
+    workspace = Workspace(
+        Scene(picture_from_array(np.asarray(cv2.resize(photo.pixels, SIZE), dtype=np.uint8)))
+    )
+    segment = next(t for t in TOOLS if t.name == "segment")
+    assert task.other is not None
+    for name, thing in (("t1", task.target), ("t2", task.other)):
+        box = np.asarray(thing.outline.bounds) * np.tile(scale, 2)
+        asyncio.run(segment.call(workspace, {"id": name, "box": box.tolist()}))
+    box = workspace.scene.target("t1").box
+    return replace(workspace, pointed=(TargetPrompt(id="t3", box=box),))  # for locate_object
+
+
+def _cases(workspace: Workspace) -> list[tuple[str, dict[str, Any], tuple[str, Work]]]:
+    box = [round(v) for v in workspace.scene.target("t1").box]
+    group = {"relation": "around", "targets": ["t1"], "robots": ROBOTS}
+    probes = np.random.default_rng(0).uniform((0, 0), SIZE, (PROBES, 2))
+    propose = next(t for t in TOOLS if t.name == "propose_formation")
+    plan = asyncio.run(propose.call(workspace, {"contract": {"groups": [group]}})).data["plan_id"]
+    points = workspace.plans[plan].formation.points
+    cut = ("bilateral, 5 x GrabCut at 160 px", lambda: _bare_segment(workspace, box))
+    return [
+        ("look", {}, ("Pillow resize, PNG", lambda: _bare_look(workspace))),
+        ("locate_object", {}, cut),
+        ("segment", {"id": "t1", "box": box}, cut),
+        (
+            "describe_shape",
+            {"target": "t1"},
+            ("findContours, approxPolyDP, minAreaRect", _bare_describe(workspace)),
+        ),
+        (
+            "check_point",
+            {"target": "t1", "points": probes.tolist()},
+            ("shapely contains, distance", _bare_check(workspace, probes)),
+        ),
+        (
+            "sample_along_edges",
+            {"target": "t1", "n": ROBOTS},
+            ("shapely buffer, interpolate", _bare_ring(workspace)),
+        ),
+        (
+            "sample_inside",
+            {"target": "t1", "n": INSIDE},
+            ("4 x 40 cKDTree queries of 6000 cells", _bare_inside(workspace)),
+        ),
+        (
+            "sample_shape",
+            {"kind": "between", "n": 8, "targets": ["t1", "t2"]},
+            ("shapely difference, interpolate", _bare_between(workspace)),
+        ),
+        ("measure", {"a": "t1", "b": "t2"}, ("shapely distance", _bare_measure(workspace))),
+        (
+            "propose_formation",
+            {"contract": {"groups": [group]}},
+            ("shapely buffer, distance; cKDTree", _bare_propose(workspace)),
+        ),
+        (
+            "deploy",
+            {"plan_id": plan},
+            ("scipy assignment, shapely intersects", _bare_deploy(workspace, points)),
+        ),
+    ]
+
+
+def _bare_look(workspace: Workspace) -> bytes:
+    buffer = io.BytesIO()
+    image = Image.fromarray(workspace.scene.picture.pixels)
+    image.resize((1500, 844)).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def _bare_segment(workspace: Workspace, box: list[int]) -> object:
+    x0, y0, x1, y1 = box
+    reach_x, reach_y = (x1 - x0) // 4, (y1 - y0) // 4
+    crop = workspace.scene.picture.pixels[
+        max(y0 - reach_y, 0) : y1 + reach_y, max(x0 - reach_x, 0) : x1 + reach_x
+    ]
+    scale = 160 / max(crop.shape[:2])
+    small = cv2.resize(crop, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    smooth = np.asarray(cv2.bilateralFilter(small, 7, 40, 5), dtype=np.uint8)
+    labels = np.empty(0)
+    for _ in range(5):
+        labels = np.full(smooth.shape[:2], cv2.GC_PR_BGD, np.uint8)
+        labels[:3], labels[-3:], labels[:, :3], labels[:, -3:] = 0, 0, 0, 0
+        labels[20:-20, 15:-15] = cv2.GC_PR_FGD
+        model = np.zeros((1, 65)), np.zeros((1, 65))
+        cv2.grabCut(smooth, labels, (0, 0, 1, 1), *model, 4, cv2.GC_INIT_WITH_MASK)
+    return labels
+
+
+def _bare_describe(workspace: Workspace) -> Work:
+    picture = workspace.scene.picture
+    mask = mask_of_outline(workspace.scene.target("t1").outline, picture.width, picture.height)
+    raster = mask.astype(np.uint8)
+
+    def work() -> object:
+        contours, _ = cv2.findContours(raster, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+        return [(cv2.approxPolyDP(c, 4, True), cv2.minAreaRect(c)) for c in contours]
+
+    return work
+
+
+def _bare_check(workspace: Workspace, probes: FloatArray) -> Work:
+    polygon = workspace.scene.target("t1").outline.polygon
+    edge = polygon.boundary
+    return lambda: (shapely.contains_xy(polygon, probes), distances(edge, probes))
+
+
+def _bare_ring(workspace: Workspace) -> Callable[[], FloatArray]:
+    filled = workspace.scene.target("t1").outline.filled
+
+    def work() -> FloatArray:
+        loop = shapely.LineString(shapely.get_coordinates(filled.buffer(80)))
+        steps = np.arange(ROBOTS, dtype=float) * loop.length / ROBOTS
+        return shapely.get_coordinates(shapely.line_interpolate_point(loop, steps))
+
+    return work
+
+
+def _bare_inside(workspace: Workspace) -> Work:
+    x0, y0, x1, y1 = workspace.scene.target("t1").outline.bounds
+    random = np.random.default_rng(0)
+    cells = random.uniform((x0, y0), (x1, y1), (6000, 2))
+    robots = random.uniform((x0, y0), (x1, y1), (INSIDE, 2))
+
+    def work() -> object:
+        return [cKDTree(robots).query(cells) for _ in range(4 * 40)]
+
+    return work
+
+
+def _bare_between(workspace: Workspace) -> Work:
+    a, b = (workspace.scene.target(t).outline.filled for t in ("t1", "t2"))
+
+    def work() -> object:
+        line = shapely.LineString([a.centroid, b.centroid]).difference(shapely.union(a, b))
+        return [line.interpolate(share, normalized=True) for share in np.linspace(0, 1, 8)]
+
+    return work
+
+
+def _bare_measure(workspace: Workspace) -> Work:
+    a, b = (workspace.scene.target(t).outline.polygon for t in ("t1", "t2"))
+    return lambda: shapely.distance(a, b)
+
+
+def _bare_propose(workspace: Workspace) -> Work:
+    filled = workspace.scene.target("t1").outline.filled
+    ring = _bare_ring(workspace)
+
+    def work() -> object:
+        points = ring()
+        return distances(filled, points), cKDTree(points).query(points, k=2)
+
+    return work
+
+
+def _bare_deploy(workspace: Workspace, goals: FloatArray) -> Work:
+    filled = workspace.scene.target("t1").outline.filled
+    starts = np.random.default_rng(0).uniform((0, 0), SIZE, goals.shape)
+
+    def work() -> object:
+        pairs = linear_sum_assignment(cdist(starts, goals, "sqeuclidean"))
+        lines = shapely.linestrings(np.stack([starts[pairs[0]], goals[pairs[1]]], axis=1))
+        return shapely.intersects(lines, filled.buffer(20))
+
+    return work
+
+
+if __name__ == "__main__":
+    main()
