@@ -11,11 +11,10 @@ demo: .venv/.ready
 	  --point 390,260 --out $(OUT)/car
 	@echo
 	@$(BIN)/formup run $(PHOTOS)/ucm_sparseresidential28.jpg "Fill the pool with 6 robots" \
-	  --outline 347,282,364,247,383,254,404,227,433,231,438,262,411,291,394,327,370,341,349,321 \
-	  --out $(OUT)/pool
+	  --box 322,261,429,388 --out $(OUT)/pool
 	@echo
 	@$(BIN)/formup run $(PHOTOS)/us_coins.jpg "Make a ring of 10 robots around the coin" \
-	  --point 285,80 --out $(OUT)/coin
+	  --point 245,95 --out $(OUT)/coin
 
 test: .venv/.ready-dev
 	$(BIN)/pytest -q

@@ -47,7 +47,7 @@ class Report(BaseModel):
     status: Status
     message: str
     instruction: str
-    image: dict[str, Any]
+    image: dict[str, Any] | None = None
     targets: tuple[dict[str, Any], ...] = ()
     candidates: tuple[dict[str, Any], ...] | None = None
     contract: Contract | None = None

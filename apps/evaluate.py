@@ -49,20 +49,15 @@ def photos(
         write_whole(out, json.dumps(content, indent=1).encode())
 
 
-def _print(means: dict[str, dict[str, float]], rows: list[Row], mode: str) -> None:
+def _print(means: dict[str, dict[str, float | None]], rows: list[Row], mode: str) -> None:
     console = Console(highlight=False)
     table = Table(title=f"offline planner, pointed by {mode}", header_style="cyan")
     for name in ("category", "runs", "placed", "success", "strict", "mean IoU"):
         table.add_column(name, justify="left" if name == "category" else "right")
     for name, values in means.items():
-        table.add_row(
-            name,
-            f"{values['runs']:.0f}",
-            f"{values['placed']:.3f}",
-            f"{values['success']:.3f}",
-            f"{values['strict']:.3f}",
-            f"{values['iou']:.3f}",
-        )
+        shares = [values[k] for k in ("placed", "success", "strict", "iou")]
+        cells = ["-" if v is None else f"{v:.3f}" for v in shares]
+        table.add_row(name, f"{values['runs']:.0f}", *cells)
     console.print(table)
     for row in rows:
         if not row.strict:

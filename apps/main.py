@@ -27,6 +27,7 @@ def _run() -> int:
 
     from ..tools.errors import FleetError, FormupError, ModelError
     from .cli import app
+    from .screen import say_failed
 
     try:
         code = app(standalone_mode=False) or 0
@@ -34,12 +35,12 @@ def _run() -> int:
             raise KeyboardInterrupt
         return code
     except typer.TyperException as error:
-        print(f"formup: {error.format_message()} (--help shows what there is)", file=sys.stderr)  # noqa: T201
+        say_failed(f"{error.format_message()} (--help shows what there is)")
         return 2
     except typer.Abort:
         raise KeyboardInterrupt from None
     except FormupError as error:
-        print(f"formup: {error}", file=sys.stderr)  # noqa: T201
+        say_failed(str(error))
         return 4 if isinstance(error, (ModelError, FleetError)) else 2
     except BrokenPipeError:
         sys.stderr.close()  # the reader has gone; there is nobody to tell

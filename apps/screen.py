@@ -1,5 +1,7 @@
 """A run on the terminal: what was found, the contract, its certificate, the arrival table."""
 
+import sys
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -45,6 +47,14 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     written = [name for name in (report.files or {}).values() if name]
     if written:
         _line(console, "files", f"{folder}/ {', '.join(written)}")
+
+
+def say_failed(message: str) -> None:
+    """Say on stderr what was wrong; with --json, also as the one object on stdout."""
+    print(f"formup: {message}", file=sys.stderr)  # noqa: T201
+    if "--json" in sys.argv and sys.argv[1] in ("run", "deploy"):
+        report = Report(status="failed", message=message, instruction="", model="offline")
+        print(report.model_dump_json(indent=2))  # noqa: T201
 
 
 def _line(console: Console, name: str, text: str) -> None:

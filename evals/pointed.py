@@ -80,7 +80,7 @@ def evaluate(
     return rows
 
 
-def summary(rows: list[Row]) -> dict[str, dict[str, float]]:
+def summary(rows: list[Row]) -> dict[str, dict[str, float | None]]:
     """Per category and in total: runs, success, strict success, mean IoU, share answered."""
     groups = {c: [r for r in rows if r.category == c] for c in ("general", "infill", "caging")}
     groups["total"] = rows
@@ -92,13 +92,13 @@ def as_json(row: Row) -> dict[str, object]:
     return asdict(row)
 
 
-def _means(rows: list[Row]) -> dict[str, float]:
+def _means(rows: list[Row]) -> dict[str, float | None]:
     known = [row.iou for row in rows if row.iou is not None]
     return {
         "runs": len(rows),
         "success": float(np.mean([row.success for row in rows])),
         "strict": float(np.mean([row.strict for row in rows])),
-        "iou": float(np.mean(known)) if known else float("nan"),
+        "iou": float(np.mean(known)) if known else None,
         "placed": float(np.mean([row.status == "deployed" for row in rows])),
     }
 

@@ -117,6 +117,14 @@ def test_unusable_option(
     refused(cli("run", picture, *CAR, "-n", 4, option, value), *words)
 
 
+def test_with_json_the_sentence_is_also_the_one_object(cli: Cli, picture: Path) -> None:
+    code, out, err = cli("run", picture, *CAR, "-n", "many", *POINT, "--json")
+    data = json.loads(out)
+    assert code == 2
+    assert (data["status"], data["positions"]) == ("failed", None)
+    assert f"formup: {data['message']}\n" == err
+
+
 @pytest.mark.parametrize("text", ["", "   ", "\n\t"])
 def test_empty_instruction(cli: Cli, picture: Path, text: str) -> None:
     refused(cli("run", picture, text, "-n", 4, *POINT), "empty")

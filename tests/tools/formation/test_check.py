@@ -1,7 +1,7 @@
 """Certified means it: against demands written out anew, scenes turned about, and tricks."""
 
 import math
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from shapely.geometry import LineString, Point
 
 WIDTH, HEIGHT = 640.0, 480.0
 RING = np.array([(-60, -70), (10, -70), (10, 30), (90, 30), (90, 80), (-60, 80)], dtype=float)
+MIDDLE = np.array([300.0, 240.0])
 RELATIONS = ["around", "cage", "corners", "left", "top", "inside", "centre"]
 
 
@@ -40,14 +41,14 @@ def grouped(relation: str, n: int) -> Group:
 def edge_distance(outline: Outline, point: Point) -> float:
     """To the exterior's edges one by one, without shapely's polygon distance."""
     ring = [(float(x), float(y)) for x, y in outline.polygon.exterior.coords]
-    return min(LineString(pair).distance(point) for pair in zip(ring, ring[1:], strict=False))
+    return min(LineString(pair).distance(point) for pair in pairwise(ring))
 
 
 def covered(outline: Outline, x: float, y: float) -> bool:
     """Whether a point is in the exterior ring, by crossing number."""
     ring = [(float(a), float(b)) for a, b in outline.polygon.exterior.coords]
     hits = 0
-    for (xa, ya), (xb, yb) in zip(ring, ring[1:], strict=False):
+    for (xa, ya), (xb, yb) in pairwise(ring):
         if (ya > y) != (yb > y) and x < xa + (y - ya) / (yb - ya) * (xb - xa):
             hits += 1
     return hits % 2 == 1
@@ -124,9 +125,9 @@ SIDE_AFTER = {
 def test_turning_or_mirroring_the_whole_scene_changes_no_verdict(
     which: str, relation: str, n: int
 ) -> None:
-    here = Site({"t1": make_outline(RING + (300, 240))}, WIDTH, HEIGHT)
+    here = Site({"t1": make_outline(RING + MIDDLE)}, WIDTH, HEIGHT)
     room = (HEIGHT, WIDTH) if which == "quarter" else (WIDTH, HEIGHT)
-    there = Site({"t1": make_outline(mapped(RING + (300, 240), which))}, *room)
+    there = Site({"t1": make_outline(mapped(RING + MIDDLE, which))}, *room)
     plan = make_plan(Contract(groups=(grouped(relation, n),), robot_radius=3), here, "s")
     after = SIDE_AFTER[which].get(relation, relation)
     contract = Contract(groups=(grouped(after, n),), robot_radius=3)
@@ -229,7 +230,7 @@ def test_nobody_stands_on_what_is_to_be_kept_out_of_nor_touches_it() -> None:
 @pytest.mark.parametrize("relation", RELATIONS)
 def test_certifying_never_fails_whatever_the_positions(relation: str) -> None:
     rng = np.random.default_rng(3)
-    for ring in (RING * 0.1 + (2, 2), RING + (300, 240), RING * 6 + (300, 240), RING + (900, 900)):
+    for ring in (RING * 0.1 + 2, RING + MIDDLE, RING * 6 + MIDDLE, RING + 900):
         site = Site({"t1": make_outline(ring)}, WIDTH, HEIGHT)
         for n, radius in ((3, 0.0), (5, 300.0)):
             contract = Contract(groups=(grouped(relation, n),), robot_radius=radius)

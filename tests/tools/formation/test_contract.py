@@ -146,7 +146,7 @@ def test_the_json_schema_uses_no_prefix_items_and_accepts_what_pydantic_does() -
     checker = Draft202012Validator(schema)
     for group in GROUPS:
         assert checker.is_valid({"groups": [group]}), group
-    for bad in (
+    wrong: list[dict[str, Any]] = [
         {"groups": []},
         {"groups": [{"relation": "around", "targets": ["t1"]}]},
         {"groups": [GROUPS[0] | {"clearance": [1]}]},
@@ -154,7 +154,8 @@ def test_the_json_schema_uses_no_prefix_items_and_accepts_what_pydantic_does() -
         {"groups": [GROUPS[9] | {"line": [1, 2, 3]}]},
         {"groups": [GROUPS[0] | {"robots": 0}]},
         {"groups": [GROUPS[0] | {"colour": "red"}]},
-    ):
+    ]
+    for bad in wrong:
         assert not checker.is_valid(bad), bad
 
 

@@ -50,21 +50,15 @@ def test_any_change_of_what_is_approved_changes_the_id() -> None:
         make_plan(AROUND, SITE, "s-2", points),
         make_plan(AROUND.model_copy(update={"robot_radius": 2.001}), SITE, "s-1", points),
         make_plan(AROUND.model_copy(update={"keep_out": ("t1",)}), SITE, "s-1", points),
-        *(
-            make_plan(
-                Contract(groups=(group.model_copy(update=change),), robot_radius=2),
-                SITE,
-                "s-1",
-                points,
-            )  # fmt: skip
-            for change in (
-                {"spacing": "free"},
-                {"fit": "wide"},
-                {"min_spacing": 5.0},
-                {"clearance": (3.0, 40.0)},
-            )
-        ),
     ]
+    for change in (
+        {"spacing": "free"},
+        {"fit": "wide"},
+        {"min_spacing": 5.0},
+        {"clearance": (3.0, 40.0)},
+    ):
+        changed = Contract(groups=(group.model_copy(update=change),), robot_radius=2)
+        others.append(make_plan(changed, SITE, "s-1", points))
     ids = [plan.id, *(other.id for other in others)]
     assert len(set(ids)) == len(ids)
     assert make_plan(AROUND, SITE, "s-1", points).id == plan.id

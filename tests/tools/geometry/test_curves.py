@@ -40,7 +40,7 @@ def outlines(draw: st.DrawFn) -> Outline:
     t = (np.arange(count) + turn) / count * 2 * math.pi
     points = np.stack([np.cos(t), np.sin(t)], axis=1) * np.array(radii)[:, None]
     try:
-        return make_outline(points + (320, 240))
+        return make_outline(points + np.array([320.0, 240.0]))
     except InputError:
         assume(False)
         raise
