@@ -17,7 +17,7 @@ demo: .venv/.ready
 	  --point 245,95 --out $(OUT)/coin
 
 test: .venv/.ready-dev
-	$(BIN)/pytest -q
+	$(BIN)/pytest -q -n auto
 
 check: .venv/.ready-dev
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""The files a run leaves: plan.json, plan.png, deploy.gif, trace.jsonl; each whole or not at all."""
+"""The files a run leaves: plan, picture, animation and trace, each whole or not at all."""
 
 import io
 import json

@@ -3,15 +3,13 @@
 import asyncio
 import json
 import sys
-from pathlib import Path
 
 import typer
 from rich.console import Console
 
 from ..agent.report import Report
 from ..tools.doors.committing import deploy as deploy_tool
-from ..tools.errors import FleetError, InputError, ToolError
-from ..tools.formation.check import certify
+from ..tools.errors import InputError, ToolError
 from ..tools.formation.plan import Plan
 from ..tools.store import Stored, read_stored, restore, rings
 from ..tools.workspace import Settings, Workspace
@@ -28,11 +26,11 @@ def deploy(plan: o.PlanFile, fleet: o.FleetName = "simulated", as_json: o.Json =
     if stored.plan_id is None or stored.plan_id not in stored.plans:
         raise InputError(f"{plan} holds no plan to deploy; give a plan.json written by formup run.")
     workspace = restore(stored, None, settings)
-    chosen = _certified(stored.plans[stored.plan_id], workspace, plan)
+    chosen = stored.plans[stored.plan_id]
     try:
         asyncio.run(deploy_tool.call(workspace, {"plan_id": chosen.id}))
     except ToolError as error:
-        raise FleetError(str(error)) from None
+        raise InputError(f"{plan}: {error}") from None
     animation = plan.with_name("deploy.gif")
     drawn = animate(animation, workspace, chosen, stored.instruction or "")
     report = _report(chosen, workspace, stored, animation.name if drawn else None)
@@ -42,21 +40,6 @@ def deploy(plan: o.PlanFile, fleet: o.FleetName = "simulated", as_json: o.Json =
     else:
         show_report(Console(highlight=False), report, str(plan.parent))
     raise typer.Exit(report.exit_code)
-
-
-def _certified(plan: Plan, workspace: Workspace, path: Path) -> Plan:
-    """The plan, certified anew: a file's own word is not taken for it."""
-    formation = plan.formation
-    if formation.scene_version != workspace.scene.version:
-        raise InputError(f"{path}: its targets are not those it was certified for; plan again.")
-    site = workspace.scene.site(formation.contract)
-    verdict = certify(formation.points, formation.contract, site)
-    if not verdict.certified:
-        raise InputError(
-            f"{path}: plan {plan.id} is not certified and is not moved to: "
-            f"{verdict.findings[0].sentence}"
-        )
-    return plan.model_copy(update={"verdict": verdict})
 
 
 def _report(plan: Plan, workspace: Workspace, stored: Stored, animation: str | None) -> Report:

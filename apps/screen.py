@@ -11,6 +11,16 @@ from ..tools.formation.contract import Group
 
 MAX_ROWS = 16
 """Robots shown in the arrival table; the rest are summed up."""
+PLACES = {
+    "around": "around",
+    "cage": "caging",
+    "corners": "at the corners of",
+    "along": "along",
+    "inside": "inside",
+    "between": "between",
+    "centre": "at the centre of",
+    "shape": "as placed",
+}
 STATUS_STYLE = {
     "deployed": "bold green",
     "planned": "bold green",
@@ -63,24 +73,33 @@ def _line(console: Console, name: str, text: str) -> None:
 
 def _group(group: Group) -> str:
     noun = "robot" if group.robots == 1 else "robots"
-    words = [f"{group.robots} {noun} {group.relation}", " and ".join(group.targets)]
+    words = [f"{group.robots} {noun} {PLACES[group.relation]}", " and ".join(group.targets)]
     if group.side:
         words.append(f"({group.side} side)")
     if group.clearance is not None and group.relation == "inside":
         words.append(f"at least {group.clearance[0]:.1f} px from its edge")
-    elif group.clearance is not None and group.relation not in ("centre", "corners"):
+    elif group.clearance is not None and group.relation != "corners":
         words.append(f"{group.clearance[0]:.1f} to {group.clearance[1]:.1f} px away")
     if group.spacing == "even" and group.relation not in ("corners", "centre"):
         words.append("evenly spaced")
     if group.closure:
-        words.append(f"closed {group.closure}")
-    return " ".join(words)
+        words.append(f"in a closed {group.closure}")
+    return " ".join(word for word in words if word)
+
+
+def _measures(measures: dict[str, float]) -> str:
+    """Measures as words, those in pixels with their unit behind the number."""
+    return ", ".join(
+        f"{name.removesuffix('_px').replace('_', ' ')} {value:g}"
+        + (" px" if name.endswith("_px") else "")
+        for name, value in measures.items()
+    )
 
 
 def _certificate(console: Console, report: Report) -> None:
     verdict = report.verdict
     assert verdict is not None
-    measures = ", ".join(f"{k.replace('_', ' ')} {v:g}" for k, v in verdict.measures.items())
+    measures = _measures(verdict.measures)
     if verdict.certified:
         _line(console, "certified", f"plan {report.plan_id}: {measures}")
     else:

@@ -206,7 +206,8 @@ def _bare_between(workspace: Workspace) -> Work:
 
     def work() -> object:
         line = shapely.LineString([a.centroid, b.centroid]).difference(shapely.union(a, b))
-        return [line.interpolate(share, normalized=True) for share in np.linspace(0, 1, 8)]
+        shares = np.arange(8) / 7
+        return [line.interpolate(float(share), normalized=True) for share in shares]
 
     return work
 

@@ -90,9 +90,10 @@ def _boundary(task: Task, points: FloatArray, result: Grade) -> None:
 
 
 def _around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
-    """Order of the points along the target's convex hull."""
+    """Order of the points along the target's convex hull, nearer ones first where that ties."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
-    return np.argsort(shapely.line_locate_point(hull, shapely.points(points)), kind="stable")
+    station = shapely.line_locate_point(hull, shapely.points(points))
+    return np.lexsort((distances(hull, points), station))
 
 
 def _gaps_along(target: Polygon, loop: FloatArray, task: Task) -> FloatArray:
@@ -106,7 +107,8 @@ def _gaps_along(target: Polygon, loop: FloatArray, task: Task) -> FloatArray:
 
 
 def _even(gaps: FloatArray, result: Grade) -> None:
-    low, high = gaps.min() / gaps.mean(), gaps.max() / gaps.mean()
+    mean = max(float(gaps.mean()), 1e-9)
+    low, high = gaps.min() / mean, gaps.max() / mean
     uneven = bool(low < STRICT_GAPS[0] or high > STRICT_GAPS[1])
     _limit(result, False, uneven, f"uneven: gaps {low:.2f} to {high:.2f} of their mean")
 

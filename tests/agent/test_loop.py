@@ -30,6 +30,10 @@ def workspace(**settings: Any) -> Workspace:
     return Workspace(Scene(picture_from_array(pixels)), Settings(**settings))
 
 
+def nobody(call: Call) -> bool:
+    return False
+
+
 def call(name: str, arguments: dict[str, Any] | None = None, id: str = "c1") -> Reply:
     return Reply(calls=(Call(id=id, name=name, arguments=arguments or {}),))
 
@@ -169,7 +173,7 @@ def test_robots_that_need_leave_wait_for_it_and_then_move() -> None:
     assert isinstance(proposed, Answered)
     (plan_id,) = work.plans
     replies = [call("deploy", {"plan_id": plan_id}, "d"), Reply(text="there")]
-    paused = go(ScriptedModel(replies[:1]), work=work, allowed=lambda call: False)
+    paused = go(ScriptedModel(replies[:1]), work=work, allowed=nobody)
     assert isinstance(paused, Paused)
     assert paused.call.name == "deploy"
     assert not work.arrivals

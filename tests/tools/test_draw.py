@@ -132,7 +132,7 @@ def test_rulers_are_exact(size: tuple[int, int]) -> None:
             np.average(np.arange(s, s + 5), weights=np.maximum(ink[s : s + 5], 0)) for s in starts
         ]
         values = (np.array(found[1:]) + 0.5) / scale - 0.5  # the first may be cut by the corner
-        step = np.round(np.diff(values).mean())
+        step = round(float(np.diff(values).mean()))
         assert np.abs(values - step * np.arange(1, len(values) + 1)).max() < 0.6 / scale
 
 

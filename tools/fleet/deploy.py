@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from ..errors import FleetError, ToolError
+from ..formation.check import certify
 from ..formation.motion import assign, obstacles, routes
 from ..formation.place import Site
 from ..formation.plan import Plan, Point
@@ -58,15 +59,17 @@ class Arrival(BaseModel):
 
 
 async def deploy(plan: Plan, site: Site, fleet: Fleet) -> Arrival:
-    """Move a fleet onto a certified plan, observe, correct, and report.
+    """Move a fleet onto a plan that is certified here and now, observe, correct, and report.
 
     Raises:
-        ToolError: the plan is not certified.
+        ToolError: the plan does not certify.
         FleetError: the fleet has another number of robots, or one starts on a target.
     """
-    if not plan.verdict.certified:
-        raise ToolError(f"Plan {plan.id} is not certified: nothing was moved.")
     contract, goals = plan.formation.contract, plan.formation.points
+    verdict = certify(goals, contract, site)  # a plan's own word is not taken for it
+    if not verdict.certified:
+        why = verdict.findings[0].sentence
+        raise ToolError(f"Plan {plan.id} is not certified: {why} Nothing was moved.")
     poses = await fleet.observe()
     if len(poses) != len(goals):
         raise FleetError(f"The fleet has {len(poses)} robots; the plan needs {len(goals)}.")

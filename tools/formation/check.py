@@ -246,8 +246,9 @@ def _evenly_inside(part: Part, audit: Audit) -> None:
 
 
 def _centre(part: Part, audit: Audit) -> None:
-    distance = np.linalg.norm(part.points - part.outline.centre, axis=1)
-    most = CENTRE_SHARE * part.outline.size
+    outline = part.site.visible(part.group.targets[0])
+    distance = np.linalg.norm(part.points - outline.centre, axis=1)
+    most = CENTRE_SHARE * outline.size
     audit.greatest("max_from_centre_px", distance.max())
     for i in np.flatnonzero(distance > most + TOLERANCE):
         audit.robot(

@@ -24,8 +24,9 @@ MAX_NODES = 60
 """Vertices kept of an obstacle: enough for a path within a percent of the shortest."""
 BEND_SEGMENTS = 2
 """Segments of a quarter circle around an obstacle's corner."""
-ROOM_SHARE = 0.7
-"""How much of the smallest clearance at starts and goals paths keep on their way."""
+ROOM_SHARES = (0.7, 0.3, 0.03)
+"""How much of the smallest clearance at starts and goals paths keep: well away where there is
+room, squeezing past where not."""
 
 
 def assign(starts: FloatArray, goals: FloatArray) -> NDArray[np.intp]:
@@ -70,28 +71,46 @@ def routes(
     Raises:
         FleetError: a goal is walled off.
     """
-    straight = shapely.linestrings(np.stack([starts, goals], axis=1))
     paths = list(np.stack([starts, goals], axis=1))
     if solid.is_empty:
         return paths
     near = float(min(distances(solid, starts).min(), distances(solid, goals).min()))
-    keep = radius + max(ROOM_SHARE * (near - radius), 0.0) if near > radius else 0.99 * near
-    barrier = solid.buffer(keep * 0.999)
-    shapely.prepare(barrier)
-    blocked = np.flatnonzero(shapely.intersects(straight, barrier))
-    if not len(blocked):
-        return paths
-    nodes = _nodes(solid, keep)
-    inside = shapely.intersects_xy(frame.box, nodes)
-    within, anywhere = _Visibility(nodes[inside], barrier), _Visibility(nodes, barrier)
-    for i in blocked:
-        path = within.path(starts[i], goals[i])
-        path = anywhere.path(starts[i], goals[i]) if path is None else path
-        if path is None:
+    open_ends = list(range(len(paths)))
+    for share in ROOM_SHARES:
+        barrier, nodes = _fence(solid, radius, near, share)
+        within = nodes[shapely.intersects_xy(frame.box, nodes)]
+        graph = _Visibility(within, barrier)
+        open_ends = [i for i in open_ends if not _settled(paths, i, graph, barrier)]
+        if not open_ends:
+            return paths
+    barrier, nodes = _fence(solid, radius, near, ROOM_SHARES[-1])
+    anywhere = _Visibility(nodes, barrier)
+    for i in open_ends:
+        if not _settled(paths, i, anywhere, barrier):
             x, y = goals[i]
             raise FleetError(f"There is no way around the target to place ({x:.0f}, {y:.0f}).")
-        paths[i] = path
     return paths
+
+
+def _fence(
+    solid: BaseGeometry, radius: float, near: float, share: float
+) -> tuple[BaseGeometry, FloatArray]:
+    """What paths must not touch, and the corners, (k, 2), they may bend around."""
+    keep = radius + share * (near - radius) if near > radius else 0.99 * near
+    barrier = solid.buffer(keep * 0.999)
+    shapely.prepare(barrier)
+    return barrier, _nodes(solid, keep)
+
+
+def _settled(paths: list[FloatArray], i: int, graph: "_Visibility", barrier: BaseGeometry) -> bool:
+    """Whether path i clears the barrier, straight or by the bends it is now given."""
+    start, goal = paths[i][0], paths[i][-1]
+    if not LineString([start, goal]).intersects(barrier):
+        return True
+    bent = graph.path(start, goal)
+    if bent is not None:
+        paths[i] = bent
+    return bent is not None
 
 
 def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:

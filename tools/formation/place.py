@@ -18,12 +18,18 @@ from ..geometry.sampling import (
     along_curve,
     around_point,
     at_corners,
+    corner_points,
     inside,
     min_spacing,
     spread_subset,
 )
 from .contract import CENTRE_SHARE, Contract, Group, nominal
 
+TOUCH = 1.0
+"""Robots between two targets keep this far off them, px."""
+REFLEX = 1.5
+"""A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
+square root of 2 in a right-angled reflex one."""
 DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
 
 
@@ -126,6 +132,16 @@ def side_direction(group: Group, outline: Outline, site: Site) -> tuple[float, f
     return float(best[0]), float(best[1])
 
 
+def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
+    """How far from each corner a robot may stand, (k,), px.
+
+    A rounded outline falls short of its corners; a reflex one is reached along its bisector.
+    """
+    assert group.clearance is not None
+    short = distances(outline.filled, corner_points(outline, group.robots))
+    return REFLEX * (group.clearance[1] + radius) + short
+
+
 def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
     n, spacing = group.robots, group.min_spacing or 0.0
     if group.relation == "shape" and group.line is None:
@@ -167,7 +183,9 @@ def _corners(group: Group, site: Site, radius: float) -> FloatArray:
         return points[:0]
     x0, y0, x1, y1 = box.bounds
     points = np.clip(points, (x0, y0), (x1, y1))
-    free = points[distances(outline.filled, points) >= group.clearance[0] + radius]
+    corners = corner_points(outline, group.robots)
+    near = np.linalg.norm(points - corners, axis=1) <= corner_reach(group, outline, radius)
+    free = points[near & (distances(outline.filled, points) >= group.clearance[0] + radius)]
     if len(free) > group.robots:
         free = free[spread_subset(free, group.robots)]
     taken: list[FloatArray] = []
@@ -200,7 +218,7 @@ def _between(group: Group, site: Site, frame: Frame) -> Curve:
     a, b = shapely.get_coordinates(max(pieces, key=lambda g: g.length))
     if group.layout == "line":
         inset = (b - a) / (group.robots + 1) * (group.robots > 1)
-        return segment(a + inset, b - inset, frame)
+        return segment(a + inset, b - inset, frame, solid.buffer(frame.margin + TOUCH))
     across = np.array([-(b - a)[1], (b - a)[0]]) / np.linalg.norm(b - a)
     middle = (a + b) / 2
     spans = [(shapely.get_coordinates(o.filled) - middle) @ across for o in (first, second)]
@@ -208,4 +226,4 @@ def _between(group: Group, site: Site, frame: Frame) -> Curve:
     if high - low < 0.3 * min(np.ptp(s) for s in spans):
         low, high = min(s.min() for s in spans), max(s.max() for s in spans)
     start, end = sorted((middle + low * across, middle + high * across), key=lambda p: (p[1], p[0]))
-    return segment(start, end, frame, solid.buffer(frame.margin + 1.0))
+    return segment(start, end, frame, solid.buffer(frame.margin + TOUCH))

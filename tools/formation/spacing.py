@@ -11,6 +11,7 @@ from shapely.geometry import LineString, Polygon
 from ..geometry.curves import Curve, side
 from ..geometry.outline import FloatArray, distances
 from ..geometry.sampling import corner_points
+from .place import corner_reach
 from .verdict import TOLERANCE, Audit, Part
 
 WIDEST, NARROWEST = 1.5, 0.5
@@ -19,9 +20,6 @@ FACING_OFFSET = 0.5
 """How far off the outline, px, the part of it that faces a direction is traced."""
 SIDE_SLACK = 0.1
 """At a corner two sides are as near; a robot may be nearer to the other one by this share."""
-REFLEX = 1.5
-"""A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
-square root of 2 in a right-angled reflex one."""
 
 
 def evenness(part: Part, curve: Curve, audit: Audit) -> None:
@@ -133,9 +131,7 @@ def corner_matching(part: Part, audit: Audit) -> None:
             "robots",
         )
         return
-    # A rounded outline falls short of its corners; a reflex one is reached along its bisector.
-    short = distances(part.outline.filled, corners)
-    reach = REFLEX * (part.clearance[1] + part.radius) + short
+    reach = corner_reach(part.group, part.outline, part.radius)
     distance = np.linalg.norm(part.points[:, None] - corners[None], axis=2)
     cost = distance + 1e6 * (distance > reach)
     robots, matched = linear_sum_assignment(cost)

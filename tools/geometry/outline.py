@@ -86,14 +86,16 @@ class Outline:
 
     @cached_property
     def rectangle(self) -> FloatArray:
-        """Corners of the minimum-area rectangle, (4, 2), in the exterior's direction.
+        """Corners of the minimum-area rectangle, (4, 2), in the exterior's direction."""
+        return rectangle_of(self.polygon)
 
-        Thin things that stick out of a bulky one, such as a car's mirrors, are left out of it.
-        """
+    @cached_property
+    def bulk_rectangle(self) -> FloatArray:
+        """The rectangle of the bulk alone, without thin things that stick out: a car's mirrors."""
         reach = KNOB_SHARE * self.size
         bulk = self.filled.buffer(-reach, join_style="mitre").buffer(reach, join_style="mitre")
         kept = bulk.intersection(self.filled)
-        return _rectangle(kept if kept.area >= BULK_SHARE * self.filled.area else self.polygon)
+        return rectangle_of(kept if kept.area >= BULK_SHARE * self.filled.area else self.polygon)
 
     @property
     def min_width(self) -> float:
@@ -132,7 +134,7 @@ class Outline:
         """The corners robots can be sent to, (k, 2).
 
         Of a polygonal outline the vertices that turn by more than 25 degrees, where they
-        rebuild the region; else the corners of the minimum-area rectangle.
+        rebuild the region; else the corners of the bulk's minimum-area rectangle.
         """
         if self.kind == "polygonal":
             turning = [
@@ -142,7 +144,7 @@ class Outline:
             ]
             if len(turning) >= 3 and _iou(Polygon(turning), self.filled) > 0.9:
                 return np.asarray(turning, dtype=float)
-        return self.rectangle
+        return self.bulk_rectangle
 
     def graph(self) -> tuple[FloatArray, NDArray[np.intp]]:
         """G = (V, E) as arrays: (k, 2) coordinates and (k, 2) index pairs."""
@@ -231,13 +233,26 @@ def _simplify(ring: FloatArray) -> tuple[FloatArray, Kind, float]:
 
 def _douglas_peucker(line: shapely.LineString, tolerance: float) -> FloatArray:
     simple = shapely.get_coordinates(line.simplify(tolerance, preserve_topology=False))[:-1]
-    return simple if len(simple) > 2 else _rectangle(line)
+    return simple if len(simple) > 2 else rectangle_of(line)
 
 
-def _rectangle(geometry: BaseGeometry) -> FloatArray:
-    """Corners of the minimum-area rectangle, (4, 2), counter-clockwise in (x, y)."""
-    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(geometry))[:4]
-    return corners if Polygon(corners).exterior.is_ccw else corners[::-1]
+def rectangle_of(geometry: BaseGeometry) -> FloatArray:
+    """Corners of the minimum-area rectangle, (4, 2), counter-clockwise in (x, y).
+
+    One side of it lies on a side of the convex hull (Freeman and Shapira 1975), so all are tried.
+    GEOS's own (3.14) can leave a part of the geometry outside.
+    """
+    hull = shapely.get_coordinates(geometry.convex_hull)
+    sides = np.diff(hull, axis=0)
+    lengths = np.linalg.norm(sides, axis=1, keepdims=True)
+    along = sides[lengths[:, 0] > 0] / lengths[lengths[:, 0] > 0]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    u, v = hull @ along.T, hull @ across.T
+    best = int(np.argmin(np.ptp(u, axis=0) * np.ptp(v, axis=0)))
+    low = np.array([u[:, best].min(), v[:, best].min()])
+    high = np.array([u[:, best].max(), v[:, best].max()])
+    corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    return corners @ np.stack([along[best], across[best]])
 
 
 def _noise(closed: FloatArray) -> float:

@@ -14,7 +14,7 @@ from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from .curves import Curve
-from .outline import FloatArray, Outline
+from .outline import FloatArray, Outline, largest_part, rectangle_of
 
 PHASES = 24
 """Rotations tried when the start of a closed curve is free."""
@@ -32,7 +32,7 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
     On a loop the start is free and chosen so that nearest neighbours are as far apart as
     possible. On an open curve the first and last robot stand at its ends, but where that is a
     loop with a cut narrower than a gap, the cut counts as one of the gaps. Several pieces share
-    the robots by length.
+    the robots by length, half a gap from their ends.
 
     Returns:
         (n, 2); empty when nothing of the curve is left.
@@ -47,9 +47,15 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
         stations: FloatArray = (step - cut) / 2 + step * np.arange(n, dtype=float)
         return _interpolate(LineString(curve.lines[0]), stations)
     pieces = [LineString(x) for x in curve.lines]
+    if len(pieces) == 1:
+        return _open_points(pieces[0], n)
     shares = _shares(np.array([p.length for p in pieces]), n)
     return np.concatenate(
-        [_open_points(p, k) for p, k in zip(pieces, shares, strict=True)] or [np.empty((0, 2))]
+        [
+            _interpolate(p, (np.arange(k) + 0.5) * p.length / k)
+            for p, k in zip(pieces, shares, strict=True)
+            if k
+        ]
     )
 
 
@@ -79,7 +85,7 @@ def corner_points(outline: Outline, n: int) -> FloatArray:
     Four robots on an outline with another number of corners take the minimum-area rectangle's.
     """
     corners = outline.corners
-    return outline.rectangle if n == 4 and len(corners) != 4 else corners
+    return outline.bulk_rectangle if n == 4 and len(corners) != 4 else corners
 
 
 def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float) -> FloatArray:
@@ -232,23 +238,21 @@ def _hex(region: BaseGeometry, pitch: float, turn: float) -> FloatArray:
 
 def _long_angle(region: BaseGeometry) -> float:
     """Direction of the longer side of the minimum-area rectangle, radians."""
-    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(region))
-    sides = np.diff(corners, axis=0)
+    sides = np.diff(rectangle_of(region), axis=0)
     x, y = sides[int(np.argmax(np.linalg.norm(sides, axis=1)))]
     return math.atan2(y, x)
 
 
 def _on_axis(region: BaseGeometry, n: int, spacing: float) -> FloatArray:
-    """Up to n points along a region that is little more than a line."""
-    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(region))[:4]
-    if len(corners) < 4:
-        return shapely.get_coordinates(region.representative_point())
-    a, b, c, d = corners
-    ends = (
-        [(a + b) / 2, (c + d) / 2]
-        if np.ptp([a, b]) < np.ptp([b, c])
-        else [(b + c) / 2, (d + a) / 2]
-    )
+    """Up to n points along a region that is little more than a line, straight or closed."""
+    band = largest_part(region)
+    if band is not None and band.interiors:
+        loop = LineString(band.exterior.coords)
+        fits = n if spacing <= 0 else min(n, int(loop.length / spacing))
+        return _interpolate(loop, np.arange(fits, dtype=float) * loop.length / max(fits, 1))
+    a, b, c, d = rectangle_of(region)
+    wide = np.linalg.norm(b - a) > np.linalg.norm(c - b)
+    ends = [(d + a) / 2, (b + c) / 2] if wide else [(a + b) / 2, (c + d) / 2]
     inner = LineString(ends).intersection(region)
     lines = [g for g in shapely.get_parts(inner) if isinstance(g, LineString) and g.length > 0]
     if not lines:

@@ -59,8 +59,8 @@ robots = st.one_of(st.integers(1, 8), st.integers(1, 60))
 radii = st.sampled_from([0.0, 0.0, 3.0, 9.0])
 
 
-def check(group: Group, radius: float, site: Site) -> None:
-    """The plan is certified, or the placer refuses in words."""
+def check(group: Group, radius: float, site: Site, allowed: frozenset[str] = frozenset()) -> None:
+    """The plan is certified but for findings allowed, or the placer refuses in words."""
     contract = Contract(groups=(group,), robot_radius=radius)
     try:
         plan = make_plan(contract, site, "s")
@@ -70,7 +70,9 @@ def check(group: Group, radius: float, site: Site) -> None:
         return
     except ToolError:
         return
-    assert plan.verdict.certified, [f.sentence for f in plan.verdict.findings[:3]]
+    others = [f.sentence for f in plan.verdict.findings if f.code not in allowed]
+    assert others == []
+    assert plan.verdict.certified == (not plan.verdict.findings)
 
 
 @given(outlines(), robots, radii, st.sampled_from(["tight", "normal", "wide"]))
@@ -83,8 +85,10 @@ def test_around(outline: Outline, n: int, radius: float, fit: str) -> None:
 @given(outlines(), st.integers(3, 60), radii)
 @MANY
 def test_cage(outline: Outline, n: int, radius: float) -> None:
+    """A ring that cannot be closed is shown, not certified, and the opening is named."""
     group = Group(relation="cage", targets=("t1",), robots=n)
-    check(group, radius, Site({"t1": outline}, WIDTH, HEIGHT))
+    cannot_close = frozenset({"opening", "not_enclosed"})
+    check(group, radius, Site({"t1": outline}, WIDTH, HEIGHT), cannot_close)
 
 
 @given(outlines(), st.integers(1, 9), radii)
@@ -113,7 +117,7 @@ def test_along_edges(outline: Outline, n: int, radius: float, edge: int, two: bo
 
 
 @given(outlines(), robots, radii)
-@settings(MANY, max_examples=30)
+@settings(MANY, max_examples=20)
 def test_inside(outline: Outline, n: int, radius: float) -> None:
     group = Group(relation="inside", targets=("t1",), robots=n)
     check(group, radius, Site({"t1": outline}, WIDTH, HEIGHT))

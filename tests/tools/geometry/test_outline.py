@@ -122,6 +122,21 @@ def test_vertices_of_thin_rectangles_run_in_the_exteriors_direction(
             assert Polygon(outline.vertices).exterior.is_ccw
 
 
+@pytest.mark.parametrize(
+    "ring", [[(0, 3), (0, 2), (3, 1), (-1, 0)], [(0, 30), (0, 20), (30, 10), (-10, 0)]]
+)
+def test_the_rectangle_covers_the_outline(ring: list[tuple[float, float]]) -> None:
+    outline = make_outline(ring)
+    assert Polygon(outline.rectangle).buffer(1e-6).covers(outline.polygon)
+    best = 0.0
+    for turn in np.linspace(0, math.pi, 721):
+        c, s = math.cos(turn), math.sin(turn)
+        extent = np.ptp(np.array(ring) @ np.array([[c, s], [-s, c]]), axis=0)
+        area = float(extent.prod())
+        best = min(best or area, area)
+    assert Polygon(outline.rectangle).area <= best * 1.0001
+
+
 def check_whole(outline: Outline) -> None:
     """Every property is a number, and those that must agree do."""
     assert outline.polygon.is_valid

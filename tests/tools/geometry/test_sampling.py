@@ -15,6 +15,7 @@ from formup.tools.geometry.sampling import (
     coverage_radius,
     inside,
     min_spacing,
+    spread_subset,
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -108,10 +109,10 @@ def test_corner_robots_stand_off_exactly_on_the_outside(
 def test_fewer_robots_than_corners_take_different_corners_far_apart(n: int) -> None:
     outline = make_outline(NOTCHED)
     places = at_corners(outline, n, 5)
-    assert len(places) == n
-    assert min_spacing(places) > 40
-    if n == 4:
-        assert min_spacing(places) > 200, "four robots take the rectangle's corners"
+    assert len(places) == (4 if n == 4 else 8), "four robots take the rectangle's corners"
+    taken = places[spread_subset(places, n)]
+    assert taken.shape == (n, 2)
+    assert min_spacing(taken) > (200 if n <= 4 else 40)
 
 
 @given(st.floats(0.005, 0.05), st.floats(0, 3.2), st.floats(1, 20))
@@ -171,7 +172,7 @@ def test_a_slanted_strip_holds_the_row_that_fits(angle: float) -> None:
 
 
 @given(st.integers(2, 60), st.floats(5, 60))
-@settings(derandomize=True, deadline=None, max_examples=12)
+@settings(derandomize=True, deadline=None, max_examples=8)
 def test_inside_gives_as_many_as_fit_and_never_closer(n: int, spacing: float) -> None:
     points = inside(rectangle(200, 120, 0.2), n, 4.0, math.inf, spacing)
     assert min_spacing(points) >= spacing - 1e-6
@@ -184,6 +185,28 @@ def test_a_margin_that_leaves_a_sliver_is_no_trap() -> None:
         points = inside(rectangle(800, 10, 0.785), 3, margin, math.inf, 5.0)
         assert 1 <= len(points) <= 3
     assert len(inside(rectangle(800, 10, 0.785), 3, 5.01, math.inf, 5.0)) == 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.3, 1.571])
+@pytest.mark.parametrize("size", [(300, 10), (10, 300)])
+def test_a_row_with_no_width_to_spare_is_filled_wherever_it_lies(
+    size: tuple[float, float], angle: float
+) -> None:
+    ring_ = np.array([(0, 0), (size[0], 0), size, (0, size[1])], dtype=float)
+    c, s = math.cos(angle), math.sin(angle)
+    turned = ring_ @ np.array([[c, s], [-s, c]])
+    for x, y in ((0, 0), (300, 600), (600, 600), (0, 200)):
+        outline = make_outline(turned + np.array([x, y], dtype=float))
+        points = inside(outline, 5, 4.95, math.inf, 20.0)
+        assert len(points) == 5
+        assert min_spacing(points) >= 20 - 1e-6
+
+
+def test_a_thin_band_all_round_is_filled_all_round() -> None:
+    outline = make_outline([(100, 100), (300, 100), (300, 300), (100, 300)])
+    points = inside(outline, 20, 5.0, 5.3, 10.0)
+    assert len(points) == 20
+    assert min_spacing(points) >= 10 - 1e-6
 
 
 def test_a_frame_smaller_than_its_margin_is_empty() -> None:

@@ -1,0 +1,86 @@
+"""A workspace written to JSON and read back is the same, or is refused in one sentence."""
+
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+from formup.tools.doors import TOOLS
+from formup.tools.errors import InputError
+from formup.tools.formation.contract import Contract, Group
+from formup.tools.formation.plan import make_plan
+from formup.tools.perception.image import load_picture
+from formup.tools.perception.prompts import TargetPrompt
+from formup.tools.scene import Scene
+from formup.tools.store import read_stored, restore, store, write_whole
+from formup.tools.workspace import Settings, Workspace
+
+PHOTO = Path(__file__).parent.parent.parent / "evals/photos/images/scissors_blue.jpg"
+
+
+@pytest.fixture(scope="module")
+def work() -> Workspace:
+    workspace = Workspace(Scene(load_picture(PHOTO)), Settings(threshold=0.3))
+    workspace.segment(TargetPrompt(box=(358, 214, 648, 628), points=((640, 330),)))
+    group = Group(relation="around", targets=("t1",), robots=9)
+    contract = Contract(groups=(group,))
+    scene = workspace.scene
+    plan = make_plan(contract, scene.site(contract), scene.version)
+    workspace.plans[plan.id] = plan
+    workspace.keep_sample(plan.formation.points)
+    return workspace
+
+
+def written(work: Workspace, path: Path) -> Path:
+    path.write_text(store(work, PHOTO).model_dump_json())
+    return path
+
+
+def test_round_trip_keeps_everything(work: Workspace, tmp_path: Path) -> None:
+    back = restore(read_stored(written(work, tmp_path / "s.json")), None, Settings())
+    assert back.scene.version == work.scene.version
+    assert back.plans == work.plans
+    assert (back.samples["s1"] == work.samples["s1"]).all()
+    (plan_id,) = back.plans
+    deploy = next(t for t in TOOLS if t.name == "deploy")
+    assert asyncio.run(deploy.call(back, {"plan_id": plan_id})).data["arrived"]
+
+
+def test_an_altered_plan_is_refused(work: Workspace, tmp_path: Path) -> None:
+    path = written(work, tmp_path / "s.json")
+    data = json.loads(path.read_text())
+    (plan,) = data["plans"].values()
+    plan["formation"]["positions"][3][1] += 0.5
+    path.write_text(json.dumps(data))
+    with pytest.raises(InputError, match="altered"):
+        read_stored(path)
+
+
+def test_an_altered_outline_voids_the_plan(work: Workspace, tmp_path: Path) -> None:
+    path = written(work, tmp_path / "s.json")
+    data = json.loads(path.read_text())
+    data["targets"][0]["outline"][0][0] -= 3
+    path.write_text(json.dumps(data))
+    back = restore(read_stored(path), None, Settings())
+    (plan_id,) = back.plans
+    assert back.plans[plan_id].formation.scene_version != back.scene.version
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("", "not JSON"), ("[]", "formup/1"), ('{"format": "formup/1"}', "image: is missing")],
+)
+def test_other_files_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "s.json").write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_stored(tmp_path / "s.json")
+
+
+def test_files_are_written_whole_or_not_at_all(tmp_path: Path) -> None:
+    path = tmp_path / "x"
+    write_whole(path, b"one")
+    write_whole(path, b"two")
+    assert path.read_bytes() == b"two"
+    assert [p.name for p in tmp_path.iterdir()] == ["x"]
+    with pytest.raises(InputError, match="cannot be written"):
+        write_whole(tmp_path / "nowhere" / "x", b"")
