@@ -6,7 +6,8 @@ A history that ends in calls without results is a paused run: whoever continues 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
+from pydantic_core import to_json
 
 ErrorKind = Literal["unknown_tool", "arguments", "tool"]
 """unknown_tool: no such tool; arguments: against its schema; tool: it could not do that."""
@@ -24,6 +25,13 @@ class Call(_Value):
     id: str
     name: str
     arguments: dict[str, Any]
+
+    @field_validator("arguments")
+    @classmethod
+    def _can_be_written(cls, arguments: dict[str, Any]) -> dict[str, Any]:
+        """A history must always be storable: no endless nesting, no text that is not Unicode."""
+        to_json(arguments)
+        return arguments
 
 
 class Usage(_Value):

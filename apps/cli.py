@@ -55,7 +55,7 @@ def run(
     """Carry out an instruction on a picture."""
     settings = Settings(
         robots=inputs.robots(robots),
-        robot_radius=inputs.length("--robot-radius", robot_radius) or 0.0,
+        robot_radius=inputs.length("--robot-radius", robot_radius),
         clearance=inputs.length("--clearance", clearance),
         segmenter=segmenter,
         threshold=inputs.share("--threshold", threshold),

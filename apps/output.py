@@ -1,12 +1,13 @@
 """The files a run leaves: plan, picture, animation and trace, each whole or not at all."""
 
 import io
-import json
 import time
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
+
+from pydantic_core import to_json
 
 from ..agent.agent import Run
 from ..agent.messages import Reply, Result, User
@@ -50,19 +51,21 @@ class Trace:
 
     def __init__(self) -> None:
         self._began = time.perf_counter()
-        self.lines: list[str] = []
+        self.lines: list[bytes] = []
 
     def __call__(self, message: User | Reply | Result) -> None:
         """Add a message."""
-        data: dict[str, Any] = message.model_dump(mode="json", exclude={"images"})
         images = () if isinstance(message, Reply) else message.images
-        seconds = round(time.perf_counter() - self._began, 4)
-        line = {"seconds": seconds, **data, "images": [len(i) for i in images]}
-        self.lines.append(json.dumps(line, ensure_ascii=False))
+        line = {
+            "seconds": round(time.perf_counter() - self._began, 4),
+            **message.model_dump(exclude={"images"}),
+            "images": [len(image) for image in images],
+        }
+        self.lines.append(to_json(line))
 
     def text(self) -> bytes:
         """The lines as a file."""
-        return ("\n".join(self.lines) + "\n").encode()
+        return b"".join(line + b"\n" for line in self.lines)
 
 
 def write_files(

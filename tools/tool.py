@@ -36,7 +36,7 @@ class ToolResult:
     @property
     def text(self) -> str:
         """The data as compact JSON."""
-        return json.dumps(self.data, separators=(",", ":"), ensure_ascii=False)
+        return json.dumps(self.data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 ToolFunction = Callable[..., ToolResult | Awaitable[ToolResult]]

@@ -30,7 +30,7 @@ class Settings:
 
     Attributes:
         robots: how many, or None where the person left it open.
-        robot_radius: px; 0 is a point.
+        robot_radius: px, 0 is a point; None leaves it to the contract.
         clearance: exact distance wanted from the target, px, or None for the default.
         segmenter: name of the segmenter.
         threshold: t, the least confidence a mask is used at; None for the segmenter's own.
@@ -42,7 +42,7 @@ class Settings:
     """
 
     robots: int | None = None
-    robot_radius: float = 0.0
+    robot_radius: float | None = None
     clearance: float | None = None
     segmenter: str = "grabcut"
     threshold: float | None = None

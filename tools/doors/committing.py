@@ -120,7 +120,8 @@ def _held_to(contract: Contract, settings: Settings) -> Contract:
     """The contract with what the person fixed: robot radius and clearance."""
     groups = tuple(_with_clearance(g, settings.clearance) for g in contract.groups)
     radius = settings.robot_radius
-    return contract.model_copy(update={"groups": groups, "robot_radius": radius})
+    fixed = {} if radius is None else {"robot_radius": radius}
+    return contract.model_copy(update={"groups": groups, **fixed})
 
 
 def _with_clearance(group: Group, clearance: float | None) -> Group:

@@ -3,7 +3,7 @@
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from ..errors import ToolError
 from ..formation.contract import MAX_ROBOTS, MIN_SPACING, Contract, Group, SideName, with_defaults
@@ -12,7 +12,7 @@ from ..geometry.curves import Frame, segment
 from ..geometry.outline import FloatArray
 from ..geometry.sampling import along_curve
 from ..perception.prompts import Point
-from ..tool import ToolResult, tool
+from ..tool import ToolResult, tool, violations
 from ..workspace import Workspace
 from .seeing import FRAME
 
@@ -43,11 +43,10 @@ def sample_along_edges(
     if side is not None and edges is not None:
         raise ToolError("sample_along_edges: give a side or edges, not both.")
     relation = "corners" if at == "corners" else "around" if side is edges is None else "along"
-    clearance = None if offset is None else (offset, offset)
-    group = Group(
-        relation=relation, targets=(target,), robots=n, side=side, edges=edges, clearance=clearance
-    )
-    return _sampled(workspace, group)
+    group: dict[str, Any] = {"relation": relation, "targets": (target,), "robots": n}
+    if offset is not None:
+        group["clearance"] = (offset, offset)
+    return _sampled(workspace, "sample_along_edges", group | {"side": side, "edges": edges})
 
 
 @tool("read")
@@ -61,9 +60,11 @@ def sample_inside(
         n: how many positions.
         margin: least distance from the target's edge, image pixels; left out: the default.
     """
-    clearance = None if margin is None else (margin, workspace.scene.target(target).outline.size)
-    group = Group(relation="inside", targets=(target,), robots=n, clearance=clearance)
-    return _sampled(workspace, group)
+    group: dict[str, Any] = {"relation": "inside", "targets": (target,), "robots": n}
+    if margin is not None:
+        deepest = workspace.scene.target(target).outline.size
+        group["clearance"] = (margin, max(margin, deepest))
+    return _sampled(workspace, "sample_inside", group)
 
 
 @tool("read")
@@ -100,11 +101,17 @@ def sample_shape(
     wanted = 2 if kind == "between" else 1
     if len(targets) != wanted:
         raise ToolError(f"sample_shape: {kind} takes {wanted} target(s), got {len(targets)}.")
-    return _sampled(workspace, Group(relation=kind, targets=targets, robots=n, layout=layout))
+    group = {"relation": kind, "targets": targets, "robots": n, "layout": layout}
+    return _sampled(workspace, "sample_shape", group)
 
 
-def _sampled(workspace: Workspace, group: Group) -> ToolResult:
-    contract = Contract(groups=(group,), robot_radius=workspace.settings.robot_radius)
+def _sampled(workspace: Workspace, tool_name: str, group: dict[str, Any]) -> ToolResult:
+    try:
+        checked = Group.model_validate(group)
+    except ValidationError as error:
+        raise ToolError(f"{tool_name}: {violations(error)}") from None
+    radius = workspace.settings.robot_radius or 0.0
+    contract = Contract(groups=(checked,), robot_radius=radius)
     site = workspace.scene.site(contract)
     return _reply(workspace, place(with_defaults(contract, site.outlines, site.room), site))
 

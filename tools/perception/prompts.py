@@ -5,7 +5,7 @@ from typing import Annotated, Self
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 from shapely.geometry import Polygon
 
-_Number = Annotated[float, Field(allow_inf_nan=False)]
+_Number = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
 _PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 _FOUR = {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}
 Point = Annotated[tuple[_Number, _Number], WithJsonSchema(_PAIR)]
