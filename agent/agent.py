@@ -13,7 +13,6 @@ from ..tools.formation.plan import Plan
 from ..tools.perception.image import Picture
 from ..tools.perception.prompts import TargetPrompt
 from ..tools.scene import Scene
-from ..tools.store import rings
 from ..tools.tool import Tool
 from ..tools.workspace import Settings, Workspace
 from .loop import DEFAULT_LIMITS, Limits, run
@@ -21,9 +20,11 @@ from .messages import History, Reply, Result, User
 from .model import Model
 from .models import model_named
 from .outcomes import Answered, Cancelled, Outcome, Paused
-from .report import Report, Status, Totals
+from .report import Report, Status, Totals, target_data
 from .task import task_text
 
+MAX_INSTRUCTION = 4_000
+"""Characters; longer texts are no instruction, and cost whoever reads them."""
 Show = Callable[[User | Reply | Result], None]
 
 
@@ -132,6 +133,10 @@ def _check(instruction: str, robots: int | None) -> None:
         raise InputError(
             'The instruction is empty; say what to do, such as "Surround the car at the corners".'
         )
+    if len(instruction) > MAX_INSTRUCTION:
+        raise InputError(
+            f"The instruction has {len(instruction):,} characters; {MAX_INSTRUCTION:,} can be read."
+        )
     if robots is not None and not 1 <= robots <= MAX_ROBOTS:
         raise InputError(f"{robots} robots cannot be placed; 1 to {MAX_ROBOTS:,} can.")
 
@@ -148,7 +153,7 @@ def _report(
         message=message,
         instruction=instruction,
         image={"sha256": picture.sha256, "width": picture.width, "height": picture.height},
-        targets=tuple(_target(workspace, t.id) for t in workspace.scene.targets),
+        targets=tuple(target_data(t) for t in workspace.scene.targets),
         candidates=_candidates(outcome, workspace),
         contract=plan.formation.contract if plan else None,
         plan_id=plan.id if plan else None,
@@ -184,20 +189,6 @@ def _status(outcome: Outcome, workspace: Workspace, plan: Plan | None) -> tuple[
     if plan is not None and plan.verdict.certified:
         return "planned", outcome.text
     return "impossible", outcome.text
-
-
-def _target(workspace: Workspace, name: str) -> dict[str, object]:
-    target = workspace.scene.target(name)
-    outline, holes = rings(target)
-    return {
-        "id": target.id,
-        "label": target.label,
-        "box": [round(v, 1) for v in target.box],
-        "confidence": target.confidence,
-        "parts": dict(target.parts),
-        "outline": outline,
-        "holes": holes,
-    }
 
 
 def _candidates(outcome: Outcome, workspace: Workspace) -> tuple[dict[str, object], ...] | None:

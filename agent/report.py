@@ -7,6 +7,8 @@ from pydantic import BaseModel, ConfigDict
 from ..tools.fleet.deploy import Arrival
 from ..tools.formation.contract import Contract
 from ..tools.formation.verdict import Verdict
+from ..tools.scene import Target
+from ..tools.store import rings
 
 Status = Literal[
     "deployed", "planned", "needs_approval", "question", "impossible", "stopped", "failed"
@@ -64,3 +66,17 @@ class Report(BaseModel):
     def exit_code(self) -> int:
         """What `formup run` exits with."""
         return EXIT_CODES[self.status]
+
+
+def target_data(target: Target) -> dict[str, Any]:
+    """A target as the report shows it."""
+    outline, holes = rings(target)
+    return {
+        "id": target.id,
+        "label": target.label,
+        "box": [round(v, 1) for v in target.box],
+        "confidence": target.confidence,
+        "parts": dict(target.parts),
+        "outline": outline,
+        "holes": holes,
+    }

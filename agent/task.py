@@ -50,7 +50,7 @@ def read_task(text: str) -> Task:
     """
     facts = {
         name: json.loads(value)
-        for name, separator, value in (line.partition(": ") for line in text.splitlines())
+        for name, separator, value in (line.partition(": ") for line in text.split("\n"))
         if separator
     }
     return Task(

@@ -10,8 +10,9 @@ from pydantic import ValidationError
 
 from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_ROBOTS
-from ..tools.geometry.outline import FloatArray
+from ..tools.geometry.outline import FARTHEST, FloatArray
 from ..tools.perception.prompts import TargetPrompt
+from ..tools.store import read_text
 from ..tools.tool import violations
 from ..tools.workspace import Descriptor
 
@@ -123,10 +124,7 @@ def starts(path: Path | None) -> FloatArray | None:
     """
     if path is None:
         return None
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"--starts {path} cannot be read: {error}.") from None
+    text = read_text(path)
     try:
         rows = (
             json.loads(text)
@@ -134,9 +132,10 @@ def starts(path: Path | None) -> FloatArray | None:
             else [[float(v) for v in line.split(",")] for line in text.splitlines() if line.strip()]
         )
         values = np.asarray(rows, dtype=float)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError, RecursionError):
         values = np.empty(0)
-    if values.ndim != 2 or values.shape[1:] != (2,) or not np.isfinite(values).all():
+    pairs = values.ndim == 2 and values.shape[1:] == (2,)
+    if not pairs or not (np.abs(values) <= FARTHEST).all():
         raise InputError(
             f"--starts {path} must hold one x,y a line, or JSON [[x, y], ...], in pixels."
         )

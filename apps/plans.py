@@ -7,11 +7,11 @@ import sys
 import typer
 from rich.console import Console
 
-from ..agent.report import Report
+from ..agent.report import Report, target_data
 from ..tools.doors.committing import deploy as deploy_tool
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.plan import Plan
-from ..tools.store import Stored, read_stored, restore, rings
+from ..tools.store import Stored, read_stored, restore
 from ..tools.workspace import Settings, Workspace
 from . import options as o
 from .output import animate
@@ -45,29 +45,17 @@ def deploy(plan: o.PlanFile, fleet: o.FleetName = "simulated", as_json: o.Json =
 def _report(plan: Plan, workspace: Workspace, stored: Stored, animation: str | None) -> Report:
     arrival = workspace.arrivals[plan.id]
     state = "All arrived" if arrival.arrived else "Not all arrived"
-    targets = [
-        {
-            "id": t.id,
-            "label": t.label,
-            "box": [round(v, 1) for v in t.box],
-            "confidence": t.confidence,
-            "parts": dict(t.parts),
-            "outline": rings(t)[0],
-            "holes": rings(t)[1],
-        }
-        for t in workspace.scene.targets
-    ]
     return Report(
         status="deployed" if arrival.arrived else "failed",
         message=f"{state}; the furthest is {max(arrival.residual_px):.1f} px from its place.",
         instruction=stored.instruction or "",
         image=json.loads(stored.image.model_dump_json(exclude={"path"})),
-        targets=tuple(targets),
+        targets=tuple(target_data(t) for t in workspace.scene.targets),
         contract=plan.formation.contract,
         plan_id=plan.id,
         positions=plan.formation.positions,
         verdict=plan.verdict,
         arrival=arrival,
-        model="offline",
+        model="none",
         files={"plan": None, "picture": None, "animation": animation, "trace": None},
     )

@@ -61,6 +61,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
 
 def say_failed(message: str) -> None:
     """Say on stderr what was wrong; with --json, also as the one object on stdout."""
+    message = " ".join(message.split())  # a path may hold a line break
     print(f"formup: {message}", file=sys.stderr)  # noqa: T201
     if "--json" in sys.argv and sys.argv[1] in ("run", "deploy"):
         report = Report(status="failed", message=message, instruction="", model="offline")

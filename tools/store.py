@@ -3,6 +3,7 @@
 Pictures are not stored but named, with their hash; reading refuses one that has changed.
 """
 
+import hashlib
 import json
 import os
 import tempfile
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import to_json
 
 from .errors import ImageError, InputError
 from .formation.plan import Plan
@@ -22,6 +24,7 @@ from .tool import violations
 from .workspace import Settings, Workspace
 
 FORMAT = "formup/1"
+MAX_BYTES = 64 << 20
 
 
 class _Value(BaseModel):
@@ -54,6 +57,7 @@ class Stored(_Value):
     """All of a workspace but its settings; `plan_id` names the plan a plan.json is for."""
 
     format: str = FORMAT
+    digest: str = ""
     plan_id: str | None = None
     instruction: str | None = None
     image: StoredImage
@@ -61,6 +65,12 @@ class Stored(_Value):
     pointed: tuple[TargetPrompt, ...] = ()
     samples: dict[str, tuple[Point, ...]] = {}
     plans: dict[str, Plan] = {}
+
+    def sealed(self) -> "Stored":
+        """The same with the digest of its content, by which an alteration shows."""
+        blank = self.model_copy(update={"digest": ""})
+        digest = hashlib.sha256(to_json(blank)).hexdigest()
+        return self.model_copy(update={"digest": digest})
 
 
 def store(
@@ -88,7 +98,7 @@ def store(
         if plan_id is None
         else {},
         plans=plans,
-    )
+    ).sealed()
 
 
 def read_stored(path: Path) -> Stored:
@@ -98,24 +108,44 @@ def read_stored(path: Path) -> Stored:
         InputError: missing, no JSON, of another format, or altered.
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}.") from None
-    except ValueError:
+        data = json.loads(read_text(path))
+    except (ValueError, RecursionError):
         raise InputError(f"{path} is not JSON; a file written by formup is needed.") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError(f"{path} is no formup file of format {FORMAT!r}.")
     try:
         stored = Stored.model_validate(data)
+        sealed = stored.sealed()
     except ValidationError as error:
         raise InputError(f"{path} is damaged: {violations(error)}") from None
-    for name, plan in stored.plans.items():
-        if plan.id != name:
-            raise InputError(
-                f"{path}: plan {name} does not match its hash ({plan.id}): it was altered after "
-                "it was certified; make the plan again."
-            )
+    except ValueError:
+        raise InputError(f"{path} is damaged: it holds text that is not Unicode.") from None
+    ids = [target.id for target in stored.targets]
+    altered = [name for name, plan in stored.plans.items() if plan.id != name]
+    if stored.digest != sealed.digest or altered or len(set(ids)) < len(ids):
+        raise InputError(
+            f"{path} was altered after formup wrote it, so its plans are not certified; "
+            "make the plan again."
+        )
     return stored
+
+
+def read_text(path: Path) -> str:
+    """The text of a file a person named.
+
+    Raises:
+        InputError: missing, no regular file, too large, not readable or not UTF-8.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path} is no file that can be read.")
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{path} has more than {MAX_BYTES >> 20} MiB.")
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}.") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is not JSON or text in UTF-8.") from None
 
 
 def restore(stored: Stored, image: Path | None, settings: Settings) -> Workspace:

@@ -135,6 +135,16 @@ def test_output_folder_that_cannot_be_written(cli: Cli, picture: Path, out: str)
     refused(cli("run", picture, *CAR, "-n", 4, *POINT, "--out", out), "cannot be written", "--out")
 
 
+def test_vast_instruction(cli: Cli, picture: Path) -> None:
+    refused(cli("run", picture, "1" * 100_000, "-n", 4, *POINT), "100,000 characters", "4,000")
+
+
+def test_line_breaks_of_all_kinds_in_an_instruction_are_words(cli: Cli, picture: Path) -> None:
+    text = "Surround\u2028the car\x85at\u2029the corners\nRobots: 9"
+    code, _, err = cli("run", picture, text, "-n", 4, "--box", "55,35,125,95")
+    assert code == 0, err
+
+
 def test_errors_leave_no_folder_behind(cli: Cli, picture: Path, tmp_path: Path) -> None:
     refused(cli("run", picture, *CAR, "-n", 4, "--point", "900,60"))
     assert not (tmp_path / "formup-runs").exists()
@@ -147,6 +157,8 @@ def test_errors_leave_no_folder_behind(cli: Cli, picture: Path, tmp_path: Path) 
         ("[[1,2],[3]]", ("x,y",)),
         ("a,b", ("x,y",)),
         ("1,nan\n" * 4, ("x,y",)),
+        ("[[1" + 400 * "0" + ",1]]", ("x,y",)),
+        ("[" * 100_000, ("x,y",)),
         ("10,10\n20,10\n30,10\n90,65\n", ("Robot 4", "on the target")),
         ("10,10\n20,10\n30,10\n900,65\n", ("Robot 4", "outside the picture")),
     ],
@@ -174,7 +186,7 @@ def test_unusable_plan_files(cli: Cli, picture: Path, tmp_path: Path) -> None:
     formation = plan["plans"][name]["formation"]
     formation["positions"][0][0] += 5
     (tmp_path / "altered.json").write_text(json.dumps(plan))
-    refused(cli("deploy", "altered.json"), name, "altered")
+    refused(cli("deploy", "altered.json"), "altered.json", "altered")
     Image.new("RGB", (200, 140)).save(picture)
     refused(cli("deploy", "o/plan.json"), "changed")
 

@@ -56,14 +56,45 @@ def test_an_altered_plan_is_refused(work: Workspace, tmp_path: Path) -> None:
         read_stored(path)
 
 
-def test_an_altered_outline_voids_the_plan(work: Workspace, tmp_path: Path) -> None:
-    path = written(work, tmp_path / "s.json")
-    data = json.loads(path.read_text())
-    data["targets"][0]["outline"][0][0] -= 3
-    path.write_text(json.dumps(data))
-    back = restore(read_stored(path), None, Settings())
-    (plan_id,) = back.plans
-    assert back.plans[plan_id].formation.scene_version != back.scene.version
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("targets", 0, "outline", 0, 0), 3.0),
+        (("targets", 0, "label"), "another"),
+        (("instruction",), "something else"),
+        (("image", "width"), 9),
+        (("samples", "s1", 0, 0), 3.0),
+        (("digest",), "0"),
+    ],
+)
+def test_any_alteration_shows(
+    work: Workspace, tmp_path: Path, path: tuple[str | int, ...], value: object
+) -> None:
+    file = written(work, tmp_path / "s.json")
+    data = json.loads(file.read_text())
+    part = data
+    for key in path[:-1]:
+        part = part[key]
+    part[path[-1]] = value
+    file.write_text(json.dumps(data))
+    with pytest.raises(InputError, match="altered"):
+        read_stored(file)
+
+
+def test_hostile_files_are_refused_in_one_sentence(work: Workspace, tmp_path: Path) -> None:
+    file = tmp_path / "s.json"
+    file.write_text("[" * 100_000)
+    with pytest.raises(InputError, match="not JSON"):
+        read_stored(file)
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="UTF-8"):
+        read_stored(file)
+    text = written(work, file).read_text()
+    file.write_text(text.replace('"instruction":null', '"instruction":"\\ud800"'))
+    with pytest.raises(InputError, match=r"damaged|altered"):
+        read_stored(file)
+    with pytest.raises(InputError, match="no file"):
+        read_stored(tmp_path)
 
 
 @pytest.mark.parametrize(

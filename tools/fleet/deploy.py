@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict
 
 from ..errors import FleetError, ToolError
 from ..formation.check import certify
+from ..formation.contract import with_defaults
 from ..formation.motion import assign, obstacles, routes
 from ..formation.place import Site
 from ..formation.plan import Plan, Point
@@ -65,7 +66,8 @@ async def deploy(plan: Plan, site: Site, fleet: Fleet) -> Arrival:
         ToolError: the plan does not certify.
         FleetError: the fleet has another number of robots, or one starts on a target.
     """
-    contract, goals = plan.formation.contract, plan.formation.points
+    contract = with_defaults(plan.formation.contract, site.outlines, site.room)
+    goals = plan.formation.points
     verdict = certify(goals, contract, site)  # a plan's own word is not taken for it
     if not verdict.certified:
         why = verdict.findings[0].sentence
