@@ -19,7 +19,7 @@ from .loop import DEFAULT_LIMITS, Limits, run
 from .messages import History, Reply, Result, User
 from .model import Model
 from .models import model_named
-from .outcomes import Answered, Cancelled, Outcome, Paused
+from .outcomes import Cancelled, Outcome, Paused, Stopped
 from .report import Report, Status, Totals, target_data
 from .task import task_text
 
@@ -133,6 +133,10 @@ def _check(instruction: str, robots: int | None) -> None:
         raise InputError(
             'The instruction is empty; say what to do, such as "Surround the car at the corners".'
         )
+    try:
+        instruction.encode()
+    except UnicodeEncodeError:
+        raise InputError("The instruction holds bytes that are not text in UTF-8.") from None
     if len(instruction) > MAX_INSTRUCTION:
         raise InputError(
             f"The instruction has {len(instruction):,} characters; {MAX_INSTRUCTION:,} can be read."
@@ -166,29 +170,42 @@ def _report(
 
 
 def _last_plan(workspace: Workspace) -> Plan | None:
-    """The plan deployed last, else the one proposed last."""
-    names = list(workspace.arrivals) or list(workspace.plans)
-    return workspace.plans[names[-1]] if names else None
+    """The plan deployed last, else the one proposed last that is not void."""
+    if workspace.arrivals:
+        return workspace.plans[list(workspace.arrivals)[-1]]
+    version = workspace.scene.version
+    valid = [p for p in workspace.plans.values() if p.formation.scene_version == version]
+    return valid[-1] if valid else None
 
 
 def _status(outcome: Outcome, workspace: Workspace, plan: Plan | None) -> tuple[Status, str]:
-    if isinstance(outcome, Paused):
-        if outcome.call.name == "ask_user":
-            return "question", str(outcome.call.arguments["question"])
-        return "needs_approval", f"A person must approve {outcome.call.arguments.get('plan_id')}."
-    if isinstance(outcome, Cancelled):
-        return "stopped", "The run was cancelled."
-    if not isinstance(outcome, Answered):
-        return ("stopped" if outcome.kind in ("limit", "repeat") else "failed"), outcome.reason
-    last = outcome.messages[-1]
-    if isinstance(last, Result):
-        return "impossible", json.loads(outcome.text)["reason"]
     arrival = workspace.arrivals.get(plan.id) if plan else None
-    if arrival is not None:
-        return ("deployed" if arrival.arrived else "failed"), outcome.text
-    if plan is not None and plan.verdict.certified:
-        return "planned", outcome.text
-    return "impossible", outcome.text
+    if arrival is not None:  # robots have moved, whatever was said after that
+        arrived = arrival.arrived and not isinstance(outcome, Stopped)
+        return ("deployed" if arrived else "failed"), _last_words(outcome)
+    if isinstance(outcome, Paused):
+        asked = outcome.call.name == "ask_user"
+        return ("question" if asked else "needs_approval"), _last_words(outcome)
+    if isinstance(outcome, Stopped):
+        ours = outcome.kind in ("limit", "repeat")
+        return ("stopped" if ours else "failed"), outcome.reason
+    if isinstance(outcome, Cancelled):
+        return "stopped", _last_words(outcome)
+    given_up = isinstance(outcome.messages[-1], Result)
+    certified = plan is not None and plan.verdict.certified
+    return ("planned" if certified and not given_up else "impossible"), _last_words(outcome)
+
+
+def _last_words(outcome: Outcome) -> str:
+    if isinstance(outcome, Paused):
+        named = outcome.call.arguments
+        return str(named.get("question") or f"A person must approve {named.get('plan_id')}.")
+    if isinstance(outcome, Stopped):
+        return outcome.reason
+    if isinstance(outcome, Cancelled):
+        return "The run was cancelled."
+    last = outcome.messages[-1]
+    return json.loads(outcome.text)["reason"] if isinstance(last, Result) else outcome.text
 
 
 def _candidates(outcome: Outcome, workspace: Workspace) -> tuple[dict[str, object], ...] | None:

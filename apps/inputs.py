@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import get_args
 
@@ -25,7 +26,7 @@ def robots(text: str | None) -> int | None:
     """
     if text is None:
         return None
-    return whole("--robots", text.replace(",", ""), least=1, most=MAX_ROBOTS)
+    return whole("--robots", text, least=1, most=MAX_ROBOTS)
 
 
 def whole(name: str, text: str, *, least: int, most: int = 1_000_000) -> int:
@@ -34,10 +35,8 @@ def whole(name: str, text: str, *, least: int, most: int = 1_000_000) -> int:
     Raises:
         InputError: not such a number.
     """
-    try:
-        value = int(text)
-    except ValueError:
-        value = least - 1
+    plain = re.fullmatch(r"[0-9]{1,9}|[0-9]{1,3}(,[0-9]{3})+", text.strip())
+    value = int(plain[0].replace(",", "")) if plain else least - 1
     if not least <= value <= most:
         raise InputError(
             f"{name} {text!r} cannot be used; give a whole number from {least} to {most:,}."

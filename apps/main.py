@@ -1,5 +1,6 @@
 """The entry point: exit codes, one sentence for every error a user can cause, Ctrl-C at once."""
 
+import io
 import signal
 import sys
 from types import FrameType
@@ -11,11 +12,16 @@ def main() -> None:
     """Run the command line and exit."""
     # Not the default handler: asyncio would turn that into a cancellation at the next await.
     signal.signal(signal.SIGINT, _interrupt)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
-        sys.exit(_run())
+        code = _run()
     except KeyboardInterrupt:
         print("formup: interrupted; nothing more was done.", file=sys.stderr)  # noqa: T201
-        sys.exit(INTERRUPTED)
+        code = INTERRUPTED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # too late: the work is done
+    sys.exit(code)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
@@ -45,3 +51,6 @@ def _run() -> int:
     except BrokenPipeError:
         sys.stderr.close()  # the reader has gone; there is nobody to tell
         return 0
+    except OSError as error:
+        say_failed(f"{error.strerror or error} ({error.filename or 'output'}).")
+        return 2

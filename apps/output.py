@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic_core import to_json
 
 from ..agent.agent import Run
@@ -26,16 +27,16 @@ class Folder:
 
     def __init__(self, path: Path | None) -> None:
         self.path = path or _fresh(Path("formup-runs"))
-        self._made = not self.path.exists()
         try:
+            self._made = not self.path.exists()
             self.path.mkdir(parents=True, exist_ok=True)
             probe = self.path / f".probe-{time.time_ns()}"
             probe.touch()
             probe.unlink()
-        except OSError as error:
+        except (OSError, RecursionError, ValueError) as error:
+            why = error.strerror if isinstance(error, OSError) else "no usable path"
             raise InputError(
-                f"The output folder {self.path} cannot be written: {error.strerror or error}; "
-                "give another with --out."
+                f"The output folder {self.path} cannot be written: {why}; give another with --out."
             ) from None
 
     def remove_if_empty(self) -> None:
@@ -100,8 +101,9 @@ def animate(path: Path, workspace: Workspace, plan: Plan, title: str) -> bool:
     frames = workspace.frames.get(plan.id)
     if not frames or len(frames[0]) > MAX_ANIMATED:
         return False
-    robots = workspace.arrivals[plan.id].robots
-    save_gif(draw_deployment(workspace.scene, plan, frames, title, robots), path)
+    takes = np.asarray(workspace.arrivals[plan.id].robots) - 1
+    by_place = [poses[takes] for poses in frames]  # numbered as in the plan
+    save_gif(draw_deployment(workspace.scene, plan, by_place, title), path)
     return True
 
 

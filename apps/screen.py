@@ -9,6 +9,8 @@ from rich.text import Text
 from ..agent.report import Report
 from ..tools.formation.contract import Group
 
+LONGEST = 600
+"""Characters of an error message; a value given may be vast."""
 MAX_ROWS = 16
 """Robots shown in the arrival table; the rest are summed up."""
 PLACES = {
@@ -62,6 +64,8 @@ def show_report(console: Console, report: Report, folder: str) -> None:
 def say_failed(message: str) -> None:
     """Say on stderr what was wrong; with --json, also as the one object on stdout."""
     message = " ".join(message.split())  # a path may hold a line break
+    if len(message) > LONGEST:
+        message = f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
     print(f"formup: {message}", file=sys.stderr)  # noqa: T201
     if "--json" in sys.argv and sys.argv[1] in ("run", "deploy"):
         report = Report(status="failed", message=message, instruction="", model="offline")

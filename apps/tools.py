@@ -61,7 +61,7 @@ def call_tool(
 def _arguments(text: str) -> dict[str, Any]:
     try:
         arguments: Any = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"--args is not JSON: {error}.") from None
     if not isinstance(arguments, dict):
         raise InputError(f'--args must be a JSON object such as {{"target": "t1"}}, not {text!r}.')

@@ -6,6 +6,8 @@ Frame everywhere: pixels of the picture as the user sees it, x right, y down.
 
 from dataclasses import dataclass, replace
 
+import shapely
+
 from .errors import ToolError
 from .formation.contract import Contract
 from .formation.place import Site
@@ -50,7 +52,7 @@ class Scene:
     def version(self) -> str:
         """Changes with the picture and with every target found, moved or renamed."""
         return scene_version(
-            self.picture.sha256, {t.id: t.outline.polygon.wkt for t in self.targets}
+            self.picture.sha256, {t.id: _canonical(t.outline) for t in self.targets}
         )
 
     def target(self, name: str) -> Target:
@@ -78,3 +80,8 @@ class Scene:
         """
         outlines = {name: self.target(name).outline for name in contract.target_ids}
         return Site(outlines, self.picture.width, self.picture.height)
+
+
+def _canonical(outline: Outline) -> str:
+    """The region as text that does not depend on where its rings start or how they are ordered."""
+    return shapely.to_wkt(shapely.normalize(outline.polygon), rounding_precision=6)

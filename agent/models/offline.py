@@ -37,7 +37,7 @@ def _begin(task: Task, history: History) -> Reply:
     """Propose a formation, or ask for what is missing."""
     answers = [m.text for m in history if isinstance(m, Result) and m.name == "ask_user"]
     reading = understand(". ".join([task.instruction, *answers]))
-    bare = [int(a) for a in answers if a.strip().isdigit()]
+    bare = [int(a) for a in answers if a.strip().isascii() and a.strip().isdecimal()]
     robots = task.robots or reading.robots or next(iter(bare), None)
     question = _open_question(task, reading, robots)
     if question or robots is None:

@@ -53,6 +53,7 @@ def propose_formation(
     held = _held_to(contract, workspace.settings)
     places = positions if samples is None else _sampled(workspace, samples)
     plan = make_plan(held, workspace.scene.site(held), workspace.scene.version, places)
+    workspace.plans.pop(plan.id, None)  # proposed again, it is the latest again
     workspace.plans[plan.id] = plan
     return ToolResult(_proposal(workspace, plan))
 

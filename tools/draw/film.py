@@ -14,6 +14,7 @@ from ..geometry.outline import FloatArray
 from ..geometry.sampling import nearest
 from ..perception.image import Picture
 from ..scene import Scene
+from ..store import write_whole
 from .canvas import (
     ALLOWED,
     CERTIFIED,
@@ -74,16 +75,14 @@ def draw_deployment(
     plan: Plan,
     frames: Sequence[FloatArray],
     title: str,
-    robots: Sequence[int] | None = None,
 ) -> list[Image.Image]:
     """One picture per frame, all of one size, no side over 640 px.
 
     Args:
         scene: what the plan was made in.
         plan: its places are the goals.
-        frames: (n, 2) each: where the fleet's robots are over time, image pixels.
+        frames: (n, 2) each: where the robots are over time, in the order of their places, px.
         title: usually the instruction.
-        robots: which robot of the fleet, from 1, takes each place; the goals bear its number.
 
     Raises:
         ToolError: the plan names a target that the scene does not have.
@@ -93,7 +92,7 @@ def draw_deployment(
     for name in plan.formation.contract.target_ids:
         draw_outline(page.canvas, scene.target(name).outline)
     radius = robot_size(page.canvas, goals)
-    _draw_goals(page.canvas, goals, radius, robots)
+    _draw_goals(page.canvas, goals, radius)
     draw_bars(page)
     return [
         _frame(page.canvas, frames[max(i - TRAIL, 0) : i + 1], goals, radius, (i, len(frames)))
@@ -109,7 +108,7 @@ def save_gif(frames: Sequence[Image.Image], path: Path) -> None:
     or not at all.
 
     Raises:
-        InputError: there are no frames.
+        InputError: there are no frames, or the file cannot be written.
     """
     if not frames:
         raise InputError("There are no frames to save; draw at least one.")
@@ -120,12 +119,7 @@ def save_gif(frames: Sequence[Image.Image], path: Path) -> None:
         data = _encoded(kept, side)
         if len(data) <= GIF_BYTES:
             break
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        partial.write_bytes(data)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    write_whole(path, data)
 
 
 def _long(picture: Picture) -> int:
@@ -135,14 +129,12 @@ def _long(picture: Picture) -> int:
     return int(factor * max(picture.size))
 
 
-def _draw_goals(
-    canvas: Canvas, goals: FloatArray, radius: float, robots: Sequence[int] | None
-) -> None:
+def _draw_goals(canvas: Canvas, goals: FloatArray, radius: float) -> None:
     for goal in goals:
         canvas.circle(goal, radius, WHITE, max(0.15 * radius, 0.7))
-    if robots is None or not _numbered(len(goals), radius):
+    if not _numbered(len(goals), radius):
         return
-    for goal, robot in zip(canvas.at(goals), robots, strict=True):
+    for robot, goal in enumerate(canvas.at(goals), start=1):
         canvas.text(goal, str(robot), 1.2 * radius, WHITE)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..geometry.curves import ROUND_JOIN_DIP, Curve
 from ..geometry.outline import FARTHEST, FloatArray, distances
-from ..geometry.sampling import coverage_radius, inside, min_spacing
+from ..geometry.sampling import coverage_radius, inside, min_spacing, nearest
 from . import spacing
 from .contract import CENTRE_SHARE, Contract
 from .place import Site, reference_curve, side_direction
@@ -69,31 +69,33 @@ def _bounds(points: FloatArray, contract: Contract, site: Site, audit: Audit) ->
 
 
 def _crowding(points: FloatArray, contract: Contract, audit: Audit) -> None:
-    """Pairs of robots nearer than either one's group allows, each pair once."""
-    from scipy.spatial import cKDTree
-
+    """Robots whose nearest neighbour is nearer than their group allows, each once."""
+    if len(points) < 2:
+        return
     least = np.concatenate(
         [np.full(g.robots, g.min_spacing or contract.spacing_floor) for g in contract.groups]
     )
-    pairs = cKDTree(points).query_pairs(max(least.max() - TOLERANCE, 0), output_type="ndarray")
-    for i, j in pairs[np.lexsort(pairs.T[::-1])]:
-        apart, needed = np.linalg.norm(points[i] - points[j]), float(max(least[i], least[j]))
-        if apart < needed - TOLERANCE:
-            text = f"is {apart:.1f} px from robot {i + 1}; {needed:.1f} px or more are needed"
-            audit.robot("too_close", int(j), float(apart), needed, text)
+    apart, other = nearest(points, points, 2)
+    own = other[:, 1] == np.arange(len(points))  # of robots on one spot any may come first
+    partner = np.where(own, other[:, 0], other[:, 1])
+    for i in np.flatnonzero(apart[:, 1] < least - TOLERANCE):
+        j = partner[i]
+        if j > i and partner[j] == i and apart[j, 1] < least[j] - TOLERANCE:
+            continue  # told of robot j
+        text = f"is {apart[i, 1]:.1f} px from robot {j + 1}; {least[i]:.1f} px or more are needed"
+        audit.robot("too_close", int(i), apart[i, 1], least[i], text)
 
 
 def _keep_out(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
-    for name in contract.keep_out:
+    """No robot stands on what is kept out of, or on what another group stands around."""
+    groups = np.repeat(np.arange(len(contract.groups)), [g.robots for g in contract.groups])
+    for name in contract.solid_targets:
         distance = distances(site.outlines[name].filled, points)
-        for i in np.flatnonzero(distance <= contract.robot_radius):
-            audit.robot(
-                "keep_out",
-                int(i),
-                distance[i],
-                contract.robot_radius,
-                f"stands on {name}, which is to be kept out of",
-            )
+        owners = [k for k, g in enumerate(contract.groups) if name in g.targets]
+        foreign = ~np.isin(groups, owners)  # a group's own rule speaks of its own target
+        for i in np.flatnonzero(foreign & (distance <= contract.robot_radius)):
+            text = f"stands on {name}, which is to be kept free"
+            audit.robot("keep_out", int(i), distance[i], contract.robot_radius, text)
 
 
 def _outside(part: Part, audit: Audit) -> None:
@@ -103,11 +105,14 @@ def _outside(part: Part, audit: Audit) -> None:
     """
     distance = distances(part.outline.filled, part.points)
     clearance = distance - part.radius
+    beyond = clearance  # a line beside a side passes its recesses by
+    if part.group.side is not None:
+        beyond = distances(part.outline.envelope, part.points) - part.radius
     least, greatest = part.clearance
     audit.least("min_clearance_px", clearance.min())
     audit.greatest("max_clearance_px", clearance.max())
     name = part.group.targets[0]
-    for i, value in enumerate(clearance, start=part.first):
+    for i, (value, far) in enumerate(zip(clearance, beyond, strict=True), start=part.first):
         if distance[i - part.first] <= 0:
             audit.robot("on_target", i, 0.0, least, f"stands on {name}")
         elif value < least - TOLERANCE:
@@ -118,7 +123,7 @@ def _outside(part: Part, audit: Audit) -> None:
                 least,
                 f"is {value:.1f} px from {name}; {least:.1f} px or more are needed",
             )
-        elif value > greatest * ROUND_JOIN_DIP + TOLERANCE and part.group.relation != "corners":
+        elif far > greatest * ROUND_JOIN_DIP + TOLERANCE and part.group.relation != "corners":
             audit.robot(
                 "too_far",
                 i,
@@ -167,7 +172,7 @@ def _along(part: Part, audit: Audit) -> None:
         spacing.on_edges(part, part.group.edges, audit)
     else:
         direction = side_direction(part.group, part.outline, part.site)
-        spacing.on_side(part, direction, audit)
+        spacing.on_side(part, curve, direction, audit)
     if part.group.spacing == "even":
         spacing.evenness(part, curve, audit)
 

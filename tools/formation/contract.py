@@ -151,6 +151,12 @@ class Contract(_Frozen):
         return tuple(dict.fromkeys(named))
 
     @property
+    def solid_targets(self) -> tuple[str, ...]:
+        """Targets no robot may stand on or drive over: those that no group is to enter."""
+        entered = {t for g in self.groups if g.relation in ("inside", "centre") for t in g.targets}
+        return tuple(t for t in self.target_ids if t in self.keep_out or t not in entered)
+
+    @property
     def spacing_floor(self) -> float:
         """Least distance of any two robots' centres, px: bodies must not overlap."""
         return max(2 * self.robot_radius, MIN_SPACING)

@@ -47,8 +47,7 @@ def assign(starts: FloatArray, goals: FloatArray) -> NDArray[np.intp]:
 
 def obstacles(contract: Contract, site: Site) -> BaseGeometry:
     """What robots have to drive around: targets no group of the contract stands on."""
-    entered = {t for g in contract.groups if g.relation in ("inside", "centre") for t in g.targets}
-    solid = [site.outlines[t].filled for t in contract.target_ids if t not in entered]
+    solid = [site.outlines[t].filled for t in contract.solid_targets]
     return shapely.union_all(np.asarray(solid, dtype=object)) if solid else Polygon()
 
 

@@ -1,5 +1,6 @@
 """How robots are spread along the curve or over the corners a contract refers to."""
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -8,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
-from ..geometry.curves import Curve, side
+from ..geometry.curves import FACING, Curve
 from ..geometry.outline import FloatArray, distances
 from ..geometry.sampling import corner_points
 from .place import corner_reach
@@ -16,8 +17,10 @@ from .verdict import TOLERANCE, Audit, Part
 
 WIDEST, NARROWEST = 1.5, 0.5
 """Even spacing: a gap between neighbours as a multiple of the mean gap."""
-FACING_OFFSET = 0.5
-"""How far off the outline, px, the part of it that faces a direction is traced."""
+NEAR_CURVE = 0.03
+"""As near to a side's curve as this share of its length, a robot stands on it."""
+FACING_SLACK = math.radians(10)
+"""How much further than the side itself its robots may be turned from the direction meant."""
 SIDE_SLACK = 0.1
 """At a corner two sides are as near; a robot may be nearer to the other one by this share."""
 
@@ -39,6 +42,15 @@ def evenness(part: Part, curve: Curve, audit: Audit) -> None:
         elif gap < NARROWEST * mean - TOLERANCE:
             text = f"{apart}; even spacing needs {NARROWEST * mean:.1f} px"
             audit.robot("crowded", i, gap, NARROWEST * mean, text)
+    _pieces(spread, mean, audit)
+
+
+def _pieces(spread: "_Spread", mean: float, audit: Audit) -> None:
+    """What uneven spreading over open or several pieces of a curve looks like."""
+    for apart, (i, j) in spread.jumps:
+        if apart < NARROWEST * mean - TOLERANCE:
+            text = f"and robot {j + 1} are {apart:.1f} px apart; even spacing needs more"
+            audit.robot("crowded", i, apart, NARROWEST * mean, text)
     for i, stretch in spread.ends:
         if stretch > mean + TOLERANCE:
             text = f"is the last before {stretch:.1f} px without a robot; {mean:.1f} px are allowed"
@@ -62,14 +74,17 @@ def on_curve(part: Part, curve: Curve, reach: float, name: str, audit: Audit) ->
         )
 
 
-def on_side(part: Part, direction: tuple[float, float], audit: Audit) -> None:
-    """Every robot's nearest part of the target is the side asked for."""
-    facing = side(part.outline, direction, FACING_OFFSET).geometry()
-    away = distances(part.outline.filled, part.points)
-    off = distances(facing, part.points) - away
-    for i in np.flatnonzero(off > np.maximum(SIDE_SLACK * away, 2 * FACING_OFFSET)):
-        text = "stands nearer to another side of the target than to the one asked for"
-        audit.robot("wrong_side", part.first + int(i), off[i], 0.0, text)
+def on_side(part: Part, curve: Curve, direction: tuple[float, float], audit: Audit) -> None:
+    """Every robot stands on the side's curve, or off a part of the target that faces that way."""
+    feet = shapely.shortest_line(part.outline.envelope, shapely.points(part.points))
+    outward = np.diff(shapely.get_coordinates(feet).reshape(-1, 2, 2), axis=1)[:, 0]
+    unit = np.asarray(direction) / np.linalg.norm(direction)
+    facing = outward @ unit / np.maximum(np.linalg.norm(outward, axis=1), 1e-9)
+    astray = distances(curve.geometry(), part.points) > NEAR_CURVE * curve.length
+    for i in np.flatnonzero(astray & (facing < math.cos(FACING + FACING_SLACK))):
+        turned = math.degrees(math.acos(float(np.clip(facing[i], -1, 1))))
+        text = f"stands beside another side of the target, {turned:.0f} degrees off the one meant"
+        audit.robot("wrong_side", part.first + int(i), turned, math.degrees(FACING), text)
 
 
 def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
@@ -166,12 +181,16 @@ def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.
 
 @dataclass(frozen=True)
 class _Spread:
-    """Robots along a curve: gaps and who is on either side, ends past the last, bare pieces."""
+    """Robots along a curve: gaps and who is on either side, ends past the last, bare pieces.
+
+    `jumps` are straight distances from the last robot of a piece to the first of the next.
+    """
 
     gaps: list[float]
     pairs: list[tuple[int, int]]
     ends: list[tuple[int, float]]
     bare: list[float]
+    jumps: list[tuple[float, tuple[int, int]]]
 
 
 def _spread(part: Part, curve: Curve) -> _Spread:
@@ -182,9 +201,9 @@ def _spread(part: Part, curve: Curve) -> _Spread:
     if cut is not None:
         around = np.diff(station[order], append=station[order[0]] + curve.length + cut)
         pairs = list(zip(names, names[1:] + names[:1], strict=True))
-        return _Spread([float(g) for g in around], pairs, [], [])
-    spread = _Spread([], [], [], [])
-    start = 0.0
+        return _Spread([float(g) for g in around], pairs, [], [], [])
+    spread = _Spread([], [], [], [], [])
+    start, last = 0.0, None
     for k, line in enumerate(curve.lines):
         mine = [(float(station[i]) - start, int(i) + part.first) for i in order if piece[i] == k]
         length = float(LineString(line).length)
@@ -192,6 +211,11 @@ def _spread(part: Part, curve: Curve) -> _Spread:
         if not mine:
             spread.bare.append(length)
             continue
+        if last is not None:
+            pair = (last, mine[0][1])
+            ends = part.points[[pair[0] - part.first, pair[1] - part.first]]
+            spread.jumps.append((float(np.linalg.norm(ends[1] - ends[0])), pair))
+        last = mine[-1][1]
         for (a, i), (b, j) in pairwise(mine):
             spread.gaps.append(b - a)
             spread.pairs.append((i, j))

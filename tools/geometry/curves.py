@@ -117,17 +117,17 @@ def ring(
 def side(
     outline: Outline, direction: tuple[float, float], offset: float, frame: Frame | None = None
 ) -> Curve:
-    """The part of the offset curve on one side of the outline, seen from that side.
+    """The part of the envelope's offset curve that faces a direction, in one piece.
 
     Args:
         outline: the thing.
         direction: outward vector of the side, image frame: (0, 1) is the bottom, (-1, 0) the left.
-        offset: distance from the outline, px, > 0.
+        offset: distance from the outline's envelope, px, > 0.
         frame: parts outside are cut off.
     """
     unit = np.asarray(direction, dtype=float) / math.hypot(*direction)
     across = np.array([-unit[1], unit[0]])
-    loop = outline.filled.buffer(offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
+    loop = outline.envelope.buffer(offset * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
     extent = shapely.get_coordinates(outline.filled) @ across
     depth = shapely.get_coordinates(loop) @ unit
     steps: FloatArray = np.linspace(float(extent.min()), float(extent.max()), SIDE_STEP)
@@ -140,7 +140,10 @@ def side(
     line = hits[order[np.unique(ray[order], return_index=True)[1]]]
     tangent = np.gradient(line, axis=0)
     facing = np.abs(np.arctan2(tangent @ unit, np.abs(tangent @ across))) <= FACING
-    return _clip(_longest_runs(line, facing if facing.any() else ~facing), frame)
+    found = np.flatnonzero(facing)
+    if len(found) < 2:
+        return _clip([line], frame)
+    return _clip([line[found[0] : found[-1] + 1]], frame)
 
 
 def edge_curve(
@@ -189,13 +192,6 @@ def _runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
     pieces = np.split(line, changes)
     kept = np.split(flags, changes)
     return [p for p, f in zip(pieces, kept, strict=True) if f[0] and len(p) > 1]
-
-
-def _longest_runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
-    """Runs, less the splinters that a rough contour leaves between them."""
-    runs = _runs(line, flags) or [line]
-    lengths = [float(np.linalg.norm(run[-1] - run[0])) for run in runs]
-    return [run for run, x in zip(runs, lengths, strict=True) if x > 0.1 * max(lengths)]
 
 
 def _clip(lines: list[FloatArray], frame: Frame | None) -> Curve:

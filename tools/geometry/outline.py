@@ -30,6 +30,8 @@ CORNER_TURN = math.radians(25)
 MAX_VERTICES = 5_000
 FARTHEST = 1e6
 """Coordinates beyond this, px, are no place in a picture."""
+RECESS_SHARE = 0.5
+"""Recesses narrower than twice this share of the size are bridged where sides are meant."""
 KNOB_SHARE, BULK_SHARE = 0.05, 0.93
 """What an opening by this share of the size removes is a knob, if this share of the area stays."""
 MIN_AREA = 4.0
@@ -85,6 +87,14 @@ class Outline:
         return Polygon(self.polygon.exterior)
 
     @cached_property
+    def envelope(self) -> Polygon:
+        """The filled region with its recesses bridged, as robots in a line beside it meet it."""
+        reach = RECESS_SHARE * self.size
+        closed = self.filled.buffer(reach).buffer(-reach).union(self.filled)
+        bridged = largest_part(closed)
+        return self.filled if bridged is None else Polygon(bridged.exterior)
+
+    @cached_property
     def rectangle(self) -> FloatArray:
         """Corners of the minimum-area rectangle, (4, 2), in the exterior's direction."""
         return rectangle_of(self.polygon)
@@ -121,7 +131,8 @@ class Outline:
     @cached_property
     def centre(self) -> tuple[float, float]:
         """The centroid where it lies well inside, else the centre of the largest inscribed disc."""
-        disc = shapely.maximum_inscribed_circle(self.polygon)
+        with np.errstate(divide="ignore", invalid="ignore"):  # GEOS on denormal coordinates
+            disc = shapely.maximum_inscribed_circle(self.polygon)
         centroid = self.polygon.centroid
         depth = self.polygon.boundary.distance(centroid)
         if self.polygon.contains(centroid) and depth >= 0.5 * disc.length:
