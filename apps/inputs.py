@@ -92,7 +92,10 @@ def pointed(points: list[str], boxes: list[str], outlines: list[str]) -> tuple[T
     """
     found: list[dict[str, object]] = []
     for text in points:
-        found.append({"points": (_pair(text, "--point", "X,Y"),)})
+        values = _numbers(text, "--point", "X,Y")
+        if len(values) % 2:
+            raise InputError(_wrong("--point", text, "X,Y, or X1,Y1,X2,Y2,... for one thing,"))
+        found.append({"points": tuple(zip(values[::2], values[1::2], strict=True))})
     for text in boxes:
         values = _numbers(text, "--box", "X0,Y0,X1,Y1")
         if len(values) != 4:
@@ -155,13 +158,6 @@ def _numbers(text: str, option: str, form: str) -> list[float]:
     if len(known) < len(values):
         raise InputError(_wrong(option, text, form))
     return known
-
-
-def _pair(text: str, option: str, form: str) -> tuple[float, float]:
-    values = _numbers(text, option, form)
-    if len(values) != 2:
-        raise InputError(_wrong(option, text, form))
-    return values[0], values[1]
 
 
 def _wrong(option: str, text: str, form: str) -> str:

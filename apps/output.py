@@ -89,9 +89,11 @@ def write_files(
         files |= {"plan": "plan.json", "picture": "plan.png"}
         if animate(folder.path / "deploy.gif", workspace, plan, title):
             files["animation"] = "deploy.gif"
-    elif workspace.scene.targets:
-        write_whole(folder.path / "plan.png", _png(draw_look(workspace.scene)))
-        files["picture"] = "plan.png"
+    elif workspace.scene.targets or workspace.doubted:
+        scene = workspace.scene
+        shown = scene.with_target(workspace.doubted) if workspace.doubted else scene
+        write_whole(folder.path / "found.png", _png(draw_look(shown)))
+        files["picture"] = "found.png"
     write_whole(folder.path / "trace.jsonl", trace.text())
     return files
 

@@ -111,7 +111,11 @@ def tool(kind: Kind) -> Callable[[ToolFunction], Tool]:
 def violations(error: ValidationError) -> str:
     """All violations of a validation as one line a model or a person can act on."""
     lines: list[str] = []
-    for item in error.errors(include_url=False):
+    items = error.errors(include_url=False)
+    deeper = {item["loc"][:k] for item in items for k in range(len(item["loc"]))}
+    for item in items:
+        if item["loc"] in deeper:
+            continue  # a consequence of what is wrong inside it
         where = ".".join(str(part) for part in item["loc"]) or "arguments"
         given = repr(item["input"])
         shown = given if len(given) <= 60 else given[:57] + "..."

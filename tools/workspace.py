@@ -4,6 +4,7 @@ The one mutable object of the tools; they read it and put new values in, so that
 target id means the same in the next call.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -70,6 +71,7 @@ class Workspace:
     Attributes:
         pointed: what the person pointed at, in order t1, t2, ...
         samples: positions kept by the sampling tools under s1, s2, ...
+        doubted: what was found last with too little confidence, for a person to look at.
         arrivals: by plan id, what was observed after a deployment, and the way there.
     """
 
@@ -78,6 +80,7 @@ class Workspace:
     pointed: tuple[TargetPrompt, ...] = ()
     plans: dict[str, Plan] = field(default_factory=dict[str, Plan])
     samples: dict[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    doubted: Target | None = None
     arrivals: dict[str, Arrival] = field(default_factory=dict[str, Arrival])
     frames: dict[str, list[FloatArray]] = field(default_factory=dict[str, list[FloatArray]])
 
@@ -101,12 +104,11 @@ class Workspace:
         found = segmenter.run(picture.pixels, prompt)
         chosen = self.settings.threshold
         threshold = segmenter.thresholds[prompt.how] if chosen is None else chosen
-        if found.confidence < threshold or not found.mask.any():
-            raise ToolError(_insufficient(found.confidence, threshold, prompt.how))
         try:
             outline = outline_of_mask(found.mask)
         except InputError as error:
-            raise ToolError(f"Insufficient segmentation accuracy. {error}") from None
+            text = f"Insufficient segmentation accuracy. {error} {ADVICE[prompt.how]}"
+            raise ToolError(text) from None
         target = Target(
             id=prompt.id,
             label=prompt.label or "the thing pointed at",
@@ -116,6 +118,9 @@ class Workspace:
             prompt=prompt.how,
             parts=tuple((name, round(value, 3)) for name, value in found.parts.items()),
         )
+        if found.confidence < threshold:
+            self.doubted = target
+            raise ToolError(_insufficient(found.confidence, threshold, prompt.how))
         self.scene = self.scene.with_target(target)
         return target
 
@@ -162,13 +167,17 @@ class Workspace:
         return SimulatedFleet(starts, seed=self.settings.seed)
 
 
+ADVICE = {
+    "point": "Draw a box close around the thing, or better a rough outline.",
+    "box": "Draw a rough outline of 4 to 12 vertices around the thing.",
+    "outline": "Draw the outline closer, or name points that do not belong; if what was found "
+    "looks right, allow a lower threshold.",
+}
+
+
 def _insufficient(confidence: float, threshold: float, how: str) -> str:
-    advice = {
-        "point": "draw a box close around the thing, or better a rough outline",
-        "box": "draw a rough outline of 4 to 12 vertices around the thing",
-        "outline": "draw the outline closer, with more vertices, or name points that do not belong",
-    }[how]
+    shown = math.floor(100 * confidence) / 100  # never rounded up to the threshold
     return (
-        f"Insufficient segmentation accuracy. The mask's confidence is {confidence:.2f}, below the "
-        f"threshold {threshold:.2f}; {advice}."
+        f"Insufficient segmentation accuracy. The mask's confidence is {shown:.2f}, below the "
+        f"threshold {threshold:.2f}. {ADVICE[how]}"
     )

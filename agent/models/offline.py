@@ -50,6 +50,12 @@ def _begin(task: Task, history: History) -> Reply:
 def _open_question(task: Task, reading: Reading, robots: int | None) -> str | None:
     """What has to be asked first, or None."""
     things = len(_target_ids(task))
+    if reading.beyond:
+        said = " and ".join(reading.beyond)
+        return (
+            f"The offline rules do not carry out {said}. Say it another way: one arrangement of "
+            "all the robots, lengths in px."
+        )
     if not reading.relations:
         return f"Which arrangement is meant? For example {EXAMPLES}."
     if len(reading.relations) > 1:
@@ -60,6 +66,10 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
         return "How many robots? Say it in the words or with -n."
     if "between" in reading.relations and things < 2:
         return "Between which two things? Point at both: --point X,Y --point X,Y."
+    used = 2 if "between" in reading.relations else 1
+    if things > used:
+        named = ", ".join(_target_ids(task))
+        return f"{things} things were pointed at ({named}), the arrangement is about {used}. Which?"
     if things == 0:
         return (
             "Which thing is meant? The offline planner does not see: point at it with "

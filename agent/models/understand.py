@@ -14,6 +14,11 @@ import yaml
 
 GAP = 6
 """Words that "..." may stand for."""
+ASIDE = re.compile(
+    r"(?<!so )\b(?:that|which|who)\s+(?:is|are|was|were|has|have|lies?|stands?|sits?|hangs?|looks?"
+    r"|leans?|can|could|would|will|you|runs?)\b[^,.;:!?]*"
+)
+"""A relative clause says which thing is meant, not what to do with it."""
 ENDINGS = ("ing", "ed", "es", "s", "e")
 Words = list[str]
 
@@ -30,11 +35,12 @@ class Reading:
     fit: str
     spacing: str
     clearance: float | None
+    beyond: tuple[str, ...]
 
 
 def understand(instruction: str) -> Reading:
     """Read an instruction in English."""
-    words = _without_ignored(_words(instruction))
+    words = _without_ignored(_words(ASIDE.sub(" ", instruction.lower())))
     side = next(iter(_matches("sides", words)), None)
     relations = _unbeaten(_matches("relations", words))
     if not relations:
@@ -49,6 +55,7 @@ def understand(instruction: str) -> Reading:
         fit=next(iter(_matches("fit", words)), "normal"),
         spacing="free" if any(_found(p, words) for p in _vocabulary()["free"]) else "even",
         clearance=_clearance(instruction),
+        beyond=_beyond(words, relations, side),
     )
 
 
@@ -106,23 +113,50 @@ def _unbeaten(relations: list[str]) -> list[str]:
 
 def _count(text: str) -> tuple[int | None, str | None]:
     """A number of robots in the words, or what stands there but is none."""
-    numbers: dict[str, int] = _vocabulary()["numbers"]
+    lowered = text.lower()
+    number = rf"-?[0-9][0-9,.]*|{_number_words()}"
     nouns = "|".join(rf"{noun}s?" for noun in _vocabulary()["robots"] if noun != "one")
-    names = "|".join(numbers)
-    pattern = (
-        rf"(-?[0-9][0-9,.]*|\b(?:{names})\b|\bmany|\bseveral|\bsome)(?:\s+[a-z-]+)?\s+(?:{nouns})\b"
+    found = re.search(
+        rf"({number}|\bmany|\bseveral|\bsome)(?:\s+[a-z-]+)?\s+(?:{nouns})\b", lowered
+    ) or re.search(
+        rf"\b(?:use|with|by)\s+({number})\b|^\s*({number})\s+(?:around|along|inside|between)",
+        lowered,
     )
-    found = re.search(pattern, text.lower())
-    if re.search(
-        r"\b(?:each|every)\b.*corner", text.lower()
-    ):  # "one robot at each": not one in all
-        found = re.search(rf"([0-9]+|{names})\s+corners?", text.lower())
+    if re.search(r"\b(?:each|every)\b.*corner", lowered):  # "one robot at each": not one in all
+        found = re.search(rf"({number})\s+corners?", lowered)
     if found is None:
         return None, None
-    word = found[1].replace(",", "")
-    if word in numbers:
-        return numbers[word], None
-    return (int(word), None) if re.fullmatch(r"[0-9]+", word) else (None, found[0])
+    word = next(group for group in found.groups() if group)
+    value = _number(word.strip())
+    return (value, None) if value is not None else (None, found[0].strip())
+
+
+def _number_words() -> str:
+    names = "|".join(_vocabulary()["numbers"])
+    return rf"\bhalf\s+a\s+dozen\b|\b(?:{names})(?:[\s-]+(?:{names}))*\b"
+
+
+def _number(word: str) -> int | None:
+    """Digits, or words that multiply and add up: four hundred, twenty-five, half a dozen."""
+    if re.fullmatch(r"[0-9]+|[0-9]{1,3}(?:,[0-9]{3})+", word):
+        return int(word.replace(",", ""))
+    if word.startswith("half"):
+        return 6
+    total = 0
+    for part in re.findall(r"[a-z]+", word):
+        value = _vocabulary()["numbers"].get(part)
+        if value is None:
+            return None
+        total = total * value if value >= 100 or (part == "dozen" and total) else total + value
+    return total or None
+
+
+def _beyond(words: Words, relations: list[str], side: str | None) -> tuple[str, ...]:
+    """What the words also say that these rules do not carry out."""
+    found = _matches("beyond", words)
+    if side and any(r in ("inside", "around", "cage") for r in relations):
+        found.append(f"the {side} side of it")
+    return tuple(found)
 
 
 def _clearance(text: str) -> float | None:

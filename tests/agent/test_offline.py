@@ -48,10 +48,52 @@ COIN = TargetPrompt(box=(175, 30, 314, 160))
         ("Put 5 robots on the left side of the car", "along"),
         ("Place 3 robots between the car and the wall", "between"),
         ("Gather 3 robots at the centre of the court", "centre"),
+        ("stand in a row along the north side", "along"),
+        ("line up on the west side", "along"),
+        ("surround the trap", "around"),
+        ("surround it so nothing gets out", "cage"),
+        ("it must not escape", "cage"),
+        ("barrier between them", "between"),
+        ("spread all over it", "inside"),
     ],
 )
 def test_words_name_one_arrangement(words: str, relation: str) -> None:
     assert understand(words).relations == (relation,)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Do not surround it, line up on its left",
+        "Don't cage it, just line up above it",
+        "surround it 3 metres away",
+        "form a triangle around it",
+        "three along the left and three along the right",
+        "flank it on both long sides",
+        "protect the left side of the house",
+        "cover the left side of the field",
+        "line up in front of it",
+        "encircle it, then fill it",
+    ],
+)
+def test_what_goes_beyond_the_rules_is_said_not_carried_out(words: str) -> None:
+    assert understand(words).beyond
+    report = run(words, pointed=[COIN], settings=Settings(robots=6))
+    assert report.status == "question"
+    assert "do not carry out" in report.message
+
+
+def test_a_relative_clause_only_says_which_thing_is_meant() -> None:
+    words = "surround the tree that stands between the yard and the bus"
+    assert understand(words).relations == ("around",)
+    assert understand("so that it cannot get out, surround it").relations == ("cage",)
+
+
+def test_more_things_pointed_at_than_the_arrangement_is_about_are_asked_about() -> None:
+    other = TargetPrompt(id="t2", points=((300, 200),))
+    report = run("Surround it", pointed=[COIN, other], settings=Settings(robots=6))
+    assert report.status == "question"
+    assert "t1, t2" in report.message
 
 
 @pytest.mark.parametrize("words", ["hello", "move", "do it", "the ringmaster's car", "corner shop"])
@@ -77,6 +119,12 @@ def test_words_that_name_two_settle_nothing() -> None:
         ("0 robots", 0, None),
         ("one robot at each corner", None, None),
         ("a robot at each of the four corners", 4, None),
+        ("half a dozen robots", 6, None),
+        ("twenty-five robots", 25, None),
+        ("four hundred robots", 400, None),
+        ("1,5 robots", None, "1,5 robots"),
+        ("surround it with 4", 4, None),
+        ("8 around the tree", 8, None),
     ],
 )
 def test_robots_are_counted_in_digits_and_words(

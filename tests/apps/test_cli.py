@@ -179,7 +179,9 @@ def test_low_confidence_is_the_papers_sentence_and_nothing_moves(tmp_path: Path)
         cwd=tmp_path,
     )
     assert done.returncode == 3
-    assert report(done)["message"].startswith("Insufficient segmentation accuracy.")
+    data = report(done)
+    assert data["message"].startswith("Insufficient segmentation accuracy.")
+    assert data["files"]["picture"] == "found.png"
 
 
 def test_more_than_a_thousand_robots_are_planned_and_it_says_so(tmp_path: Path) -> None:

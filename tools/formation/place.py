@@ -161,7 +161,8 @@ def _place_at_target(group: Group, site: Site, radius: float) -> tuple[FloatArra
     outline = site.visible(group.targets[0])
     n, spacing = group.robots, group.min_spacing or 0.0
     if group.relation == "corners":
-        why = "no more corners can be taken inside the picture"
+        count = len(corner_points(outline, n))
+        why = f"{group.targets[0]} has {count} corners, less those without room in the picture"
         return _corners(group, site, radius), why
     if group.relation == "inside":
         assert group.clearance is not None

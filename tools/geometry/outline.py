@@ -131,7 +131,7 @@ class Outline:
     @cached_property
     def centre(self) -> tuple[float, float]:
         """The centroid where it lies well inside, else the centre of the largest inscribed disc."""
-        with np.errstate(divide="ignore", invalid="ignore"):  # GEOS on denormal coordinates
+        with np.errstate(all="ignore"):  # GEOS on denormal coordinates
             disc = shapely.maximum_inscribed_circle(self.polygon)
         centroid = self.polygon.centroid
         depth = self.polygon.boundary.distance(centroid)

@@ -1,5 +1,7 @@
 """Masks to outlines: the pixel borders of a mask as a polygon with holes."""
 
+import math
+
 import cv2
 import numpy as np
 import shapely
@@ -10,9 +12,14 @@ from shapely.geometry.base import BaseGeometry
 from ..errors import InputError
 from ..geometry.outline import Outline, largest_part, outline_of
 
+WHOLE = 0.9
+"""The share of a mask that one piece must hold to stand for it."""
+GAP_SHARES = (0.0, 0.02, 0.05, 0.1)
+"""Half the width of a gap that may be bridged, as a share of the mask's size; tried in order."""
+
 
 def outline_of_mask(mask: NDArray[np.bool_]) -> Outline:
-    """The outline of a mask's largest connected part, holes kept.
+    """The outline of a mask, holes kept; parts that a narrow gap splits are joined.
 
     OpenCV traces pixel centres (Suzuki and Abe 1985); growing the polygon by half a pixel gives
     the pixels' borders: exact for upright edges, up to half a pixel wide of slanted ones.
@@ -21,7 +28,8 @@ def outline_of_mask(mask: NDArray[np.bool_]) -> Outline:
         mask: (H, W).
 
     Raises:
-        InputError: nothing in the mask is wide enough to have an area.
+        InputError: nothing in the mask is wide enough to have an area, or it falls into pieces
+            of which none holds nine tenths.
     """
     contours, hierarchy = cv2.findContours(
         mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE
@@ -33,10 +41,22 @@ def outline_of_mask(mask: NDArray[np.bool_]) -> Outline:
         holes = [c[:, 0] for c, h in zip(contours, hierarchy[0], strict=True) if h[3] == i]
         region = Polygon(contour[:, 0], [h for h in holes if len(h) >= 3])
         parts.append(shapely.make_valid(region).buffer(0.5, join_style="mitre"))
-    largest = largest_part(shapely.union_all(parts)) if parts else None
-    if largest is None:
+    region = shapely.union_all(parts)
+    if region.is_empty:
         raise InputError(f"The mask's {int(mask.sum())} pixels form lines or specks, no shape.")
-    return outline_of(largest)
+    return outline_of(_in_one_piece(region))
+
+
+def _in_one_piece(region: BaseGeometry) -> BaseGeometry:
+    """The largest part if it holds nearly all, else of the region with its narrow gaps bridged."""
+    for share in GAP_SHARES:
+        reach = share * math.sqrt(region.area)
+        joined = region if share == 0 else region.buffer(reach).buffer(-reach).union(region)
+        largest = largest_part(joined)
+        if largest is not None and largest.intersection(region).area >= WHOLE * region.area:
+            return largest
+    count = len(shapely.get_parts(region))
+    raise InputError(f"The mask falls into {count} pieces, none of which is the whole thing.")
 
 
 def mask_of_outline(outline: Outline, width: int, height: int) -> NDArray[np.bool_]:
