@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from ..evals.pointed import Row, as_json, evaluate, mode_named, one_target, summary
+from ..evals.pointed import JITTERED, Row, as_json, evaluate, mode_named, one_target, summary
 from ..evals.suite import load_tasks
 from ..tools.store import write_whole
 from . import inputs
@@ -32,7 +32,7 @@ def photos(
     """Success over all one-target tasks of a folder of photographs; the shipped ones by default."""
     chosen, tasks = mode_named(mode), one_target(load_tasks(data))
     jitters = inputs.whole("--seeds", seeds, least=1)
-    count = len(tasks) * (jitters if chosen in ("box", "outline") else 1)
+    count = len(tasks) * (jitters if chosen in JITTERED else 1)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task(f"{chosen}, {len(tasks)} tasks", total=count)
         rows = evaluate(tasks, chosen, jitters, lambda row: progress.advance(bar))

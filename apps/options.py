@@ -50,6 +50,8 @@ PictureFile = Annotated[Path | None, typer.Option("--image", help="The picture t
 DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Photographs in the format of evals/photos.")
 ]
-Mode = Annotated[str, typer.Option("--mode", help="How to point: box, outline, truth or words.")]
+Mode = Annotated[
+    str, typer.Option("--mode", help="How to point: truth, outline, box, point or words.")
+]
 JsonFile = Annotated[Path | None, typer.Option("--out", help="Where to write the rows as JSON.")]
 Seeds = Annotated[str, typer.Option("--seeds", help="Jitters of every task.")]

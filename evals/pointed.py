@@ -2,7 +2,7 @@
 
 truth: the drawn outline is the mask. box: the target's box, each side moved by up to 8 % of the
 box. outline: at most 12 vertices, each coordinate moved by up to 4 % of the size (square root of
-the area). words: nothing is pointed at.
+the area). point: one point well inside. words: nothing is pointed at.
 """
 
 import asyncio
@@ -29,7 +29,8 @@ from ..tools.workspace import Settings, Workspace
 from .grade import grade
 from .suite import Task
 
-Mode = Literal["truth", "box", "outline", "words"]
+Mode = Literal["truth", "outline", "box", "point", "words"]
+JITTERED = ("outline", "box", "point")
 BOX_JITTER, OUTLINE_JITTER, OUTLINE_VERTICES = 0.08, 0.04, 12
 
 
@@ -74,7 +75,7 @@ def evaluate(
     """Run every task under every seed; `done` is told of each row as it comes."""
     rows: list[Row] = []
     for task in tasks:
-        for seed in range(seeds if mode in ("box", "outline") else 1):
+        for seed in range(seeds if mode in JITTERED else 1):
             rows.append(_row(task, mode, seed))
             done(rows[-1])
     return rows
@@ -146,12 +147,26 @@ def _prompt(task: Task, mode: Mode, seed: int) -> TargetPrompt:
         moved = box + random.uniform(-BOX_JITTER, BOX_JITTER, (2, 2)) * (box[1] - box[0])
         x0, y0, x1, y1 = np.clip(moved, 0, far).ravel()
         return TargetPrompt(box=(float(x0), float(y0), float(x1), float(y1)))
+    if mode == "point":
+        return TargetPrompt(points=(_inner_point(task, random),))
     vertices = _few_vertices(task)
     while True:  # a jitter that crosses itself is no outline a person would draw
         amount = OUTLINE_JITTER * task.target.outline.size
         moved = np.clip(vertices + random.uniform(-amount, amount, vertices.shape), 0, far)
         if Polygon(moved).is_valid:
             return TargetPrompt(outline=tuple((float(x), float(y)) for x, y in moved))
+
+
+def _inner_point(task: Task, random: np.random.Generator) -> tuple[float, float]:
+    """A random point of the target, off its edge by an eighth of its least width if it can be."""
+    outline = task.target.outline
+    inner = outline.polygon.buffer(-outline.min_width / 8)
+    region = outline.polygon if inner.is_empty else inner
+    x0, y0, x1, y1 = region.bounds
+    while True:
+        x, y = (float(v) for v in random.uniform((x0, y0), (x1, y1)))
+        if shapely.contains_xy(region, x, y):
+            return x, y
 
 
 def _few_vertices(task: Task) -> FloatArray:

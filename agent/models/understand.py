@@ -55,7 +55,7 @@ def understand(instruction: str) -> Reading:
         fit=next(iter(_matches("fit", words)), "normal"),
         spacing="free" if any(_found(p, words) for p in _vocabulary()["free"]) else "even",
         clearance=_clearance(instruction),
-        beyond=_beyond(words, relations, side),
+        beyond=(*_beyond(words, relations, side), *_foreign_units(instruction)),
     )
 
 
@@ -157,6 +157,13 @@ def _beyond(words: Words, relations: list[str], side: str | None) -> tuple[str, 
     if side and any(r in ("inside", "around", "cage") for r in relations):
         found.append(f"the {side} side of it")
     return tuple(found)
+
+
+def _foreign_units(text: str) -> list[str]:
+    """Lengths in other units than pixels, such as 3 metres."""
+    units = "|".join(_vocabulary()["units"])
+    amount = rf"(?:[0-9][0-9.,]*|{_number_words()}|\bhalf\s+an?|\ban?)"
+    return re.findall(rf"{amount}\s*(?:{units})s?\b", text.lower())
 
 
 def _clearance(text: str) -> float | None:

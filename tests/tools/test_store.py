@@ -5,13 +5,13 @@ import json
 from pathlib import Path
 
 import pytest
+from formup.evals.suite import load_tasks
 from formup.tools.doors import TOOLS
 from formup.tools.errors import InputError
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import make_plan
 from formup.tools.perception.image import load_picture
-from formup.tools.perception.prompts import TargetPrompt
-from formup.tools.scene import Scene
+from formup.tools.scene import Scene, Target
 from formup.tools.store import read_stored, restore, store, write_whole
 from formup.tools.workspace import Settings, Workspace
 
@@ -20,8 +20,10 @@ PHOTO = Path(__file__).parent.parent.parent / "evals/photos/images/scissors_blue
 
 @pytest.fixture(scope="module")
 def work() -> Workspace:
-    workspace = Workspace(Scene(load_picture(PHOTO)), Settings(threshold=0.3))
-    workspace.segment(TargetPrompt(box=(358, 214, 648, 628), points=((640, 330),)))
+    outline = next(t for t in load_tasks() if t.image == PHOTO).target.outline
+    assert len(outline.polygon.interiors) == 2
+    target = Target("t1", "scissors", outline.bounds, 1.0, outline, "outline")
+    workspace = Workspace(Scene(load_picture(PHOTO), (target,)))
     group = Group(relation="around", targets=("t1",), robots=9)
     contract = Contract(groups=(group,))
     scene = workspace.scene

@@ -28,6 +28,10 @@ MAX_SHARE = 0.5
 MIN_PIXELS = 12
 # The contrast that is half as good as any: a clear edge, in units of the features.
 CLEAR_CONTRAST = 22.0
+# Colours this near to each other show no edge between them.
+NO_EDGE = 8.0
+# How far a mask may reach beyond the thing's edge, as a share of its size.
+OVERSHOOT = 0.08
 # Touching a border of the picture makes a region less likely to be a thing, but not impossible.
 BORDER_DISCOUNT = 0.7
 # Of two equally good regions the larger is the thing and the smaller its part, by a weak power.
@@ -204,13 +208,32 @@ def region_score(mask: Mask, window: Window) -> float:
 
 def _edge_contrast(colours: Floats, mask: Mask) -> float:
     """The contrast that all but the weakest tenth of the region's edge exceeds."""
+    contrast = _contrast_along_edge(colours, mask)
+    return float(np.quantile(contrast, 0.1)) if len(contrast) else 0.0
+
+
+def edge_support(image: Bytes, mask: Mask) -> float:
+    """Share of the mask's (h, w) edge along which the picture has an edge too.
+
+    Masks of small things overshoot, so the best of the mask and slightly smaller ones counts.
+    """
+    colours, region, best = image.astype(np.float32), mask, 0.0
+    for _ in range(2 + int(OVERSHOOT * float(np.sqrt(np.count_nonzero(mask))))):
+        contrast = _contrast_along_edge(colours, region)
+        best = max(best, int(np.count_nonzero(contrast >= NO_EDGE)) / max(len(contrast), 1))
+        region = np.asarray(cv2.erode(region.astype(np.uint8), np.ones((3, 3), np.uint8))) > 0
+        if not region.any():
+            break
+    return best
+
+
+def _contrast_along_edge(colours: Floats, mask: Mask) -> Floats:
+    """Colour distance (n,) from the pixels just outside the edge to the region nearby."""
     region = mask.astype(np.uint8)
     inner, outer = np.ones((3, 3), np.uint8), np.ones((5, 5), np.uint8)
     core = np.asarray(cv2.erode(region, inner, borderValue=(1,)), dtype=np.float32)
     rim = np.asarray(cv2.dilate(region, outer)) > np.asarray(cv2.dilate(region, inner))
     weight = np.asarray(cv2.blur(core, (7, 7)))
     rim &= weight > 1e-3
-    if not rim.any():
-        return 0.0
     inside = np.asarray(cv2.blur(colours * core[..., None], (7, 7)))[rim] / weight[rim][:, None]
-    return float(np.quantile(np.linalg.norm(colours[rim] - inside, axis=1), 0.1))
+    return np.asarray(np.linalg.norm(colours[rim] - inside, axis=1), dtype=np.float32)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from . import grabcut as gc
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
 from .openings import cut_openings
-from .region_growing import Region, box_iou, pin, propose
+from .region_growing import Region, box_iou, edge_support, pin, propose
 from .wholes import on_plain_ground, propose_wholes, solidity
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
@@ -42,6 +42,8 @@ PROPOSALS = 4
 # A whole holds this share of its part, is this many times as large (a thing with its shadow is
 # less) and stands out this much of it; it is taken for a thing when it fills its hull this far.
 HELD, MUCH_LARGER, RIVAL, SOLID = 0.85, 2.2, 0.6, 0.88
+# How strongly missing edges lower the confidence.
+EDGE_WEIGHT = 2
 # Other points of a mask that should lead back to it, and how deep inside it they lie at least.
 ECHOES = 4
 DEPTH = 0.35
@@ -73,6 +75,7 @@ class _Prompt:
 
     `trimaps` are GrabCut labels, first for the prompt as given and then for perturbed ones;
     `extent` is what the prompt says the thing covers, `core` what is most surely the thing.
+    `drawn` says that a person or model drew its edge, so that the picture need not show one.
     """
 
     window: Window
@@ -81,6 +84,7 @@ class _Prompt:
     core: Mask
     positive: Points
     box: Box
+    drawn: bool = False
 
 
 def segment_box(
@@ -125,7 +129,7 @@ def segment_outline(
         pin(window.features, gc.trimap(region, _dilated(region), core), on, off)
         for region, core in zip(regions, cores, strict=True)
     ]
-    return _segment(_Prompt(window, trimaps, regions[0], cores[0], on, box))
+    return _segment(_Prompt(window, trimaps, regions[0], cores[0], on, box, drawn=True))
 
 
 def segment_points(
@@ -190,7 +194,10 @@ def _judged(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
         "colour_separation": gc.colour_separation(window.features, mask),
         "prompt_fit": _fit(prompt, mask),
     }
-    confidence = float(np.prod(list(parts.values())) ** (1 / len(parts)))
+    agreed = float(np.prod(list(parts.values())) ** (1 / len(parts)))
+    # Cues that agree are worth nothing where the mask ends in the middle of nowhere.
+    parts["edge_support"] = edge_support(window.features, mask)
+    confidence = agreed if prompt.drawn else agreed * parts["edge_support"] ** EDGE_WEIGHT
     return Segmentation(window.to_picture(mask), confidence, parts, prompt.box)
 
 
@@ -278,8 +285,7 @@ def _is_whole_of(outer: _Tried, part: _Tried) -> bool:
 
 def _doubted(found: Segmentation, share: float) -> Segmentation:
     parts = {**found.parts, "unrivalled": share}
-    confidence = float(np.prod(list(parts.values())) ** (1 / len(parts)))
-    return Segmentation(found.mask, confidence, parts, found.box)
+    return Segmentation(found.mask, found.confidence * share, parts, found.box)
 
 
 def _region_prompt(

@@ -228,8 +228,20 @@ def test_a_wrong_box_is_trusted_less():
     assert ground.confidence < good.confidence - 0.3
 
 
-def test_confidence_is_the_geometric_mean_of_its_parts():
+def test_confidence_is_the_mean_of_what_agrees_and_falls_with_missing_edges() -> None:
     found = segment_box(scene(DISC), box_around(DISC, 4))
-    parts = np.array(list(found.parts.values()))
-    assert ((parts >= 0) & (parts <= 1)).all()
-    assert found.confidence == pytest.approx(np.prod(parts) ** (1 / len(parts)))
+    parts = dict(found.parts)
+    assert all(0 <= value <= 1 for value in parts.values())
+    edges = parts.pop("edge_support")
+    agreed = float(np.prod(list(parts.values())) ** (1 / len(parts)))
+    assert found.confidence == pytest.approx(agreed * edges**2)
+
+
+def test_a_mask_that_ends_where_there_is_no_edge_is_not_believed() -> None:
+    """A soft spot that fades into the ground has no outline anybody could find."""
+    y, x = np.mgrid[:240, :320].astype(np.float32)
+    spot = 30 * np.exp(-((x - 160) ** 2 + (y - 120) ** 2) / (2 * 45**2))
+    picture = np.clip(np.array(GREY) + spot[..., None], 0, 255).astype(np.uint8)
+    found = segment_box(picture, (100.0, 60.0, 220.0, 180.0))
+    assert found.parts.get("edge_support", 0.0) < 0.9
+    assert found.confidence < 0.6
