@@ -42,6 +42,10 @@ PROPOSALS = 4
 # A whole holds this share of its part, is this many times as large (a thing with its shadow is
 # less) and stands out this much of it; it is taken for a thing when it fills its hull this far.
 HELD, MUCH_LARGER, RIVAL, SOLID = 0.85, 2.2, 0.6, 0.88
+# A mask that runs along the sure background for this many times its size was cut short; the box
+# is widened by this share a side, so often at most.
+CUT_SHORT, WIDER, WIDENINGS = 0.05, 0.15, 3
+NEXT_TO = np.ones((3, 3), np.uint8)
 # How strongly missing edges lower the confidence.
 EDGE_WEIGHT = 2
 # Other points of a mask that should lead back to it, and how deep inside it they lie at least.
@@ -268,8 +272,13 @@ def _tried(
 ) -> list[_Tried]:
     found: list[_Tried] = []
     for region in regions:
-        prompt = _region_prompt(pixels, region, points, negative)
+        prompt = _region_prompt(pixels, region, region.box, points, negative)
         mask = _cut(prompt, prompt.trimaps[0])
+        for _ in range(WIDENINGS):
+            if not _cut_short(prompt, mask):
+                break
+            prompt = _region_prompt(pixels, region, _widened(prompt.box), points, negative)
+            mask = _cut(prompt, prompt.trimaps[0])
         if mask.any() and not mask.all():
             found.append(_Tried(prompt, mask, _standing_out(prompt, mask)))
     return found
@@ -288,18 +297,32 @@ def _doubted(found: Segmentation, share: float) -> Segmentation:
     return Segmentation(found.mask, found.confidence * share, parts, found.box)
 
 
+def _cut_short(prompt: _Prompt, mask: Mask) -> bool:
+    """Whether a mask ends at the sure background rather than at an edge of its own."""
+    touching = np.asarray(cv2.dilate((prompt.trimaps[0] == cv2.GC_BGD).astype(np.uint8), NEXT_TO))
+    return int(np.count_nonzero(mask & (touching > 0))) > CUT_SHORT * np.sqrt(
+        np.count_nonzero(mask)
+    )
+
+
+def _widened(box: Box) -> Box:
+    x0, y0, x1, y1 = box
+    dx, dy = WIDER * (x1 - x0), WIDER * (y1 - y0)
+    return x0 - dx, y0 - dy, x1 + dx, y1 + dy
+
+
 def _region_prompt(
-    pixels: Bytes, region: Region, points: Sequence[Point], negative: Sequence[Point]
+    pixels: Bytes, region: Region, box: Box, points: Sequence[Point], negative: Sequence[Point]
 ) -> _Prompt:
-    """The box around a grown region, with the region's inside as sure object."""
-    window = gc.window_around(pixels, region.box)
+    """A box around a grown region, with the region's inside as sure object."""
+    window = gc.window_around(pixels, box)
     on, off = window.to_work(points), window.to_work(negative)
-    drawn = window.to_work((region.box[:2], region.box[2:])).ravel()
+    drawn = window.to_work((box[:2], box[2:])).ravel()
     core = _eroded(region.window.transfer(region.mask, window))
     trimap = _box_trimap(window.shape, drawn)
     trimap[core] = cv2.GC_FGD
     extent = gc.box_region(window.shape, drawn)
-    return _Prompt(window, [pin(window.features, trimap, on, off)], extent, core, on, region.box)
+    return _Prompt(window, [pin(window.features, trimap, on, off)], extent, core, on, box)
 
 
 def _standing_out(prompt: _Prompt, mask: Mask) -> float:

@@ -57,5 +57,5 @@ def _grabcut(pixels: Pixels, prompt: TargetPrompt) -> Segmentation:
 
 
 SEGMENTERS = {
-    "grabcut": Segmenter("grabcut", _grabcut, {"point": 0.84, "box": 0.6, "outline": 0.55})
+    "grabcut": Segmenter("grabcut", _grabcut, {"point": 0.82, "box": 0.6, "outline": 0.55})
 }
