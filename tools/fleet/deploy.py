@@ -21,16 +21,6 @@ ARRIVED_SHARE, ARRIVED_PX = 0.001, 0.5
 class Fleet(Protocol):
     """Robots that can be observed and driven; poses are (n, 2) positions in image pixels."""
 
-    @property
-    def name(self) -> str:
-        """What the user calls it."""
-        ...
-
-    @property
-    def simulated(self) -> bool:
-        """Whether nothing real moves, so that no person need approve."""
-        ...
-
     async def observe(self) -> FloatArray:
         """Where the robots are seen to be now, robot order."""
         ...

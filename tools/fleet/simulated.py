@@ -25,9 +25,6 @@ START_MARGIN = 0.03
 class SimulatedFleet:
     """Robots on the picture's plane; `frames` keeps every pose for the animation."""
 
-    name = "simulated"
-    simulated = True
-
     def __init__(self, starts: FloatArray, *, seed: int = 0) -> None:
         self._poses = np.array(starts, dtype=float)
         self._random = np.random.default_rng(seed)
