@@ -29,8 +29,13 @@ def photos(
     seeds: o.Seeds = "3",
     out: o.JsonFile = Path("photos-eval.json"),
 ) -> None:
-    """Success over all one-target tasks of a folder of photographs; the shipped ones by default."""
-    chosen, tasks = mode_named(mode), one_target(load_tasks(data))
+    """Success over a folder of photographs, the shipped ones by default.
+
+    Tasks about two things are left out where only one is pointed at: in all modes but truth.
+    """
+    chosen, tasks = mode_named(mode), load_tasks(data)
+    if chosen != "truth":
+        tasks = one_target(tasks)
     jitters = inputs.whole("--seeds", seeds, least=1)
     count = len(tasks) * (jitters if chosen in JITTERED else 1)
     with Progress(console=Console(stderr=True), transient=True) as progress:

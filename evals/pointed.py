@@ -130,9 +130,12 @@ def _run(task: Task, mode: Mode, seed: int) -> Run:
     picture, agent = _picture(task.image), Agent()
     settings = Settings(robots=task.robots)
     if mode == "truth":
-        outline = task.target.outline
-        target = Target("t1", task.target.name, outline.bounds, 1.0, outline, "truth")
-        workspace = Workspace(Scene(picture, (target,)), settings)
+        things = [task.target, *filter(None, [task.other])]
+        targets = tuple(
+            Target(f"t{i}", thing.name, thing.outline.bounds, 1.0, thing.outline, "truth")
+            for i, thing in enumerate(things, start=1)
+        )
+        workspace = Workspace(Scene(picture, targets), settings)
         first = User(text=task_text(task.instruction, workspace))
         return asyncio.run(agent.resume(workspace, (first,), task.instruction))
     pointed = () if mode == "words" else (_prompt(task, mode, seed),)

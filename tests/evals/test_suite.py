@@ -58,7 +58,7 @@ def test_a_users_own_folder_is_validated(tmp_path: Path) -> None:
 
 
 def test_true_outlines_are_placed_and_graded_strictly_right() -> None:
-    rows = evaluate(ONE_TARGET, "truth", 1)
+    rows = evaluate(TASKS, "truth", 1)
     assert [row.task for row in rows if not (row.strict and row.certified)] == []
 
 

@@ -74,16 +74,21 @@ def routes(
     if solid.is_empty:
         return paths
     near = float(min(distances(solid, starts).min(), distances(solid, goals).min()))
-    open_ends = list(range(len(paths)))
+    widest = _barrier(solid, radius, near, ROOM_SHARES[0])
+    straight = shapely.linestrings(np.stack([starts, goals], axis=1))
+    open_ends = [int(i) for i in np.flatnonzero(shapely.intersects(straight, widest))]
+    if not open_ends:
+        return paths
     for share in ROOM_SHARES:
-        barrier, nodes = _fence(solid, radius, near, share)
+        barrier = _barrier(solid, radius, near, share)
+        nodes = _nodes(solid, _keep(radius, near, share))
         within = nodes[shapely.intersects_xy(frame.box, nodes)]
         graph = _Visibility(within, barrier)
         open_ends = [i for i in open_ends if not _settled(paths, i, graph, barrier)]
         if not open_ends:
             return paths
-    barrier, nodes = _fence(solid, radius, near, ROOM_SHARES[-1])
-    anywhere = _Visibility(nodes, barrier)
+    barrier = _barrier(solid, radius, near, ROOM_SHARES[-1])
+    anywhere = _Visibility(_nodes(solid, _keep(radius, near, ROOM_SHARES[-1])), barrier)
     for i in open_ends:
         if not _settled(paths, i, anywhere, barrier):
             x, y = goals[i]
@@ -91,14 +96,15 @@ def routes(
     return paths
 
 
-def _fence(
-    solid: BaseGeometry, radius: float, near: float, share: float
-) -> tuple[BaseGeometry, FloatArray]:
-    """What paths must not touch, and the corners, (k, 2), they may bend around."""
-    keep = radius + share * (near - radius) if near > radius else 0.99 * near
-    barrier = solid.buffer(keep * 0.999)
+def _barrier(solid: BaseGeometry, radius: float, near: float, share: float) -> BaseGeometry:
+    """What paths must not touch: the obstacles grown by a share of the room there is."""
+    barrier = solid.buffer(_keep(radius, near, share) * 0.999)
     shapely.prepare(barrier)
-    return barrier, _nodes(solid, keep)
+    return barrier
+
+
+def _keep(radius: float, near: float, share: float) -> float:
+    return radius + share * (near - radius) if near > radius else 0.99 * near
 
 
 def _settled(paths: list[FloatArray], i: int, graph: "_Visibility", barrier: BaseGeometry) -> bool:
@@ -127,11 +133,11 @@ def _interpolated(path: FloatArray, share: float) -> FloatArray:
 def _nodes(solid: BaseGeometry, keep: float) -> FloatArray:
     """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
     dip = math.cos(math.pi / (4 * BEND_SEGMENTS))
+    grown = solid.buffer((1.01 * keep + 0.05) / dip, quad_segs=BEND_SEGMENTS)
     tolerance = 0.0
     while True:
-        reach = (1.01 * keep + 0.05 + 1.05 * tolerance) / dip
-        grown = solid.buffer(reach, quad_segs=BEND_SEGMENTS).simplify(tolerance)
-        coordinates = shapely.get_coordinates(grown)
+        coarse = grown.simplify(tolerance).buffer(1.05 * tolerance, join_style="mitre")
+        coordinates = shapely.get_coordinates(coarse)
         if len(coordinates) <= MAX_NODES:
             return np.unique(coordinates, axis=0)
         tolerance = max(1.5 * tolerance, 0.25)
