@@ -7,6 +7,7 @@ asks when the words do not settle what to do. It is no language model and sees n
 import json
 from typing import Any
 
+from ...tools.formation.contract import MAX_ROBOTS
 from ..messages import Call, History, Reply, Result, User
 from ..model import Request
 from ..task import Task, read_task
@@ -62,6 +63,8 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
         return f"Which arrangement is meant: {' or '.join(reading.relations)}?"
     if robots is None and reading.odd_count:
         return f"How many robots? {reading.odd_count!r} names no whole number above 0."
+    if robots is not None and robots > MAX_ROBOTS:
+        return f"How many robots? {robots:,} are more than the {MAX_ROBOTS:,} that can be placed."
     if not robots:
         return "How many robots? Say it in the words or with -n."
     if "between" in reading.relations and things < 2:

@@ -188,6 +188,12 @@ def test_a_count_in_the_words_is_enough() -> None:
     assert len(report.positions) == 5
 
 
+def test_more_robots_than_can_be_placed_are_asked_about() -> None:
+    report = run("Surround it with 20000 robots", pointed=[COIN])
+    assert report.status == "question"
+    assert "20,000 are more than the 10,000" in report.message
+
+
 def test_a_named_distance_becomes_the_contracts_clearance() -> None:
     report = run("Ring it with 5 robots, 14 px away", pointed=[COIN])
     assert report.contract is not None
