@@ -13,8 +13,9 @@ demo: .venv/.ready
 	@$(BIN)/formup run $(PHOTOS)/ucm_sparseresidential28.jpg "Fill the pool with 6 robots" \
 	  --box 322,261,429,388 --out $(OUT)/pool
 	@echo
-	@$(BIN)/formup run $(PHOTOS)/us_coins.jpg "Make a ring of 10 robots around the coin" \
-	  --point 245,95 --out $(OUT)/coin
+	@$(BIN)/formup run $(PHOTOS)/us_coins.jpg "Cage the largest coin" -n 10 --out $(OUT)/coin
+	@echo
+	@$(BIN)/formup run docs/images/lot.jpg "Surround the incorrectly parked car" -n 6 --out $(OUT)/lot
 
 test: .venv/.ready-dev
 	$(BIN)/pytest -q -n auto

@@ -4,10 +4,10 @@ import asyncio
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..tools.doors import TOOLS
-from ..tools.errors import InputError
+from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
 from ..tools.formation.plan import Plan
 from ..tools.perception.image import Picture
@@ -20,7 +20,7 @@ from .messages import History, Reply, Result, User
 from .model import Model
 from .models import model_named
 from .outcomes import Cancelled, Outcome, Paused, Stopped
-from .report import Report, Status, Totals, target_data
+from .report import Report, Status, Totals, candidate_choice, target_choice, target_data
 from .task import task_text
 
 MAX_INSTRUCTION = 4_000
@@ -103,10 +103,43 @@ class Agent:
         fixed = settings or Settings()
         _check(instruction, fixed.robots)
         workspace = Workspace(Scene(picture), fixed, tuple(pointed))
+        _check_candidates(workspace)
         first = User(text=task_text(instruction, workspace))
         if show is not None:
             show(first)
         return await self.resume(workspace, (first,), instruction, show)
+
+    def answer(self, asked: Run, text: str, *, show: Show | None = None) -> Run:
+        """Go on from a question with its answer; the synchronous door to `aanswer`.
+
+        Raises:
+            InputError: the run asked nothing, or the answer cannot be used.
+        """
+        return asyncio.run(self.aanswer(asked, text, show=show))
+
+    async def aanswer(self, asked: Run, text: str, *, show: Show | None = None) -> Run:
+        """Go on from a question with its answer.
+
+        Args:
+            asked: a run whose report's status is `question`; its workspace is worked on further.
+            text: what the person says; "3" or "c3" is the third candidate.
+            show: is given every new message as it comes, the answer first.
+
+        Raises:
+            InputError: the run asked nothing, or the answer cannot be used.
+        """
+        outcome = asked.outcome
+        if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
+            raise InputError(f"The run asked nothing: it is {asked.report.status}.")
+        _check_text("answer", text, "say it in words, or the number of a candidate")
+        answer = Result(call_id=outcome.call.id, name=outcome.call.name, text=text.strip())
+        if show is not None:
+            show(answer)
+        history = (*outcome.messages, answer)
+        run = await self.resume(asked.workspace, history, asked.report.instruction, show)
+        spent = asked.report.usage.seconds + run.report.usage.seconds
+        usage = run.report.usage.model_copy(update={"seconds": round(spent, 3)})
+        return replace(run, report=run.report.model_copy(update={"usage": usage}))
 
     async def resume(
         self, workspace: Workspace, messages: History, instruction: str, show: Show | None = None
@@ -129,20 +162,33 @@ class Agent:
 
 
 def _check(instruction: str, robots: int | None) -> None:
-    if not instruction.strip():
-        raise InputError(
-            'The instruction is empty; say what to do, such as "Surround the car at the corners".'
-        )
-    try:
-        instruction.encode()
-    except UnicodeEncodeError:
-        raise InputError("The instruction holds bytes that are not text in UTF-8.") from None
-    if len(instruction) > MAX_INSTRUCTION:
-        raise InputError(
-            f"The instruction has {len(instruction):,} characters; {MAX_INSTRUCTION:,} can be read."
-        )
+    example = 'say what to do, such as "Surround the car at the corners"'
+    _check_text("instruction", instruction, example)
     if robots is not None and not 1 <= robots <= MAX_ROBOTS:
         raise InputError(f"{robots} robots cannot be placed; 1 to {MAX_ROBOTS:,} can.")
+
+
+def _check_text(name: str, text: str, advice: str) -> None:
+    if not text.strip():
+        raise InputError(f"The {name} is empty; {advice}.")
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"The {name} holds bytes that are not text in UTF-8.") from None
+    if len(text) > MAX_INSTRUCTION:
+        raise InputError(
+            f"The {name} has {len(text):,} characters; {MAX_INSTRUCTION:,} can be read."
+        )
+
+
+def _check_candidates(workspace: Workspace) -> None:
+    """Candidates pointed at must be there; the picture is searched only if there are some."""
+    try:
+        for prompt in workspace.pointed:
+            if prompt.candidate is not None:
+                workspace.candidate(prompt.candidate)
+    except ToolError as error:
+        raise InputError(str(error)) from None
 
 
 def _report(
@@ -209,13 +255,14 @@ def _last_words(outcome: Outcome) -> str:
 
 
 def _candidates(outcome: Outcome, workspace: Workspace) -> tuple[dict[str, object], ...] | None:
+    """What a question offers, in its order; ids that mean nothing are left out."""
     if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
         return None
     named = outcome.call.arguments.get("candidates", ())
-    found = [
-        workspace.scene.target(n) for n in named if n in {t.id for t in workspace.scene.targets}
-    ]
-    return tuple({"id": t.id, "label": t.label, "box": list(t.box)} for t in found)
+    known = {t.id: target_choice(t) for t in workspace.scene.targets}
+    if any(n not in known for n in named):
+        known |= {c.id: candidate_choice(c) for c in workspace.candidates()}
+    return tuple(known[n] for n in named if n in known)
 
 
 def _totals(messages: History, seconds: float) -> Totals:

@@ -7,7 +7,8 @@ from pydantic import BaseModel, ConfigDict
 from ..tools.fleet.deploy import Arrival
 from ..tools.formation.contract import Contract
 from ..tools.formation.verdict import Verdict
-from ..tools.scene import Target
+from ..tools.perception.attributes import Candidate
+from ..tools.scene import Box, Target
 from ..tools.store import rings
 
 Status = Literal[
@@ -74,9 +75,31 @@ def target_data(target: Target) -> dict[str, Any]:
     return {
         "id": target.id,
         "label": target.label,
-        "box": [round(v, 1) for v in target.box],
+        "box": _box(target.box),
         "confidence": target.confidence,
         "parts": dict(target.parts),
         "outline": outline,
         "holes": holes,
     }
+
+
+def target_choice(target: Target) -> dict[str, Any]:
+    """A target as a question offers it."""
+    return {"id": target.id, "label": target.label, "box": _box(target.box)}
+
+
+def candidate_choice(candidate: Candidate) -> dict[str, Any]:
+    """A candidate as a question offers it."""
+    seen = candidate.attributes
+    return {
+        "id": candidate.id,
+        "label": candidate.label,
+        "box": _box(candidate.outline.bounds),
+        "colour": seen.colour,
+        "shape": seen.shape,
+        "area_px": round(seen.area),
+    }
+
+
+def _box(box: Box) -> list[float]:
+    return [round(v, 1) for v in box]

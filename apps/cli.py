@@ -6,7 +6,7 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
-from ..agent.agent import Agent
+from ..agent.agent import Agent, Run
 from ..agent.report import Report
 from ..prompts import PromptError, load_prompt
 from ..tools.errors import InputError
@@ -15,7 +15,10 @@ from ..tools.workspace import Settings
 from . import evaluate, inputs, plans, tools
 from . import options as o
 from .output import Folder, Trace, write_files
-from .screen import show_report
+from .screen import ask, at_terminal, show_report
+
+MOST_ANSWERS = 5
+"""Questions answered in one run at a terminal."""
 
 app = typer.Typer(
     name="formup",
@@ -38,6 +41,7 @@ def run(
     point: o.Points = None,
     box: o.Boxes = None,
     outline: o.Outlines = None,
+    target: o.Candidates = None,
     plan_only: o.PlanOnly = False,
     as_json: o.Json = False,
     out: o.Out = None,
@@ -66,17 +70,28 @@ def run(
         may_deploy=not plan_only,
     )
     settings.check()
-    pointed = inputs.pointed(point or [], box or [], outline or [])
+    pointed = inputs.pointed(point or [], box or [], outline or [], target or [])
     agent, picture = _agent(model, prompt), load_picture(image)
     folder, trace = Folder(out), Trace()
     try:
         result = agent.run(picture, instruction, pointed=pointed, settings=settings, show=trace)
-        files = write_files(folder, result, image, trace)
+        report = _told(folder, result, image, trace, as_json)
+        for _ in range(0 if as_json or not at_terminal() else MOST_ANSWERS):
+            if report.status != "question" or not (text := ask()):
+                break
+            result = agent.answer(result, text, show=trace)
+            report = _told(folder, result, image, trace, as_json)
     finally:
         folder.remove_if_empty()
+    raise typer.Exit(report.exit_code)
+
+
+def _told(folder: Folder, result: Run, image: Path, trace: Trace, as_json: bool) -> Report:
+    """The report with its files, written and printed."""
+    files = write_files(folder, result, image, trace)
     report = result.report.model_copy(update={"files": files})
     _print(report, folder.path, as_json)
-    raise typer.Exit(report.exit_code)
+    return report
 
 
 def _agent(model: str, prompt: str | None) -> Agent:

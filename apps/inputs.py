@@ -17,6 +17,9 @@ from ..tools.store import read_text
 from ..tools.tool import violations
 from ..tools.workspace import Descriptor
 
+MAX_SPAN = 10_000
+"""Seeds in one run."""
+
 
 def robots(text: str | None) -> int | None:
     """A number of robots.
@@ -42,6 +45,26 @@ def whole(name: str, text: str, *, least: int, most: int = 1_000_000) -> int:
             f"{name} {text!r} cannot be used; give a whole number from {least} to {most:,}."
         )
     return value
+
+
+def span(name: str, text: str) -> tuple[int, int]:
+    """First and last of a range of whole numbers, A-B or A alone.
+
+    Raises:
+        InputError: no such range, or one of more than 10,000.
+    """
+    first, dash, last = text.strip().partition("-")
+    if not dash:
+        last = first
+    numbers = [
+        int(n) if n.isascii() and n.isdecimal() and len(n) < 10 else -1 for n in (first, last)
+    ]
+    if not 0 <= numbers[0] <= numbers[1] < numbers[0] + MAX_SPAN:
+        raise InputError(
+            f"{name} {text!r} cannot be used; give first and last seed, 0 or more, such as 0-199 "
+            f"({MAX_SPAN:,} at most)."
+        )
+    return numbers[0], numbers[1]
 
 
 def length(name: str, text: str | None) -> float | None:
@@ -84,11 +107,13 @@ def descriptor(text: str) -> Descriptor:
     raise InputError(f"Unknown descriptor {text!r}. There are: {', '.join(get_args(Descriptor))}.")
 
 
-def pointed(points: list[str], boxes: list[str], outlines: list[str]) -> tuple[TargetPrompt, ...]:
-    """What was pointed at, as t1, t2, ...: points first, then boxes, then outlines.
+def pointed(
+    points: list[str], boxes: list[str], outlines: list[str], candidates: list[str]
+) -> tuple[TargetPrompt, ...]:
+    """What was pointed at, as t1, t2, ...: points, then boxes, then outlines, then candidates.
 
     Raises:
-        InputError: not numbers, or not as many as are needed.
+        InputError: not numbers, not as many as are needed, or no id of a candidate.
     """
     found: list[dict[str, object]] = []
     for text in points:
@@ -109,6 +134,8 @@ def pointed(points: list[str], boxes: list[str], outlines: list[str]) -> tuple[T
                 "X1,Y1,X2,Y2,..."
             )
         found.append({"outline": tuple(zip(values[::2], values[1::2], strict=True))})
+    for text in candidates:
+        found.append({"candidate": _candidate(text)})
     try:
         return tuple(
             TargetPrompt.model_validate({"id": f"t{i}", **prompt})
@@ -142,6 +169,15 @@ def starts(path: Path | None) -> FloatArray | None:
             f"--starts {path} must hold one x,y a line, or JSON [[x, y], ...], in pixels."
         )
     return values
+
+
+def _candidate(text: str) -> str:
+    known = re.fullmatch(r"[cC]?([1-9][0-9]{0,3})", text.strip(), re.ASCII)
+    if known is None:
+        raise InputError(
+            f"--target {text!r} cannot be read; give a candidate's id such as c3, or its number."
+        )
+    return f"c{known[1]}"
 
 
 def _number(text: str) -> float | None:

@@ -19,6 +19,10 @@ Outlines = Annotated[
     list[str] | None,
     typer.Option("--outline", help="X1,Y1,X2,Y2,...: 3 to 30 rough vertices; repeatable."),
 ]
+Candidates = Annotated[
+    list[str] | None,
+    typer.Option("--target", help="A thing found in the picture, such as c3; repeatable."),
+]
 PlanOnly = Annotated[bool, typer.Option("--plan-only", help="Certify a plan but move nothing.")]
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; default: formup-runs/TIME.")
@@ -55,3 +59,7 @@ Mode = Annotated[
 ]
 JsonFile = Annotated[Path | None, typer.Option("--out", help="Where to write the rows as JSON.")]
 Seeds = Annotated[str, typer.Option("--seeds", help="Jitters of every task.")]
+SceneSeeds = Annotated[str, typer.Option("--seeds", help="First and last seed: 0-199.")]
+KeepFolder = Annotated[
+    Path | None, typer.Option("--keep", help="Keep pictures and annotations.json here.")
+]

@@ -15,6 +15,7 @@ from ..agent.messages import Reply, Result, User
 from ..tools.draw import draw_deployment, draw_look, draw_plan, save_gif
 from ..tools.errors import InputError
 from ..tools.formation.plan import Plan
+from ..tools.scene import Scene
 from ..tools.store import store, write_whole
 from ..tools.workspace import Workspace
 
@@ -27,6 +28,7 @@ class Folder:
 
     def __init__(self, path: Path | None) -> None:
         self.path = path or _fresh(Path("formup-runs"))
+        self._drawn: set[str] = set()
         try:
             self._made = not self.path.exists()
             self.path.mkdir(parents=True, exist_ok=True)
@@ -38,6 +40,21 @@ class Folder:
             raise InputError(
                 f"The output folder {self.path} cannot be written: {why}; give another with --out."
             ) from None
+
+    def draw(self, name: str, image: Any) -> str:
+        """Write a picture and return its name."""
+        buffer = io.BytesIO()
+        image.save(buffer, "PNG")
+        write_whole(self.path / name, buffer.getvalue())
+        self._drawn.add(name)
+        return name
+
+    def drop_pictures_but(self, name: str | None) -> None:
+        """Remove the pictures drawn earlier in this run, before a question was answered."""
+        stale = {old for old in self._drawn if old != name}
+        for old in stale:
+            (self.path / old).unlink(missing_ok=True)
+        self._drawn -= stale
 
     def remove_if_empty(self) -> None:
         """Leave no empty folder behind when nothing came of the run."""
@@ -85,17 +102,30 @@ def write_files(
     if plan is not None:
         stored = store(workspace, image, plan_id=plan.id, instruction=title)
         write_whole(folder.path / "plan.json", stored.model_dump_json(indent=1).encode())
-        write_whole(folder.path / "plan.png", _png(draw_plan(workspace.scene, plan, title)))
-        files |= {"plan": "plan.json", "picture": "plan.png"}
+        files["plan"] = "plan.json"
         if animate(folder.path / "deploy.gif", workspace, plan, title):
             files["animation"] = "deploy.gif"
+    if report.candidates:
+        files["picture"] = folder.draw("question.png", _choices(run))
+    elif plan is not None:
+        files["picture"] = folder.draw("plan.png", draw_plan(workspace.scene, plan, title))
     elif workspace.scene.targets or workspace.doubted:
         scene = workspace.scene
         shown = scene.with_target(workspace.doubted) if workspace.doubted else scene
-        write_whole(folder.path / "found.png", _png(draw_look(shown)))
-        files["picture"] = "found.png"
+        files["picture"] = folder.draw("found.png", draw_look(shown))
+    folder.drop_pictures_but(files["picture"])
     write_whole(folder.path / "trace.jsonl", trace.text())
     return files
+
+
+def _choices(run: Run) -> Any:
+    """The picture with what a question offers and nothing else."""
+    workspace = run.workspace
+    asked = [choice["id"] for choice in run.report.candidates or ()]
+    targets = tuple(t for t in workspace.scene.targets if t.id in asked)
+    named = {t.id for t in targets}
+    candidates = [workspace.candidate(name) for name in asked if name not in named]
+    return draw_look(Scene(workspace.scene.picture, targets), candidates=candidates)
 
 
 def animate(path: Path, workspace: Workspace, plan: Plan, title: str) -> bool:
@@ -107,12 +137,6 @@ def animate(path: Path, workspace: Workspace, plan: Plan, title: str) -> bool:
     by_place = [poses[takes] for poses in frames]  # numbered as in the plan
     save_gif(draw_deployment(workspace.scene, plan, by_place, title), path)
     return True
-
-
-def _png(image: Any) -> bytes:
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG")
-    return buffer.getvalue()
 
 
 def _fresh(parent: Path) -> Path:

@@ -1,6 +1,8 @@
 """A run on the terminal: what was found, the contract, its certificate, the arrival table."""
 
 import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -56,9 +58,25 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     console.print(
         Text.assemble((f"{report.status}: ", STATUS_STYLE[report.status]), report.message)
     )
+    if report.candidates:
+        _choices(console, report.candidates)
     written = [name for name in (report.files or {}).values() if name]
     if written:
         _line(console, "files", f"{folder}/ {', '.join(written)}")
+
+
+def at_terminal() -> bool:
+    """Whether a person reads and can answer."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def ask() -> str:
+    """The person's answer to the question just shown; empty to leave it open."""
+    print("your answer (Enter leaves it open): ", end="", flush=True)  # noqa: T201
+    line = sys.stdin.buffer.readline()  # not input(): it chokes on bytes that are no text
+    if not line.endswith(b"\n"):
+        print()  # noqa: T201
+    return line.decode(errors="replace").strip()
 
 
 def say_failed(message: str) -> None:
@@ -74,6 +92,17 @@ def say_failed(message: str) -> None:
 
 def _line(console: Console, name: str, text: str) -> None:
     console.print(Text.assemble((f"{name:>12}  ", "cyan"), text))
+
+
+def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
+    """What a question offers; candidates by the number they bear in the picture."""
+    table = Table(box=None, padding=(0, 2), pad_edge=False, header_style="cyan")
+    for title in ("number", "looks like", "box"):
+        table.add_column(title, justify="right" if title == "number" else "left")
+    for choice in candidates:
+        box = ", ".join(f"{v:.0f}" for v in choice["box"])
+        table.add_row(choice["id"].removeprefix("c"), Text(choice["label"]), box)
+    console.print(table)
 
 
 def _group(group: Group) -> str:

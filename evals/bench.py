@@ -32,6 +32,8 @@ SIZE = (1920, 1080)
 REPEATS = 5
 ROBOTS, INSIDE, PROBES = 24, 24, 1000
 Work = Callable[[], object]
+Case = tuple[str, dict[str, Any], tuple[str, Work]]
+"""What is called, its arguments, and the bare calls in words and as a function."""
 
 
 def main() -> None:
@@ -40,7 +42,7 @@ def main() -> None:
     print(f"{SIZE[0]} x {SIZE[1]} px, CPU milliseconds, best of {REPEATS}")  # noqa: T201
     print(f"{'tool':20} {'formup':>9} {'bare':>9} {'ratio':>7}  bare calls")  # noqa: T201
     for name, arguments, (words, bare) in _cases(workspace):
-        tool = next(t for t in TOOLS if t.name == name)
+        tool = next(t for t in TOOLS if t.name == name.partition(" ")[0])
 
         def call(tool: Any = tool, arguments: dict[str, Any] = arguments) -> object:
             return asyncio.run(tool.call(_anew(workspace), arguments))
@@ -63,7 +65,8 @@ def _best(work: Work) -> float:
 def _anew(workspace: Workspace) -> Workspace:
     """The workspace with outlines that have nothing computed and kept from an earlier call."""
     targets = (replace(t, outline=outline_of(t.outline.polygon)) for t in workspace.scene.targets)
-    return replace(workspace, scene=replace(workspace.scene, targets=tuple(targets)))
+    scene = replace(workspace.scene, targets=tuple(targets))
+    return replace(workspace, scene=scene, found=None)
 
 
 def _workspace() -> Workspace:
@@ -83,18 +86,15 @@ def _workspace() -> Workspace:
     return replace(workspace, pointed=(TargetPrompt(id="t3", box=box),))  # for locate_object
 
 
-def _cases(workspace: Workspace) -> list[tuple[str, dict[str, Any], tuple[str, Work]]]:
+def _cases(workspace: Workspace) -> list[Case]:
     box = [round(v) for v in workspace.scene.target("t1").box]
     group = {"relation": "around", "targets": ["t1"], "robots": ROBOTS}
     probes = np.random.default_rng(0).uniform((0, 0), SIZE, (PROBES, 2))
     propose = next(t for t in TOOLS if t.name == "propose_formation")
     plan = asyncio.run(propose.call(workspace, {"contract": {"groups": [group]}})).data["plan_id"]
     points = workspace.plans[plan].formation.points
-    cut = ("bilateral, 5 x GrabCut at 160 px", lambda: _bare_segment(workspace, box))
     return [
-        ("look", {}, ("Pillow resize, PNG", lambda: _bare_look(workspace))),
-        ("locate_object", {}, cut),
-        ("segment", {"id": "t1", "box": box}, cut),
+        *_seeing_cases(workspace, box),
         (
             "describe_shape",
             {"target": "t1"},
@@ -134,6 +134,20 @@ def _cases(workspace: Workspace) -> list[tuple[str, dict[str, Any], tuple[str, W
     ]
 
 
+def _seeing_cases(workspace: Workspace, box: list[int]) -> list[Case]:
+    cut = ("bilateral, 5 x GrabCut at 160 px", lambda: _bare_segment(workspace, box))
+    return [
+        ("look", {}, ("Pillow resize, PNG", lambda: _bare_look(workspace))),
+        ("locate_object", {}, cut),
+        (
+            "locate_object query",
+            {"query": {"colours": ["red"], "picks": [{"by": "largest"}]}},
+            ("k-means, 150 thresholds at 384 px, contours", lambda: _bare_candidates(workspace)),
+        ),
+        ("segment", {"id": "t1", "box": box}, cut),
+    ]
+
+
 def _bare_look(workspace: Workspace) -> bytes:
     buffer = io.BytesIO()
     image = Image.fromarray(workspace.scene.picture.pixels)
@@ -158,6 +172,26 @@ def _bare_segment(workspace: Workspace, box: list[int]) -> object:
         model = np.zeros((1, 65)), np.zeros((1, 65))
         cv2.grabCut(smooth, labels, (0, 0, 1, 1), *model, 4, cv2.GC_INIT_WITH_MASK)
     return labels
+
+
+def _bare_candidates(workspace: Workspace) -> int:
+    """The regions of every threshold of three channels and of the distances to nine colours."""
+    small = cv2.resize(workspace.scene.picture.pixels[::2, ::2], (384, 216))
+    smooth = cv2.bilateralFilter(small, 7, 40, 5).astype(np.float32)
+    lab = np.asarray(cv2.cvtColor(smooth / 255, cv2.COLOR_RGB2LAB))
+    cues = [lab[..., k] for k in range(3)]
+    for count in (3, 6):
+        stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 12, 1.0)
+        sample, none = lab.reshape(-1, 3)[::16], np.empty(0, np.int32)
+        _, _, centres = cv2.kmeans(sample, count, none, stop, 1, cv2.KMEANS_PP_CENTERS)
+        cues += [np.linalg.norm(lab - c, axis=2) for c in np.asarray(centres)]
+    found = 0
+    for cue in cues:
+        for level in np.quantile(cue, np.linspace(0.02, 0.98, 12)):
+            above = (cue > level).astype(np.uint8)
+            cv2.connectedComponentsWithStats(above, connectivity=4)
+            found += len(cv2.findContours(above, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)[0])
+    return found
 
 
 def _bare_describe(workspace: Workspace) -> Work:

@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from itertools import permutations
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -27,22 +28,36 @@ from ..tools.perception.prompts import TargetPrompt
 from ..tools.scene import Scene, Target
 from ..tools.workspace import Settings, Workspace
 from .grade import grade
-from .suite import Task
+from .suite import Task, Thing
 
 Mode = Literal["truth", "outline", "box", "point", "words"]
 JITTERED = ("outline", "box", "point")
+ORDER = (
+    *("general", "infill", "caging"),
+    *("single", "multi", "hidden"),
+    *("known words", "fresh words"),
+)
+SAME = 0.5
 BOX_JITTER, OUTLINE_JITTER, OUTLINE_VERTICES = 0.08, 0.04, 12
 
 
 @dataclass(frozen=True)
 class Row:
-    """One task under one jitter: what was asked, what came of it, and how it was graded."""
+    """One task under one jitter: what was asked, what came of it, and how it was graded.
+
+    `right` says whether the thing robots were placed about is the one meant: outlines that
+    overlap by more than half (intersection over union); None where nothing was placed.
+    """
 
     task: str
     mode: Mode
     seed: int
     category: str
+    setup: str
+    referring: str
+    wording: str
     status: str
+    right: bool | None
     success: bool
     strict: bool
     certified: bool
@@ -82,10 +97,13 @@ def evaluate(
 
 
 def summary(rows: list[Row]) -> dict[str, dict[str, float | None]]:
-    """Per category and in total: runs, success, strict success, mean IoU, share answered."""
-    groups = {c: [r for r in rows if r.category == c] for c in ("general", "infill", "caging")}
-    groups["total"] = rows
-    return {name: _means(group) for name, group in groups.items() if group}
+    """Per category, setup and wording and in total: what `_means` tells of the rows."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        for name in filter(None, (row.category, row.setup, row.wording and f"{row.wording} words")):
+            groups.setdefault(name, []).append(row)
+    ordered = [name for name in ORDER if name in groups]
+    return {name: _means(groups[name]) for name in ordered} | {"total": _means(rows)}
 
 
 def as_json(row: Row) -> dict[str, object]:
@@ -94,13 +112,18 @@ def as_json(row: Row) -> dict[str, object]:
 
 
 def _means(rows: list[Row]) -> dict[str, float | None]:
+    """Runs; shares placed, successful and strictly so; of those placed, about the right thing
+    and successful; mean IoU of what was segmented."""
     known = [row.iou for row in rows if row.iou is not None]
+    placed = [row for row in rows if row.right is not None]
     return {
         "runs": len(rows),
+        "placed": len(placed) / len(rows),
         "success": float(np.mean([row.success for row in rows])),
         "strict": float(np.mean([row.strict for row in rows])),
+        "right_of_placed": float(np.mean([bool(r.right) for r in placed])) if placed else None,
+        "success_of_placed": float(np.mean([r.success for r in placed])) if placed else None,
         "iou": float(np.mean(known)) if known else None,
-        "placed": float(np.mean([row.status == "deployed" for row in rows])),
     }
 
 
@@ -109,17 +132,22 @@ def _row(task: Task, mode: Mode, seed: int) -> Row:
     report = run.report
     placed = report.arrival.observed if report.arrival and report.arrival.arrived else None
     graded = grade(task, placed)
-    target = run.workspace.scene.targets[0] if run.workspace.scene.targets else None
+    targets = run.workspace.scene.targets
+    target = targets[0] if targets else None
     return Row(
         task=task.id,
         mode=mode,
         seed=seed,
         category=task.category,
+        setup=task.setup,
+        referring=task.referring,
+        wording=task.wording,
         status=report.status,
+        right=None if placed is None else _right([t.outline.polygon for t in targets], task),
         success=graded.success,
         strict=graded.strict,
         certified=report.verdict is not None and report.verdict.certified,
-        iou=None if target is None else round(_iou(target.outline.polygon, task), 4),
+        iou=None if target is None else round(_iou(target.outline.polygon, task.target), 4),
         confidence=None if target is None else target.confidence,
         failures=graded.failures + graded.strict_failures,
         message=report.message,
@@ -183,9 +211,19 @@ def _few_vertices(task: Task) -> FloatArray:
         tolerance *= 1.15
 
 
-def _iou(polygon: Polygon, task: Task) -> float:
-    truth = shapely.make_valid(Polygon(task.target.polygon, task.target.holes))
+def _iou(polygon: Polygon, thing: Thing) -> float:
+    truth = shapely.make_valid(Polygon(thing.polygon, thing.holes))
     return float(polygon.intersection(truth).area / polygon.union(truth).area)
+
+
+def _right(found: list[Polygon], task: Task) -> bool:
+    """Whether the things found are those meant, in either order where there are two."""
+    meant = [task.target, *filter(None, [task.other])]
+    return any(
+        all(_iou(polygon, thing) > SAME for polygon, thing in zip(order, meant, strict=True))
+        for order in permutations(found)
+        if len(order) == len(meant)
+    )
 
 
 @lru_cache(maxsize=4)

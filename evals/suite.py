@@ -47,6 +47,8 @@ class Task:
     target: Thing
     success: dict[str, Any] = field(repr=False)
     other: Thing | None = None
+    referring: str = ""
+    wording: str = ""
 
 
 def photos_folder() -> Path:
@@ -118,6 +120,8 @@ def _tasks(entry: dict[str, Any], root: Path) -> list[Task]:
                 target=things[task["target"]],
                 success=task["success"],
                 other=things[named[1]] if len(named) > 1 else None,
+                referring=task.get("referring", ""),
+                wording=task.get("wording", ""),
             )
         )
     return tasks

@@ -30,7 +30,8 @@ COMMANDS = [
 
 @pytest.mark.parametrize(("page", "code"), blocks("python"))
 def test_python_blocks_run(page: str, code: str, tmp_path: Path) -> None:
-    (tmp_path / "evals").symlink_to(ROOT / "evals")
+    for folder in ("evals", "docs"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
     command = [sys.executable, "-W", "error", "-c", code]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -39,7 +40,8 @@ def test_python_blocks_run(page: str, code: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands_run_as_written(command: str, tmp_path: Path) -> None:
-    (tmp_path / "evals").symlink_to(ROOT / "evals")
+    for folder in ("evals", "docs"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
     arguments = [sys.executable, "-m", *shlex.split(command)]
     done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

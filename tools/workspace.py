@@ -5,6 +5,7 @@ target id means the same in the next call.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -15,7 +16,9 @@ from .formation.contract import Contract
 from .formation.motion import obstacles
 from .formation.place import Site
 from .formation.plan import Plan
-from .geometry.outline import FloatArray
+from .geometry.outline import FloatArray, Outline
+from .perception.attributes import Candidate
+from .perception.candidates import find_candidates, segment_candidate
 from .perception.contours import outline_of_mask
 from .perception.prompts import TargetPrompt
 from .perception.segmenters import segmenter_named
@@ -72,6 +75,7 @@ class Workspace:
         pointed: what the person pointed at, in order t1, t2, ...
         samples: positions kept by the sampling tools under s1, s2, ...
         doubted: what was found last with too little confidence, for a person to look at.
+        found: what was found in the picture, once somebody has asked.
         arrivals: by plan id, what was observed after a deployment, and the way there.
     """
 
@@ -81,6 +85,7 @@ class Workspace:
     plans: dict[str, Plan] = field(default_factory=dict[str, Plan])
     samples: dict[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     doubted: Target | None = None
+    found: tuple[Candidate, ...] | None = None
     arrivals: dict[str, Arrival] = field(default_factory=dict[str, Arrival])
     frames: dict[str, list[FloatArray]] = field(default_factory=dict[str, list[FloatArray]])
 
@@ -100,12 +105,9 @@ class Workspace:
         problems = prompt.problems(picture.width, picture.height)
         if problems:
             raise ToolError(" ".join(problems))
-        segmenter = segmenter_named(self.settings.segmenter)
-        found = segmenter.run(picture.pixels, prompt)
-        chosen = self.settings.threshold
-        threshold = segmenter.thresholds[prompt.how] if chosen is None else chosen
+        threshold = self.threshold(prompt.how)
         try:
-            outline = outline_of_mask(found.mask)
+            outline, confidence, parts = self._measured(prompt)
         except InputError as error:
             text = f"Insufficient segmentation accuracy. {error} {ADVICE[prompt.how]}"
             raise ToolError(text) from None
@@ -113,16 +115,50 @@ class Workspace:
             id=prompt.id,
             label=prompt.label or "the thing pointed at",
             box=outline.bounds,
-            confidence=round(found.confidence, 3),
+            confidence=round(confidence, 3),
             outline=outline,
             prompt=prompt.how,
-            parts=tuple((name, round(value, 3)) for name, value in found.parts.items()),
+            parts=tuple((name, round(value, 3)) for name, value in parts.items()),
         )
-        if found.confidence < threshold:
+        if confidence < threshold:
             self.doubted = target
-            raise ToolError(_insufficient(found.confidence, threshold, prompt.how))
+            raise ToolError(_insufficient(confidence, threshold, prompt.how))
         self.scene = self.scene.with_target(target)
         return target
+
+    def threshold(self, how: str) -> float:
+        """The least confidence a mask pointed at in that way is used at."""
+        chosen = self.settings.threshold
+        usual = segmenter_named(self.settings.segmenter).thresholds
+        return usual[how] if chosen is None else chosen
+
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The things in the picture, found when first asked for."""
+        if self.found is None:
+            self.found = find_candidates(self.scene.picture.pixels)
+        return self.found
+
+    def candidate(self, name: str) -> Candidate:
+        """The candidate with an id.
+
+        Raises:
+            ToolError: there is none; the text says which there are.
+        """
+        found = self.candidates()
+        for candidate in found:
+            if candidate.id == name:
+                return candidate
+        known = f"c1 to c{len(found)}" if found else "none: nothing stands out in this picture"
+        raise ToolError(f"There is no candidate {name!r}. Candidates: {known}.")
+
+    def _measured(self, prompt: TargetPrompt) -> tuple[Outline, float, Mapping[str, float]]:
+        """Outline, confidence and its parts."""
+        segmenter, pixels = segmenter_named(self.settings.segmenter), self.scene.picture.pixels
+        if prompt.candidate is None:
+            found = segmenter.run(pixels, prompt)
+            return outline_of_mask(found.mask), found.confidence, found.parts
+        candidate = self.candidate(prompt.candidate)
+        return segment_candidate(lambda p: segmenter.run(pixels, p), candidate)
 
     def keep_sample(self, points: FloatArray) -> str:
         """Store sampled positions, (n, 2), and name them."""
@@ -169,6 +205,7 @@ class Workspace:
 
 ADVICE = {
     "point": "Draw a box close around the thing, or better a rough outline.",
+    "candidate": "Draw a rough outline of 4 to 12 vertices around the thing.",
     "box": "Draw a rough outline of 4 to 12 vertices around the thing.",
     "outline": "Draw the outline closer, or name points that do not belong; if what was found "
     "looks right, allow a lower threshold.",

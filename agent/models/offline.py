@@ -1,7 +1,7 @@
 """The offline planner: rules in a model's place, so that everything runs with no key and no GPU.
 
-It reads the arrangement from a phrase table, points tools at what the person pointed at, and
-asks when the words do not settle what to do. It is no language model and sees no picture.
+It reads the arrangement and the thing meant from phrase tables, has tools measure them, and
+asks when the words do not settle what to do. It is no language model: it sees measures only.
 """
 
 import json
@@ -11,8 +11,12 @@ from ...tools.formation.contract import MAX_ROBOTS
 from ..messages import Call, History, Reply, Result, User
 from ..model import Request
 from ..task import Task, read_task
+from .refer import Reading as Words
+from .refer import references
 from .understand import Reading, understand
+from .which import Step, find, located_reasons
 
+MAX_LABEL = 100
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 
 
@@ -35,21 +39,52 @@ class OfflinePlanner:
 
 
 def _begin(task: Task, history: History) -> Reply:
-    """Propose a formation, or ask for what is missing."""
-    answers = [m.text for m in history if isinstance(m, Result) and m.name == "ask_user"]
-    reading = understand(". ".join([task.instruction, *answers]))
+    """Propose a formation, or find and ask what is missing."""
+    pointed = bool(_target_ids(task))
+    spoken = Words((), task.instruction) if pointed else references(task.instruction)
+    answers = _spoken_answers(history)
+    reading = understand(". ".join([spoken.rest, *answers]))
     bare = [int(a) for a in answers if a.strip().isascii() and a.strip().isdecimal()]
     robots = task.robots or reading.robots or next(iter(bare), None)
     question = _open_question(task, reading, robots)
     if question or robots is None:
         return _call(history, "ask_user", {"question": question or "How many robots?"})
+    things = 2 if "between" in reading.relations else 1
     prompts = [p for p in task.pointed if p["id"] not in task.targets]
-    arguments = {"contract": {"groups": [_group(task, reading, robots)]}, "targets": prompts}
+    if not pointed:
+        found = find(spoken.things, things, history)
+        if isinstance(found, Step):
+            return _call(history, found.name, found.arguments)
+        prompts = [
+            {"id": f"t{i}", "candidate": f.candidate, "label": _label(f.said)}
+            for i, f in enumerate(found, start=1)
+        ]
+    ids = list(dict.fromkeys([*task.targets, *(p["id"] for p in prompts)]))
+    group = _group(reading, robots, ids[:things])
+    arguments = {"contract": {"groups": [group]}, "targets": prompts}
     return _call(history, "propose_formation", arguments)
 
 
+def _spoken_answers(history: History) -> list[str]:
+    """Answers in words and numbers of robots, not those that choose a candidate."""
+    offered = {
+        c.id
+        for m in history
+        if isinstance(m, Reply)
+        for c in m.calls
+        if c.arguments.get("candidates")
+    }
+    asked = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
+    return [m.text for m in asked if m.call_id not in offered]
+
+
+def _label(said: str) -> str:
+    """What a thing is called: the words for it without their article."""
+    return said.split(" ", 1)[-1][:MAX_LABEL]
+
+
 def _open_question(task: Task, reading: Reading, robots: int | None) -> str | None:
-    """What has to be asked first, or None."""
+    """What has to be asked before a thing is looked for, or None."""
     things = len(_target_ids(task))
     if reading.beyond:
         said = " and ".join(reading.beyond)
@@ -67,25 +102,20 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
         return f"How many robots? {robots:,} are more than the {MAX_ROBOTS:,} that can be placed."
     if not robots:
         return "How many robots? Say it in the words or with -n."
-    if "between" in reading.relations and things < 2:
+    if "between" in reading.relations and things == 1:
         return "Between which two things? Point at both: --point X,Y --point X,Y."
     used = 2 if "between" in reading.relations else 1
     if things > used:
         named = ", ".join(_target_ids(task))
         return f"{things} things were pointed at ({named}), the arrangement is about {used}. Which?"
-    if things == 0:
-        return (
-            "Which thing is meant? The offline planner does not see: point at it with "
-            "--point X,Y, --box X0,Y0,X1,Y1 or --outline X1,Y1,X2,Y2,..."
-        )
     return None
 
 
-def _group(task: Task, reading: Reading, robots: int) -> dict[str, Any]:
+def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
     (relation,) = reading.relations
     group: dict[str, Any] = {
         "relation": relation,
-        "targets": _target_ids(task)[: 2 if relation == "between" else 1],
+        "targets": targets,
         "robots": robots,
         "fit": reading.fit,
         "spacing": "even" if relation == "cage" else reading.spacing,
@@ -114,14 +144,14 @@ def _after_proposal(task: Task, result: Result, history: History) -> Reply:
         return _call(history, "report_impossible", arguments)
     if task.deploy:
         return _call(history, "deploy", {"plan_id": plan["plan_id"]})
-    return Reply(text=f"{_planned(plan)} Nothing was moved.")
+    return Reply(text=f"{_planned(plan, history)} Nothing was moved.")
 
 
 def _after_deploy(task: Task, result: Result, history: History) -> str:
     proposal = next(
         m for m in reversed(history) if isinstance(m, Result) and m.name == "propose_formation"
     )
-    planned = _planned(json.loads(proposal.text))
+    planned = _planned(json.loads(proposal.text), history)
     if result.error:
         return f"{planned} {result.text}"
     arrival = json.loads(result.text)
@@ -136,9 +166,23 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
     )
 
 
-def _planned(plan: dict[str, Any]) -> str:
+def _planned(plan: dict[str, Any], history: History) -> str:
     noun = "robot has a certified place" if plan["robots"] == 1 else "robots have certified places"
-    return " ".join([f"{plan['robots']} {noun} (plan {plan['plan_id']}).", *plan["notes"]])
+    placed = f"{plan['robots']} {noun} (plan {plan['plan_id']})."
+    return " ".join([*_taken(history), placed, *plan["notes"]])
+
+
+def _taken(history: History) -> list[str]:
+    """Which candidates were taken for the things meant, and why."""
+    proposals = [c for m in history if isinstance(m, Reply) for c in m.calls]
+    prompts = [p for p in proposals[::-1] if p.name == "propose_formation"][0].arguments["targets"]
+    reasons = located_reasons(history)
+    return [
+        f"Took {p['candidate']} for the {p.get('label') or 'thing chosen'}"
+        + (f": {'; '.join(reasons[p['candidate']])}." if reasons.get(p["candidate"]) else ".")
+        for p in prompts
+        if p.get("candidate")
+    ]
 
 
 def _call(history: History, name: str, arguments: dict[str, Any]) -> Reply:

@@ -128,7 +128,7 @@ def test_terminal_output_names_what_a_person_needs(tmp_path: Path) -> None:
         ("Do something nice", CAR_BOX, "arrangement"),
         ("Surround the car", CAR_BOX, "How many"),
         ("Surround the car with many robots", CAR_BOX, "many robots"),
-        ("Surround the car", ("-n", 4), "point at it"),
+        ("Surround the car", ("-n", 4), "Which one is"),
         ("Stand between the cars", ("-n", 4, *CAR_BOX), "two things"),
         ("Ring the car and fill it", ("-n", 4, *CAR_BOX), "or"),
     ],

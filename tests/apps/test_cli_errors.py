@@ -97,6 +97,14 @@ def test_no_number_of_robots(cli: Cli, picture: Path, count: str) -> None:
         ("--outline", "60,40,120,90,120,40,60,90", ("crosses itself",)),
         ("--outline", "60,40,90,40,120,40", ("empty",)),
         ("--outline", "360,40,420,40,420,90", ("outside",)),
+        ("--target", "c99", ("'c99'", "Candidates: c1")),
+        ("--target", "99", ("'c99'", "Candidates: c1")),
+        ("--target", "c0", ("'c0'", "c3")),
+        ("--target", "t1", ("'t1'", "c3")),
+        ("--target", "c1,c2", ("'c1,c2'", "c3")),
+        ("--target", "١", ("'١'", "c3")),
+        ("--target", "c123456", ("'c123456'", "c3")),
+        ("--target", "", ("''", "c3")),
         ("--threshold", "2", ("'2'", "0 to 1")),
         ("--threshold", "high", ("'high'",)),
         ("--robot-radius", "-3", ("'-3'", "pixels")),
@@ -147,6 +155,7 @@ def test_line_breaks_of_all_kinds_in_an_instruction_are_words(cli: Cli, picture:
 
 def test_errors_leave_no_folder_behind(cli: Cli, picture: Path, tmp_path: Path) -> None:
     refused(cli("run", picture, *CAR, "-n", 4, "--point", "900,60"))
+    refused(cli("run", picture, *CAR, "-n", 4, "--target", "c99"))
     assert not (tmp_path / "formup-runs").exists()
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,10 +73,30 @@ def test_pointed_runs_are_reproducible_and_mostly_right() -> None:
     assert means["iou"] > 0.85
 
 
-def test_words_alone_are_asked_about_and_nothing_is_placed() -> None:
-    rows = evaluate(ONE_TARGET[:3], "words", 1)
-    assert {row.status for row in rows} == {"question"}
-    assert summary(rows)["total"]["iou"] is None
+def test_words_alone_place_the_right_thing_or_ask() -> None:
+    some = [t for t in TASKS if t.image.stem in ("us_coins", "fork_black", "cars_two")]
+    rows = {row.task: row for row in evaluate(some, "words", 1)}
+    assert rows["us_coins_t1"].right is True
+    assert rows["us_coins_t1"].success
+    assert rows["fork_black_t1"].status == "question"
+    assert rows["fork_black_t1"].right is None
+    means = summary(list(rows.values()))
+    placed = [row for row in rows.values() if row.right is not None]
+    assert means["total"]["placed"] == len(placed) / len(rows)
+    assert means["total"]["right_of_placed"] == 1
+    assert "caging" in means
+    assert "multi" in means
+
+
+def test_the_wrong_thing_is_told_from_the_right_one() -> None:
+    task = next(t for t in TASKS if t.other is not None)
+    (row,) = evaluate([task], "truth", 1)
+    assert row.right is True  # both things
+    swapped = replace(task, target=task.other, other=task.target)
+    assert evaluate([swapped], "truth", 1)[0].right is True  # in either order
+    coins = [t for t in TASKS if t.image.stem == "us_coins"]
+    mixed = replace(coins[0], target=coins[1].target)
+    assert evaluate([mixed], "words", 1)[0].right is False
 
 
 def test_modes_have_names() -> None:

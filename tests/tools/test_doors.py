@@ -101,16 +101,76 @@ def test_look_shows_the_picture_with_targets_and_plan(work: Workspace) -> None:
         assert image.format == "PNG"
 
 
-def test_locate_object_returns_what_was_pointed_at() -> None:
-    pixels = np.full((140, 200, 3), 90, np.uint8)
+def painted() -> Workspace:
+    """A red box, a large blue disc and a small one on grey."""
+    pixels = np.full((240, 320, 3), 90, np.uint8)
     pixels[40:90, 60:120] = (200, 40, 40)
+    y, x = np.ogrid[:240, :320]
+    pixels[(x - 230) ** 2 + (y - 70) ** 2 < 40**2] = (40, 60, 200)
+    pixels[(x - 100) ** 2 + (y - 180) ** 2 < 20**2] = (40, 60, 200)
+    return Workspace(Scene(picture_from_array(pixels)))
+
+
+def test_locate_object_measures_what_was_pointed_at() -> None:
     pointed = (TargetPrompt(points=((90, 65),)),)
-    workspace = Workspace(Scene(picture_from_array(pixels)), pointed=pointed)
-    (found,) = call(workspace, "locate_object")["candidates"]
+    workspace = Workspace(painted().scene, pointed=pointed)
+    (found,) = call(workspace, "locate_object")["targets"]
     assert found["id"] == "t1"
     assert found["area_px"] == pytest.approx(3000, rel=0.1)
-    bare = Workspace(Scene(picture_from_array(pixels)))
-    assert call(bare, "locate_object")["candidates"] == []
+
+
+def test_locate_object_lists_all_that_stands_out() -> None:
+    found = call(painted(), "locate_object")
+    assert found["things"] == 3
+    seen = {(c["label"], tuple(c["box"])) for c in found["candidates"]}
+    assert {label for label, _ in seen} == {"red rectangle", "blue circle"}
+    (box,) = (box for label, box in seen if label == "red rectangle")
+    assert box == pytest.approx((60, 40, 120, 90), abs=3)
+
+
+def test_locate_object_decides_words_on_measures_and_says_the_numbers() -> None:
+    query = {"colours": ["blue"], "picks": [{"by": "smallest"}]}
+    found = call(painted(), "locate_object", query=query)
+    (only,) = found["candidates"]
+    assert found["settled"] is True
+    assert only["box"] == pytest.approx([80, 160, 120, 200], abs=3)
+    assert any("area" in r and "px" in r for r in only["reasons"])
+    both = call(painted(), "locate_object", query={"shapes": ["circle"]})
+    assert both["settled"] is False
+    assert len(both["candidates"]) == 2
+    none = call(painted(), "locate_object", query={"colours": ["purple"]})
+    assert none["candidates"] == []
+    assert "none of 3 things is purple" in none["lacking"]
+
+
+@pytest.mark.parametrize(
+    ("query", "words"),
+    [
+        ({"colours": ["crimson"]}, "crimson|colours"),
+        ({"picks": [{"by": "odd", "place": 2}]}, "odd has no place 2"),
+        ({"relations": [{"kind": "between", "things": ["c1"]}]}, "two other things"),
+        ({"relations": [{"kind": "left_of", "things": ["c9"]}]}, "no candidate c9"),
+    ],
+)
+def test_locate_object_says_what_is_wrong_with_a_query(query: dict[str, Any], words: str) -> None:
+    with pytest.raises(ToolError, match=words):
+        call(painted(), "locate_object", query=query)
+
+
+def test_a_candidate_is_a_target_by_its_id() -> None:
+    workspace = painted()
+    query = {"colours": ["red"]}
+    (red,) = call(workspace, "locate_object", query=query)["candidates"]
+    data = call(workspace, "segment", id="t1", candidate=red["id"])
+    assert data["area_px"] == pytest.approx(3000, rel=0.05)
+    with pytest.raises(ToolError, match="no candidate 'c99'. Candidates: c1 to c3"):
+        call(workspace, "segment", id="t1", candidate="c99")
+
+
+def test_look_numbers_the_candidates() -> None:
+    shown = call(painted(), "look", candidates=True)
+    assert [c["id"] for c in shown["candidates"]] == ["c1", "c2", "c3"]
+    assert call(painted(), "look")["candidates"] == []
 
 
 @pytest.mark.parametrize(
@@ -138,11 +198,15 @@ def test_segment_below_the_threshold_says_the_papers_sentence(work: Workspace) -
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ({}, "give a box, points or an outline"),
+        ({}, "give a candidate, a box, points or an outline"),
         ({"box": (60, 40, 50, 90)}, "inverted"),
         ({"box": (260, 40, 350, 90)}, "outside the picture"),
         ({"points": [(900, 4)]}, "outside the picture"),
-        ({"box": BOX, "outline": [(0, 0), (9, 0), (9, 9)]}, "not both"),
+        (
+            {"box": BOX, "outline": [(0, 0), (9, 0), (9, 9)]},
+            "give one of candidate, box and outline",
+        ),
+        ({"candidate": "c1", "points": [(9, 9)]}, "a candidate takes no points"),
         ({"id": "car", "box": BOX}, "id"),
     ],
 )

@@ -136,16 +136,13 @@ def test_rulers_are_exact(size: tuple[int, int]) -> None:
         assert np.abs(values - step * np.arange(1, len(values) + 1)).max() < 0.6 / scale
 
 
-def test_a_look_shows_candidates_targets_and_robots_without_rulers() -> None:
+def test_a_look_shows_targets_and_robots_without_rulers() -> None:
     made = scene()
-    bare = draw_look(made, rulers=False)
-    assert bare.size == (1200, 800)
-    box = (10.0, 20.0, 60.0, 90.0)
-    image = draw_look(
-        made, plan=plan_for(made), candidates=[("c1", box), ("🚗", (0, 0, 299, 199))], rulers=False
-    )
-    changed = (np.asarray(image) != np.asarray(bare)).any(axis=2)
-    assert changed[4 * 55 : 4 * 60, 38:46].any()  # the box's left edge, x = 10 at scale 4
+    plain = draw_look(scene(boxes=()), rulers=False)
+    assert plain.size == (1200, 800)
+    image = draw_look(made, plan=plan_for(made), rulers=False)
+    changed = (np.asarray(image) != np.asarray(plain)).any(axis=2)
+    assert changed[4 * 95 : 4 * 105, 417:423].any()  # its left edge, x = 105 at scale 4
     assert (np.asarray(image) == ROBOT).all(axis=2).any()
 
 

@@ -12,7 +12,7 @@ from ..formation.plan import Plan, make_plan
 from ..perception.prompts import Point, TargetPrompt
 from ..tool import ToolResult, tool
 from ..workspace import Settings, Workspace
-from .seeing import FRAME, summary
+from .seeing import FRAME, sighting, summary
 
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
@@ -36,7 +36,7 @@ def propose_formation(
 
     Args:
         contract: what the positions must satisfy; its robots must add up to those asked for.
-        targets: things not segmented yet, each by box, points or outline; they get the ids given.
+        targets: things not segmented yet, each by candidate, box, points or outline; they get the ids given.
         positions: (x, y) of every robot, image pixels, y down, in the order of the groups.
         samples: names of samples (s1, ...) to use as positions, in the order of the groups.
     """
@@ -95,9 +95,14 @@ def ask_user(workspace: Workspace, question: str, candidates: tuple[str, ...] = 
 
     Args:
         question: one clear question.
-        candidates: target ids the person may choose from.
+        candidates: ids the person may choose from: candidates (c3) or targets (t1).
     """
-    listed = [summary(workspace.scene.target(c)) for c in candidates]
+    listed = [
+        sighting(workspace.candidate(c))
+        if c.startswith("c")
+        else summary(workspace.scene.target(c))
+        for c in candidates
+    ]
     return ToolResult({"question": question, "candidates": listed})
 
 

@@ -113,10 +113,14 @@ class Canvas:
         self, lines: Sequence[FloatArray], colour: Colour, width: float, strength: float = 1.0
     ) -> None:
         """Draw polylines, each (k, 2)."""
+        paths = [[(x, y) for x, y in self._fine(line)] for line in lines]
+        if strength == 1:
+            for path in paths:
+                self._draw.line(path, colour, self._thick(width), joint="curve")
+            return
         mask = self._mask()
         draw = ImageDraw.Draw(mask)
-        for line in lines:
-            path = [(x, y) for x, y in self._fine(line)]
+        for path in paths:
             draw.line(path, round(255 * strength), self._thick(width), joint="curve")
         self._cover(mask, colour)
 
@@ -212,12 +216,25 @@ class Canvas:
         )
 
     def chip(
-        self, where: FloatArray, text: str, size: float, colour: Colour, ground: Colour
+        self,
+        where: FloatArray,
+        text: str,
+        size: float,
+        colour: Colour,
+        ground: Colour,
+        seam: float = 0.0,
     ) -> None:
-        """Text on a rounded ground, its middle at a point of the page, page px."""
+        """Text on a rounded ground, its middle at a point of the page, page px.
+
+        `seam` is the width of a dark rim around it, units.
+        """
         x, y = where
         width, height = self.chip_size(text, size)
         box = (x - width / 2, y - height / 2, x + width / 2, y + height / 2)
+        if seam:
+            out = seam * self.unit
+            around = (box[0] - out, box[1] - out, box[2] + out, box[3] + out)
+            self.box(around, INK, corner=4 + seam, strength=0.75)
         self.box(box, ground, corner=4)
         self.text(where, text, size, colour)
 
@@ -286,9 +303,18 @@ class Labels:
         reach = np.concatenate([gap + half.min() + 0 * turns, 2.2 * gap + half.max() + 0 * turns])
         ways = np.concatenate([ways, ways])
         support = np.abs(ways) @ (half - half.min())
-        centres = anchor + ways * (reach + support)[:, None]
+        return self.pick(anchor + ways * (reach + support)[:, None], np.array(size))
+
+    def pick(
+        self, centres: FloatArray, size: FloatArray, hidden: FloatArray | float = 0.0
+    ) -> FloatArray:
+        """The best of some middles (n, 2) for a label of a size, which is then taken, (2,).
+
+        `hidden` is what each would hide besides the parts taken, square page px.
+        """
+        half = size / 2
         boxes = np.concatenate([centres - half, centres + half], axis=1)
-        best = int(np.argmin([self._cost(box) for box in boxes]))
+        best = int(np.argmin(np.array([self._cost(box) for box in boxes]) + hidden))
         centre = np.clip(centres[best], self._room[:2] + half, self._room[2:] - half)
         self.take(np.concatenate([centre - half, centre + half])[None])
         return centre

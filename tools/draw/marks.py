@@ -60,7 +60,7 @@ def draw_areas(canvas: Canvas, contract: Contract, site: Site, points: FloatArra
         if area is not None:
             shown = area.intersection(picture)
             canvas.tint(shown, ALLOWED, 0.26)
-            canvas.strokes(_rings(shown), ALLOWED, 1.0, 0.8)
+            canvas.strokes(rings(shown), ALLOWED, 1.0, 0.8)
     for name in contract.keep_out:
         canvas.tint(site.outlines[name].filled, FORBIDDEN, 0.35)
     for name in contract.target_ids:
@@ -70,7 +70,7 @@ def draw_areas(canvas: Canvas, contract: Contract, site: Site, points: FloatArra
 def draw_outline(canvas: Canvas, outline: Outline, colour: tuple[int, int, int] = TARGET) -> None:
     """The outline and its holes as a light line with dark seams."""
     simple = outline.polygon.simplify(OUTLINE_DETAIL / canvas.page_length(1.0))
-    canvas.cased(_rings(simple), colour, 2.6)
+    canvas.cased(rings(simple), colour, 2.6)
 
 
 def draw_guides(canvas: Canvas, contract: Contract, site: Site, points: FloatArray) -> None:
@@ -295,7 +295,7 @@ def _corner_links(part: Part, corners: FloatArray) -> list[FloatArray]:
     return list(np.stack([part.points[robots], corners[matched]], axis=1))
 
 
-def _rings(geometry: BaseGeometry) -> list[FloatArray]:
+def rings(geometry: BaseGeometry) -> list[FloatArray]:
     """Every boundary line of an area, closed, (k, 2) each."""
     lines = shapely.get_parts(shapely.boundary(geometry))
     return [

@@ -14,9 +14,10 @@ from ..formation.place import Site
 from ..formation.plan import Plan
 from ..formation.verdict import Verdict
 from ..geometry.outline import FloatArray
+from ..perception.attributes import Candidate
 from ..perception.image import Picture
 from ..scene import Box, Scene
-from .canvas import CERTIFIED, FINDING, INK, MARKS, PAPER, Canvas, Colour, Labels, Margins
+from .canvas import CERTIFIED, FINDING, INK, PAPER, Canvas, Colour, Labels, Margins
 from .marks import (
     directions,
     draw_areas,
@@ -28,6 +29,7 @@ from .marks import (
     robot_size,
     target_room,
 )
+from .numbered import colours_of, draw_numbered
 from .page import draw_bars, draw_footer, make_page
 from .text import drawable
 
@@ -94,7 +96,7 @@ def draw_look(
     scene: Scene,
     *,
     plan: Plan | None = None,
-    candidates: Sequence[tuple[str, Box]] = (),
+    candidates: Sequence[Candidate] = (),
     rulers: bool = True,
 ) -> Image.Image:
     """The photograph as a model is shown it, with what coordinates and ids can be read from.
@@ -102,7 +104,7 @@ def draw_look(
     Args:
         scene: its targets are outlined and tagged with their ids.
         plan: its robots are drawn.
-        candidates: id and box (x0, y0, x1, y1), image pixels.
+        candidates: outlined and numbered, 3 for c3.
         rulers: whether all four edges bear rulers in image pixels.
 
     Returns:
@@ -116,15 +118,15 @@ def draw_look(
     left, top, right, bottom = (round(m * unit) if rulers else 0 for m in RULER)
     canvas = Canvas(scene.picture, long, unit, (left, top, right, bottom))
     labels = Labels(canvas.photo)
-    for k, target in enumerate(scene.targets):
-        draw_outline(canvas, target.outline, MARKS[k % len(MARKS)])
-    for k, (_, box) in enumerate(candidates, start=len(scene.targets)):
-        canvas.cased([_corners(box)], MARKS[k % len(MARKS)], 2.0)
+    count = len(scene.targets)
+    colours = colours_of([thing.outline for thing in (*scene.targets, *candidates)])
+    for target, colour in zip(scene.targets, colours[:count], strict=True):
+        draw_outline(canvas, target.outline, colour)
     if plan is not None:
         _draw_robots(canvas, plan, scene.site(plan.formation.contract), labels)
-    named = [(target.id, target.box) for target in scene.targets]
-    for k, (name, box) in enumerate([*named, *candidates]):
-        _draw_tag(canvas, name, box, MARKS[k % len(MARKS)], labels)
+    draw_numbered(canvas, candidates, colours[count:], labels)
+    for target, colour in zip(scene.targets, colours[:count], strict=True):
+        _draw_tag(canvas, target.id, target.box, colour, labels)
     if rulers:
         _draw_rulers(canvas)
     return canvas.finish()
@@ -173,12 +175,6 @@ def _facts(plan: Plan) -> list[str]:
     if "widest_opening_px" in measured:
         told = [fact for fact in told if not fact.startswith("widest gap")]
     return [plan.id, f"{count} robot{'s' * (count != 1)}", *told[:3]]
-
-
-def _corners(box: Box) -> FloatArray:
-    """A box as a closed line, (5, 2)."""
-    x0, y0, x1, y1 = box
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]], dtype=float)
 
 
 def _draw_tag(canvas: Canvas, name: str, box: Box, colour: Colour, labels: Labels) -> None:

@@ -115,11 +115,17 @@ def open_window(pixels: Bytes, box: Box, side: int) -> Window:
     y0, y1 = max(0, int(box[1])), min(height, int(np.ceil(box[3])) + 1)
     scale = min(MAX_UPSCALE, side / max(x1 - x0, y1 - y0))
     size = max(1, round((x1 - x0) * scale)), max(1, round((y1 - y0) * scale))
+    small = resampled(pixels[y0:y1, x0:x1], size)
+    return Window(features(small), (x0, y0), (x1 - x0, y1 - y0), (height, width))
+
+
+def resampled(pixels: Bytes, size: tuple[int, int]) -> Bytes:
+    """`pixels` (H, W, 3) at another size (width, height); only some are read of very many."""
+    scale = size[0] / pixels.shape[1]
     how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
     step = max(1, int(1 / (scale * SAMPLES)))
-    sampled = pixels[y0 + step // 2 : y1 : step, x0 + step // 2 : x1 : step]
-    small = cv2.resize(np.ascontiguousarray(sampled), size, interpolation=how)
-    return Window(features(small), (x0, y0), (x1 - x0, y1 - y0), (height, width))
+    sampled = pixels[step // 2 :: step, step // 2 :: step]
+    return np.asarray(cv2.resize(np.ascontiguousarray(sampled), size, interpolation=how))
 
 
 def features(rgb: npt.ArrayLike) -> Bytes:

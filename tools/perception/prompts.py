@@ -1,4 +1,4 @@
-"""How a thing is pointed at: a box, points or a rough outline, checked against the picture."""
+"""How a thing is pointed at: candidate, box, points or rough outline, checked on the picture."""
 
 from typing import Annotated, Self
 
@@ -16,12 +16,17 @@ MIN_SIDE = 2.0
 
 
 class TargetPrompt(BaseModel):
-    """Points at one thing: give a box, or points, or an outline (the most exact); image pixels."""
+    """Points at one thing: a candidate, a box, points, or an outline of yours; image pixels."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     id: str = Field(default="t1", pattern=r"^t[0-9]{1,4}$", description="Target id to give it: t1")
     label: str = Field(default="", max_length=200, description="What it is, in a few words")
+    candidate: str | None = Field(
+        default=None,
+        pattern=r"^c[0-9]{1,4}$",
+        description="Id of a candidate that locate_object or look showed: c3",
+    )
     box: Box | None = Field(default=None, description="x0, y0, x1, y1 close around it, px")
     points: tuple[Point, ...] | None = Field(
         default=None, min_length=1, max_length=20, description="Points (x, y) on it, px"
@@ -38,15 +43,21 @@ class TargetPrompt(BaseModel):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        if self.box is None and self.points is None and self.outline is None:
-            raise ValueError("give a box, points or an outline")
-        if self.box is not None and self.outline is not None:
-            raise ValueError("give a box or an outline, not both")
+        leading = [self.candidate, self.box, self.outline]
+        given = sum(way is not None for way in leading)
+        if given == 0 and self.points is None:
+            raise ValueError("give a candidate, a box, points or an outline")
+        if given > 1:
+            raise ValueError("give one of candidate, box and outline")
+        if self.candidate is not None and (self.points or self.negative):
+            raise ValueError("a candidate takes no points; give an outline of yours instead")
         return self
 
     @property
     def how(self) -> str:
-        """The way of pointing that leads: outline, box or point."""
+        """The way of pointing that leads: candidate, outline, box or point."""
+        if self.candidate is not None:
+            return "candidate"
         if self.outline is not None:
             return "outline"
         return "box" if self.box is not None else "point"

@@ -20,7 +20,7 @@ class Segmenter:
     """A way to make masks, with the confidence below which it is not believed.
 
     Attributes:
-        thresholds: t per way of pointing (point, box, outline). Points mean parts as often as
+        thresholds: t per way of pointing (point, box, outline, candidate). Points mean parts as often as
             wholes, so only the clearest are taken; drawn outlines are mostly right already.
     """
 
@@ -57,5 +57,7 @@ def _grabcut(pixels: Pixels, prompt: TargetPrompt) -> Segmentation:
 
 
 SEGMENTERS = {
-    "grabcut": Segmenter("grabcut", _grabcut, {"point": 0.82, "box": 0.6, "outline": 0.55})
+    "grabcut": Segmenter(
+        "grabcut", _grabcut, {"point": 0.82, "box": 0.6, "outline": 0.55, "candidate": 0.55}
+    )
 }

@@ -1,0 +1,90 @@
+"""Runs of small words that say one thing: "not lined up with the others", "in the upper left".
+
+People say these in too many ways to list. A run is read as a whole: which kinds of words are in
+it decides what it says, and words that are in none of the lists end it.
+"""
+
+from functools import cache
+
+from .phrases import Words, several, table
+
+LONGEST = 16
+MIDDLE_OF_PICTURE = {
+    ("leftmost", "topmost"): "upper_left",
+    ("rightmost", "topmost"): "upper_right",
+    ("bottommost", "leftmost"): "lower_left",
+    ("bottommost", "rightmost"): "lower_right",
+}
+
+
+def difference(words: Words, at: int) -> tuple[str, int] | None:
+    """The kind of oddness that a run of words speaks of, a pick, and the run's length."""
+    end = _run(words, at, _difference_words())
+    while end > at:
+        pick = _difference(set(words[at:end]), words[end - 1])
+        if pick is not None:
+            return pick, end - at
+        end -= 1
+    return None
+
+
+def position(words: Words, at: int) -> tuple[str, int] | None:
+    """The place in the picture that a run of words speaks of, a pick, and the run's length."""
+    end = _run(words, at, _position_words())
+    lists = table()["positions"]
+    while end > at:
+        exactly = words[at] == "right" and end > at + 1  # right at the top
+        here = set(words[at + exactly : end])
+        sides = sorted(side for side, names in lists["sides"].items() if here & set(names))
+        closed = words[end - 1] not in lists["open"]
+        of_something = words[end : end + 1] == ["of"] and not several(words, end)
+        if sides and closed and not of_something and not _also_beside(words, at, end):
+            pick = sides[0] if len(sides) == 1 else MIDDLE_OF_PICTURE.get(tuple(sides[:2]))
+            if len(sides) <= 2 and pick is not None:
+                return pick, end - at
+        end -= 1
+    return None
+
+
+def _run(words: Words, at: int, known: frozenset[str]) -> int:
+    end = at
+    while end < min(len(words), at + LONGEST) and words[end] in known:
+        end += 1
+    return end
+
+
+def _difference(here: set[str], last: str) -> str | None:
+    """What a set of words says, if they say a difference."""
+    lists = {name: set(words) for name, words in table()["differences"].items()}
+    if last in lists["open"]:
+        return None
+    negated = bool(here & lists["negation"])
+    unlike = bool(here & lists["unlike"]) or (negated and bool(here & lists["like"]))
+    if here & lists["crooked"] or (here & lists["turn"] and (unlike or negated)):
+        return "askew"
+    for aspect in ("colour", "size", "shape"):
+        if here & lists[aspect] and unlike:
+            return f"odd_{aspect}"
+    if here & lists["alone"]:
+        return "alone"
+    if unlike:
+        return "odd"
+    return "alone" if here & lists["apart"] and here & lists["compared"] else None
+
+
+def _also_beside(words: Words, at: int, end: int) -> bool:
+    """Whether a side of the thing is more likely meant than one of the picture."""
+    lined = table()["positions"]["lined"]
+    return bool({"side", "edge"} & set(words[at:end])) and bool(set(lined) & set(words[:at]))
+
+
+@cache
+def _difference_words() -> frozenset[str]:
+    return frozenset(word for words in table()["differences"].values() for word in words)
+
+
+@cache
+def _position_words() -> frozenset[str]:
+    lists = table()["positions"]
+    sides = {word for words in lists["sides"].values() for word in words}
+    return frozenset(sides | set(lists["fillers"]) | set(lists["open"]))

@@ -1,0 +1,92 @@
+"""The words of things.yaml, and where their phrases stand in a sentence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import yaml
+
+Words = Sequence[str]
+HEADS = ("noun", "shapes")
+"""Kinds of phrases that can be a noun."""
+STOPS = ",.;:!?"
+
+
+@dataclass(frozen=True)
+class Phrase:
+    """A phrase that stands somewhere: what it adds, how long it is, how its last word ends."""
+
+    kind: str
+    value: str
+    length: int
+    plural: bool = False
+    owns: bool = False
+
+
+@cache
+def table() -> dict[str, Any]:
+    """things.yaml, every value as text: YAML would make truth values of "on" and "no"."""
+    text = resources.files(__package__ or "").joinpath("things.yaml").read_text("utf-8")
+    return yaml.load(text, yaml.BaseLoader)
+
+
+def several(words: Words, at: int) -> bool:
+    """Whether it goes on with "of the two", "among these crates": a choice among things."""
+    opening = phrase(words, at)
+    if opening is None or opening.kind != "partitive":
+        return False
+    after = at + opening.length
+    for k in range(after, min(after + 4, len(words))):
+        if words[k] in table()["counts"]:
+            return True
+        found = phrase(words, k)
+        if found is not None and found.kind in HEADS:
+            return found.plural
+    return False
+
+
+def phrase(words: Words, at: int) -> Phrase | None:
+    """The longest phrase that stands at a place."""
+    for length in range(min(_longest(), len(words) - at), 0, -1):
+        *first, last = words[at : at + length]
+        owns = last.endswith("'s")
+        for ending, plural in _endings(last.removesuffix("'s") if owns else last):
+            found = _phrases().get((*first, ending))
+            if found and (not (plural or owns) or found[0] in HEADS):
+                return Phrase(*found, length, plural, owns)
+    return None
+
+
+@cache
+def _phrases() -> dict[tuple[str, ...], tuple[str, str]]:
+    """Every phrase of the tables, with its kind and value."""
+    words = table()
+    found: dict[tuple[str, ...], tuple[str, str]] = {}
+    for kind in ("relations", "picks", "traits", "shades", "colours", "shapes"):
+        for value, phrases in words[kind].items():
+            found |= {tuple(phrase.split()): (kind, value) for phrase in phrases}
+    for value, entry in words["nouns"].items():
+        found |= {tuple(phrase.split()): ("noun", value) for phrase in entry["words"]}
+    found |= {(word,): ("ordinal", str(place)) for word, place in words["ordinals"].items()}
+    for kind in ("skip", "partitive"):
+        found |= {tuple(phrase.split()): (kind, "") for phrase in words[kind]}
+    return found
+
+
+@cache
+def _longest() -> int:
+    return max(map(len, _phrases()))
+
+
+def _endings(word: str) -> list[tuple[str, bool]]:
+    """The word, and what it may be the plural of."""
+    found = [(word, False)]
+    if word.endswith("ies"):
+        found.append((word[:-3] + "y", True))
+    if word.endswith("es"):
+        found.append((word[:-2], True))
+    if word.endswith("s"):
+        found.append((word[:-1], True))
+    return found

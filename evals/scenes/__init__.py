@@ -1,0 +1,1 @@
+"""Drawn scenes with exact outlines, as many as wanted: graded pictures nothing was fitted to."""

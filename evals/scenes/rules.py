@@ -1,0 +1,108 @@
+"""Success rules for a true outline, by the proportions the rules of the photographs have."""
+
+import math
+from typing import Any
+
+from numpy.random import Generator
+
+from .layout import clearance
+from .things import Thing
+
+SIDES = {"left": "left", "right": "right", "upper": "top", "lower": "bottom"}
+"""The words for a side, and the rule's."""
+PARTING = 11.0
+"""Least distance of neighbours at which a count of robots is asked for, px."""
+
+
+def arrangements(thing: Thing, category: str) -> list[str]:
+    """The arrangements that make sense for a thing, more likely ones repeated."""
+    if category == "caging":
+        return ["cage"]
+    if category == "infill":
+        return ["inside"]
+    fit = ["around"] * 4
+    if thing.sort.corners:
+        fit += ["corners"] * 3
+    straight = not thing.sort.upright or abs((thing.turn + 45) % 90 - 45) < 12
+    if thing.solidity > 0.8 and straight:
+        fit += ["side"] * 2
+    if thing.solidity > 0.95:
+        fit.append("centre")
+    return fit
+
+
+def robots_for(random: Generator, thing: Thing, arrangement: str) -> int:
+    """A count of robots that fits the thing."""
+    if arrangement == "corners":
+        return thing.sort.corners
+    if arrangement == "centre":
+        return 1
+    x0, y0, x1, y1 = thing.polygon.bounds
+    loop = thing.polygon.convex_hull.buffer(clearance(thing)).length
+    least, most = {
+        "around": (4, loop / (1.6 * PARTING)),
+        "cage": (6, loop / PARTING),
+        "inside": (3, thing.polygon.area / PARTING**2),
+        "side": (3, min(x1 - x0, y1 - y0) / PARTING),
+    }[arrangement]
+    if arrangement == "cage" and _hollow(thing):
+        least = 10  # fewer would leave the mouth of a C open
+    limit = {"around": 16, "cage": 20, "inside": 12, "side": 6}[arrangement]
+    return int(random.integers(least, max(least, min(limit, int(most))) + 1))
+
+
+def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str, Any]:
+    """The rule; `side` counts for that arrangement only."""
+    size = thing.size
+    if arrangement in ("around", "cage"):
+        closed = arrangement == "cage"
+        low = max((0.03 if closed else 0.04) * size, 2.0)
+        high = max((0.4 if closed else 0.5) * size, 16.0)
+        loop = thing.outline.filled.buffer((low + high) / 2).exterior.length
+        slack = (1.8 if _hollow(thing) else 1.6) if closed else 2.0
+        rule = {
+            "where": "boundary",
+            "side": "outside",
+            "band_px": [round(low, 1), round(high, 1)],
+            "even": True,
+            "max_gap_px": round(slack * loop / robots, 1),
+        }
+        return rule | ({"closed": True, "min_clearance_px": round(low, 1)} if closed else {})
+    if arrangement == "inside":
+        cell = math.sqrt(thing.polygon.area / robots)
+        return {
+            "where": "inside",
+            "even": True,
+            "min_clearance_px": round(0.03 * math.sqrt(thing.polygon.area), 1),
+            "min_spacing_px": round(0.45 * cell, 1),
+            "max_uncovered_px": round(1.6 * cell, 1),
+        }
+    if arrangement == "corners":
+        return {
+            "where": "corners",
+            "side": "outside",
+            "points": [[round(x, 1), round(y, 1)] for x, y in _corners(thing)],
+            "tolerance_px": round(max(0.216 * size, 10), 1),
+            "min_clearance_px": 0,
+        }
+    if arrangement == "side":
+        band = [round(0.03 * size, 1), round(max(0.5 * size, 16.0), 1)]
+        return {"where": f"side:{SIDES[side]}", "band_px": band, "min_span_frac": 0.5}
+    x, y = thing.outline.centre
+    return {
+        "where": "center",
+        "points": [[round(x, 1), round(y, 1)]],
+        "tolerance_px": round(max(0.2 * size, 5), 1),
+    }
+
+
+def _hollow(thing: Thing) -> bool:
+    """Whether robots in a recess of it come between others when counted around its hull."""
+    return thing.area < 0.8 * thing.polygon.convex_hull.area
+
+
+def _corners(thing: Thing) -> list[tuple[float, float]]:
+    ring = thing.polygon.exterior
+    if thing.sort.corners == len(ring.coords) - 1:
+        return [(float(x), float(y)) for x, y in list(ring.coords)[:-1]]
+    return [(float(x), float(y)) for x, y in thing.outline.bulk_rectangle]
