@@ -177,14 +177,14 @@ def _bare_segment(workspace: Workspace, box: list[int]) -> object:
 def _bare_candidates(workspace: Workspace) -> int:
     """The regions of every threshold of three channels and of the distances to nine colours."""
     small = cv2.resize(workspace.scene.picture.pixels[::2, ::2], (384, 216))
-    smooth = cv2.bilateralFilter(small, 7, 40, 5).astype(np.float32)
-    lab = np.asarray(cv2.cvtColor(smooth / 255, cv2.COLOR_RGB2LAB))
-    cues = [lab[..., k] for k in range(3)]
+    smooth = np.asarray(cv2.bilateralFilter(small, 7, 40, 5), dtype=np.float32)
+    lab = np.asarray(cv2.cvtColor(smooth / 255, cv2.COLOR_RGB2LAB), dtype=np.float32)
+    cues = list(np.moveaxis(lab, 2, 0))
     for count in (3, 6):
         stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 12, 1.0)
         sample, none = lab.reshape(-1, 3)[::16], np.empty(0, np.int32)
         _, _, centres = cv2.kmeans(sample, count, none, stop, 1, cv2.KMEANS_PP_CENTERS)
-        cues += [np.linalg.norm(lab - c, axis=2) for c in np.asarray(centres)]
+        cues += [np.linalg.norm(lab - c, axis=2) for c in np.asarray(centres, np.float32)]
     found = 0
     for cue in cues:
         for level in np.quantile(cue, np.linspace(0.02, 0.98, 12)):

@@ -25,7 +25,7 @@ from formup.evals.suite import Task, load_tasks
 from formup.tools.geometry.outline import FloatArray
 from shapely.geometry import Point, Polygon
 
-SEEDS = range(216)
+SEEDS = range(108)
 DRAWN = range(54)
 FOLDER = Path(__file__).parents[2] / "evals" / "scenes"
 PLAIN = {

@@ -141,6 +141,16 @@ def test_locate_object_decides_words_on_measures_and_says_the_numbers() -> None:
     none = call(painted(), "locate_object", query={"colours": ["purple"]})
     assert none["candidates"] == []
     assert "none of 3 things is purple" in none["lacking"]
+    assert none["absent"] is True
+
+
+def test_a_colour_that_some_thing_shows_a_little_of_is_not_absent() -> None:
+    pixels = painted().scene.picture.pixels.copy()
+    pixels[40:90, 60:68] = (240, 220, 30)  # a yellow stripe on the red box
+    workspace = Workspace(Scene(picture_from_array(pixels)))
+    found = call(workspace, "locate_object", query={"colours": ["yellow"]})
+    assert found["candidates"] == []
+    assert found["absent"] is False
 
 
 @pytest.mark.parametrize(

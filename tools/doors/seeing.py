@@ -88,6 +88,7 @@ def locate_object(workspace: Workspace, query: Query | None = None) -> ToolResul
     Without a query it measures what the person pointed at, or else lists all that stands out.
     With one the reply has every match with numeric reasons. Nothing is recognised: say "round",
     not "coin". Only when settled is true is there exactly one; doubt and lacking say why not.
+    Absent is true only where not even a part of a thing has the look asked for.
 
     Args:
         query: colours, shade, shapes, traits, superlatives and relations that tell it apart.
@@ -111,10 +112,20 @@ def locate_object(workspace: Workspace, query: Query | None = None) -> ToolResul
             "settled": selection.settled,
             "doubt": selection.doubt,
             "lacking": selection.lacking,
+            "absent": bool(selection.lacking) and not _hinted(query, workspace.candidates()),
             "things": len(clear),
             "frame": FRAME,
         }
     )
+
+
+def _hinted(query: Query, candidates: tuple[Candidate, ...]) -> bool:
+    """Whether some thing, however faint, shows a little of the colour asked for."""
+    shares = (
+        sum(share for name, share in c.attributes.colours if name in query.colours)
+        for c in candidates
+    )
+    return bool(query.colours) and any(share >= LEAST_SHARE for share in shares)
 
 
 @tool("read")

@@ -125,7 +125,8 @@ def resampled(pixels: Bytes, size: tuple[int, int]) -> Bytes:
     how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
     step = max(1, int(1 / (scale * SAMPLES)))
     sampled = pixels[step // 2 :: step, step // 2 :: step]
-    return np.asarray(cv2.resize(np.ascontiguousarray(sampled), size, interpolation=how))
+    found = cv2.resize(np.ascontiguousarray(sampled), size, interpolation=how)
+    return np.asarray(found, dtype=np.uint8)
 
 
 def features(rgb: npt.ArrayLike) -> Bytes:
