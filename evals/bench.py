@@ -14,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from PIL import Image
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
@@ -179,18 +180,20 @@ def _bare_candidates(workspace: Workspace) -> int:
     small = cv2.resize(workspace.scene.picture.pixels[::2, ::2], (384, 216))
     smooth = np.asarray(cv2.bilateralFilter(small, 7, 40, 5), dtype=np.float32)
     lab = np.asarray(cv2.cvtColor(smooth / 255, cv2.COLOR_RGB2LAB), dtype=np.float32)
-    cues = list(np.moveaxis(lab, 2, 0))
+    cues: list[NDArray[np.float32]] = [lab[..., k] for k in range(3)]
     for count in (3, 6):
         stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 12, 1.0)
         sample, none = lab.reshape(-1, 3)[::16], np.empty(0, np.int32)
         _, _, centres = cv2.kmeans(sample, count, none, stop, 1, cv2.KMEANS_PP_CENTERS)
-        cues += [np.linalg.norm(lab - c, axis=2) for c in np.asarray(centres, np.float32)]
+        away = (np.linalg.norm(lab - c, axis=2) for c in np.asarray(centres, np.float32))
+        cues += [np.asarray(d, dtype=np.float32) for d in away]
     found = 0
     for cue in cues:
         for level in np.quantile(cue, np.linspace(0.02, 0.98, 12)):
-            above = (cue > level).astype(np.uint8)
+            above = np.asarray(cue > level, dtype=np.uint8)
             cv2.connectedComponentsWithStats(above, connectivity=4)
-            found += len(cv2.findContours(above, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)[0])
+            contours, _ = cv2.findContours(above, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+            found += len(contours)
     return found
 
 

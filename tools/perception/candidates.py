@@ -49,9 +49,9 @@ GROUND = 4.0
 # What of an outline is stairs of pixels, in pixels at the working scale.
 SMOOTHING = 0.7
 # A colour is everywhere where it fills so much of a cell in this share of the cells; it is met
-# again beyond a region at this share of its outline.
+# again within a side's length of a region at this share of its outline.
 EVERYWHERE, ALIKE, AGAIN = 0.4, 9.0, 0.6
-COARSE, BEYOND = 3, 6
+COARSE, BEYOND = 3, 12
 # Measured again, an outline is taken if it overlaps so far with the candidate's.
 REFINED = 0.92
 # A rough outline has 30 vertices at most, and closes with the first.
@@ -142,12 +142,14 @@ def _shows_ground(region: Region, features: Bytes) -> bool:
     if np.mean(np.asarray(cells) > IN_CELL) < EVERYWHERE:
         return False
     far = (features.shape[1] - 1, features.shape[0] - 1)
-    steps = np.linspace(GROUND, 2 * GROUND + 1.0 * math.sqrt(region.area), 2*BEYOND)
+    steps = np.linspace(GROUND, 2 * GROUND + math.sqrt(region.area), BEYOND)
     points = region.points + steps[:, None, None] * region.normals
     at = np.rint(points).astype(np.int64).clip(0, far)
     met = np.asarray(features[at[..., 1], at[..., 0]], dtype=np.float64)
-    again = np.asarray(np.linalg.norm(met - own, axis=2) < ALIKE)
-    return float(np.mean(again.any(axis=0))) > AGAIN
+    again = np.linalg.norm(met - own, axis=2).min(axis=0) < ALIKE
+    # What lies beyond the picture may be the same colour or not: it does not count.
+    seen = np.asarray(((points[-1] >= 0) & (points[-1] <= far)).all(axis=1))
+    return bool(seen.any()) and float(np.mean(np.asarray(again)[seen])) > AGAIN
 
 
 def _distinct(regions: Sequence[Region], features: Bytes) -> list[Region]:

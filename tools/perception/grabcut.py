@@ -123,7 +123,7 @@ def resampled(pixels: Bytes, size: tuple[int, int]) -> Bytes:
     """`pixels` (H, W, 3) at another size (width, height); only some are read of very many."""
     scale = size[0] / pixels.shape[1]
     how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    step = max(1, int(1 / (scale * SAMPLES)))
+    step = max(1, min(int(1 / (scale * SAMPLES)), *pixels.shape[:2]))  # a picture may be a sliver
     sampled = pixels[step // 2 :: step, step // 2 :: step]
     found = cv2.resize(np.ascontiguousarray(sampled), size, interpolation=how)
     return np.asarray(found, dtype=np.uint8)

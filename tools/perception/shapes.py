@@ -23,6 +23,8 @@ TURNS, RINGS = 96, 28
 REACH = 1.7
 # Worse overlaps than this are no shape that has a name.
 IRREGULAR = 0.82
+# Sides of holes in rings and frames: wider steps leave thin ones between two of them unnamed.
+HOLES = (0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85)
 
 Spectrum = NDArray[np.complex64]
 
@@ -45,7 +47,7 @@ def shape_fits(polygon: Polygon) -> tuple[tuple[ShapeName, float], ...]:
     best: dict[ShapeName, float] = {"irregular": IRREGULAR}
     for template in _templates():
         shared = np.fft.irfft((spectrum * np.conj(template.spectrum)).sum(axis=1), TURNS).max()
-        overlap = float(shared / (area + template.area - shared))
+        overlap = min(float(shared / (area + template.area - shared)), 1.0)  # but for rounding
         best[template.name] = max(best.get(template.name, 0.0), overlap)
     return tuple(sorted(best.items(), key=lambda item: -item[1]))
 
@@ -84,9 +86,9 @@ def _round_ones() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     yield "circle", disc
     for long in (1.35, 1.7, 2.2, 3.0):
         yield "oval", _stretched(disc, long)
-    for hole in (0.35, 0.45, 0.55, 0.65, 0.75, 0.85):
+    for hole in HOLES:
         yield "ring", disc.difference(Polygon(hole * _regular(64)))
-    for shift in (0.4, 0.7):
+    for shift in (0.4, 0.5, 0.6, 0.7):
         yield "crescent", disc.difference(Polygon(_regular(64) + np.array([shift, 0.0])))
     for stretch in (1.0, 1.2):
         yield "heart", _stretched(Polygon(_heart()), stretch)
@@ -101,9 +103,9 @@ def _polygons() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     yield "triangle", Polygon([(0, 0), (1, 0), (0, 1)])
     yield "pentagon", Polygon(_regular(5))
     yield "hexagon", Polygon(_regular(6))
-    for hole in (0.35, 0.45, 0.55, 0.65, 0.75, 0.85):
+    for hole in HOLES:
         square, inner = shapely.box(-1, -1, 1, 1), shapely.box(-hole, -hole, hole, hole)
-        for long in (1.0, 1.4):
+        for long in (1.0, 1.1, 1.2, 1.3, 1.4):
             yield "frame", _stretched(square.difference(inner), long)
 
 
