@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from .hints import difference, position
+from .hints import comparison, difference, position
 from .phrases import HEADS, STOPS, Phrase, Words, phrase, table
 
 STRANGERS = 3
@@ -56,8 +56,8 @@ class Description:
         closed: whether something of the thing follows, as in "the boat's left side".
     """
 
-    def __init__(self, words: Words, at: int) -> None:
-        self.words, self.at = words, at
+    def __init__(self, words: Words, at: int, nested: bool = False) -> None:
+        self.words, self.at, self._nested = words, at, nested
         self.thing = Reference()
         self._place = 0
         self._headed = self.closed = self._partitive = False
@@ -75,9 +75,11 @@ class Description:
         return (
             self._count()
             or self._relation()
+            or self._compared()
             or self._hint()
             or self._known()
             or self._relative()
+            or self._apposed()
             or self._blocked()
             or self._unknown()
         )
@@ -107,12 +109,17 @@ class Description:
             return False
         others: list[Reference] = []
         end = self.at + found.length
+        if self._nested and self.words[end : end + 1] == [
+            "the"
+        ]:  # a chain: which thing it hangs on is not decided here
+            self.thing.refused = " ".join(self.words[self.at : end])
+            return False
         for _ in range(2 if found.value == "between" else 1):
             if others and self.words[end : end + 1] == ["and"]:
                 end += 1
             if end >= len(self.words) or self.words[end] not in table()["determiners"]:
                 return False
-            other = Description(self.words, end + 1)
+            other = Description(self.words, end + 1, nested=True)
             others.append(other.thing)
             end = other.at
         if any(_unclear(other) for other in others):
@@ -121,6 +128,12 @@ class Description:
         self.thing.query.setdefault("relations", []).append(relation)
         self.at = end
         return True
+
+    def _compared(self) -> bool:
+        """Than any of the others: what a superlative says too."""
+        length = comparison(self.words, self.at)
+        self.at += length
+        return length > 0
 
     def _hint(self) -> bool:
         """Unlike the others in colour; in the upper left corner of the picture."""
@@ -162,6 +175,16 @@ class Description:
         if not (phrase(words, at) or difference(words, at) or position(words, at)):
             return False
         self.at = at
+        return True
+
+    def _apposed(self) -> bool:
+        """The article in "which is the largest"."""
+        words, at = self.words, self.at
+        following = phrase(words, at + 1)
+        ranked = following is not None and following.kind in ("picks", "ordinal")
+        if words[at] != "the" or words[at - 1] != "is" or not ranked:
+            return False
+        self.at += 1
         return True
 
     def _blocked(self) -> bool:
@@ -211,6 +234,8 @@ class Description:
         words = self.words
         if self._headed or words[self.at] in table()["follow"]:
             return False
+        if words[self.at + 1 : self.at + 2] == ["of"]:  # the shiniest of the coins
+            self.thing.refused = words[self.at]
         for ahead in range(1, STRANGERS + 1):
             if self.at + ahead >= len(words) or words[self.at + ahead] in STOPS:
                 return False

@@ -6,7 +6,7 @@ it decides what it says, and words that are in none of the lists end it.
 
 from functools import cache
 
-from .phrases import Words, several, table
+from .phrases import HEADS, Words, phrase, several, table
 
 LONGEST = 16
 MIDDLE_OF_PICTURE = {
@@ -44,6 +44,21 @@ def position(words: Words, at: int) -> tuple[str, int] | None:
                 return pick, end - at
         end -= 1
     return None
+
+
+def comparison(words: Words, at: int) -> int:
+    """How many words compare with all the others: "than any of the other boats"."""
+    if words[at] not in ("than", "compared"):
+        return 0
+    end = at + 1
+    while end < min(len(words), at + LONGEST):
+        found = phrase(words, end)
+        plural = found is not None and found.kind in HEADS and found.plural
+        if words[end] not in _difference_words() and not plural:
+            break
+        end += 1
+    everything = set(words[at:end]) & set(table()["differences"]["compared"])
+    return end - at if everything else 0
 
 
 def _run(words: Words, at: int, known: frozenset[str]) -> int:

@@ -175,12 +175,12 @@ def _planned(plan: dict[str, Any], history: History) -> str:
 def _taken(history: History) -> list[str]:
     """Which candidates were taken for the things meant, and why."""
     proposals = [c for m in history if isinstance(m, Reply) for c in m.calls]
-    prompts = [p for p in proposals[::-1] if p.name == "propose_formation"][0].arguments["targets"]
+    last = next(p for p in proposals[::-1] if p.name == "propose_formation")
     reasons = located_reasons(history)
     return [
         f"Took {p['candidate']} for the {p.get('label') or 'thing chosen'}"
         + (f": {'; '.join(reasons[p['candidate']])}." if reasons.get(p["candidate"]) else ".")
-        for p in prompts
+        for p in last.arguments["targets"]
         if p.get("candidate")
     ]
 

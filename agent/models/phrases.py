@@ -52,10 +52,17 @@ def phrase(words: Words, at: int) -> Phrase | None:
     for length in range(min(_longest(), len(words) - at), 0, -1):
         *first, last = words[at : at + length]
         owns = last.endswith("'s")
+        whole = _phrases().get((*first, last))
+        if whole:
+            return Phrase(*whole, length)
         for ending, plural in _endings(last.removesuffix("'s") if owns else last):
             found = _phrases().get((*first, ending))
             if found and (not (plural or owns) or found[0] in HEADS):
                 return Phrase(*found, length, plural, owns)
+    if words[at : at + 1] and words[at] in table()["modifiers"]:
+        found = phrase(words, at + 1)
+        if found is not None and found.kind == "relations":
+            return Phrase(found.kind, found.value, found.length + 1)
     return None
 
 

@@ -28,19 +28,20 @@ def references(instruction: str) -> Reading:
     at = 0
     while at < len(words):
         read = _read(words, at)
-        if read is None or found and read[0].strange:
+        if read is None or (found and read[0].strange):
             rest.append(words[at])
             at += 1
         else:
             found.append(read[0])
-            rest.append("it")
+            owner = read[1] > at and words[read[1] - 1].endswith("'s")
+            rest.append("its" if owner else "it")
             at = read[1]
     return Reading(_without_echoes(found), " ".join(rest))
 
 
 def _words(text: str) -> list[str]:
     plain = text.lower().replace("-", " ").replace("\N{RIGHT SINGLE QUOTATION MARK}", "'")
-    return re.findall(r"[a-z0-9']+|[,.;:!?]", plain)
+    return re.findall(r"[a-z0-9]+(?:'[a-z0-9]+)*|[,.;:!?+*%]", plain)
 
 
 def _read(words: Words, at: int) -> tuple[Reference, int] | None:
@@ -62,16 +63,70 @@ def _described(words: Words, at: int) -> tuple[Reference, int] | None:
     if len(before) == 2 and before[1] == "of" and not _may_own(before[0]):
         thing.refused = thing.refused or f"{before[0]} of"
     blockers = [w for w in before if w in table()["blockers"]]
-    if blockers:
+    part = description.closed and _part_follows(words, end)
+    if blockers and not part:
         thing.refused = blockers[0]
+    if _or_another(words, end):
+        thing.refused = thing.refused or " ".join(words[end : end + 2])  # the red or blue one
+    if description.closed and not part:
+        thing.refused = thing.refused or " ".join(words[end : end + 1])  # the coin's shadow
     trailing = 0 if description.closed else _trailing(words, end)
     if trailing:
-        clause = " ".join(words[end : end + trailing])
-        thing.unknown.append(clause)
-        if words[end] not in table()["clauses"]:
-            thing.refused = thing.refused or clause  # the coin box is no coin
+        clause = words[end : end + trailing]
+        thing.unknown.append(" ".join(clause))
+        excludes = set(clause) & {*table()["blockers"], *table()["differences"]["negation"]}
+        if words[end] not in table()["clauses"] or excludes:
+            thing.refused = thing.refused or " ".join(clause)  # the coin box is no coin
+    if not thing.noun and words[end - 1] in table()["places"]:
+        thing.refused = thing.refused or words[end - 1]  # the top left corner
+    if thing.noun == "any" and not thing.whole_query and _from_another(words, end):
+        thing.refused = thing.refused or " ".join(words[end : end + 3])
     thing.said = " ".join(words[at : end + trailing])
     return thing, end + trailing
+
+
+def _or_another(words: Words, at: int) -> bool:
+    """Whether it goes on with a second thing that has no article: "or blue heart", "and star"."""
+    if words[at : at + 1] not in (["or"], ["and"], ["nor"], ["plus"], [","]):
+        return False
+    second = phrase(words, at + 1) if at + 1 < len(words) else None
+    if second is None or second.kind in ("relations", "skip", "partitive"):
+        return False
+    if words[at] == ",":
+        noun = phrase(words, at + 1 + second.length) if second.kind == "colours" else None
+        return noun is not None and noun.kind in HEADS and noun.value != "any"
+    after = words[at + 1 + second.length : at + 2 + second.length]
+    return not after or after[0] not in ("it", "them", *table()["determiners"])  # and circle it
+
+
+def _part_follows(words: Words, at: int) -> bool:
+    """Whether a part comes after an owner: left side, very centre."""
+    for k, word in enumerate(words[at : at + 4], start=at):
+        found = phrase(words, k)
+        if found is not None and found.kind in HEADS:
+            return False
+        if word in table()["parts"]:
+            return _ends_there(words, k + 1)
+        if word in STOPS or word in table()["determiners"]:
+            return False
+    return False
+
+
+def _ends_there(words: Words, at: int) -> bool:
+    """Whether no other noun comes: "left side", not "left neighbour"."""
+    lists = table()
+    while at < len(words) and (words[at] in lists["parts"] or words[at] == "hand"):
+        at += 1
+    ends = (*STOPS, *lists["follow"], *lists["ends"], *lists["at"])
+    return at >= len(words) or words[at] in ends or words[at].isdecimal()
+
+
+def _from_another(words: Words, at: int) -> bool:
+    """Whether it goes on with where it is seen from a thing named before: "to its left"."""
+    relation = phrase(words, at)
+    if relation is not None and relation.kind == "relations":
+        return words[at + relation.length : at + relation.length + 1] in (["it"], ["them"])
+    return words[at : at + 1] in (["to"], ["on"]) and words[at + 1 : at + 2] in (["its"], ["their"])
 
 
 def _stranger(words: Words, at: int) -> tuple[Reference, int] | None:
@@ -91,7 +146,7 @@ def _stranger(words: Words, at: int) -> tuple[Reference, int] | None:
     if relation is not None and relation.kind == "relations":
         after = end + relation.length
         if after < len(words) and words[after] in lists["determiners"]:
-            end = Description(words, after + 1).at
+            end = Description(words, after + 1, nested=True).at
     return thing, end
 
 
@@ -129,8 +184,11 @@ def _trailing(words: Words, at: int) -> int:
     if word == "with" or word in lists["at"]:
         clause = bool(after) and after[0] in lists["describing"]
         clause = clause and not set(words[at + 2 : at + 4]) & set(lists["parts"])
+        clause = clause and not _is_robots(words, at + 2, at + 4)
         if not clause:
             return 0
+    if word == "than":
+        clause = bool(after) and after[0] in lists["determiners"]  # larger than the quarter
     if not clause and (word in lists["follow"] or word in lists["counts"]):
         return 0
     count = 1
@@ -143,10 +201,10 @@ def _trailing(words: Words, at: int) -> int:
 
 def _without_echoes(things: Sequence[Reference]) -> tuple[Reference, ...]:
     """The things without those that only take up another one: "that thing", "the coin" again."""
-    telling = [t for t in things if t.query or t.unknown or t.noun != "any"]
+    telling = [t for t in things if t.query or t.unknown or t.refused or t.noun != "any"]
     kept: list[Reference] = []
     for thing in telling or things:
-        again = any(
+        again = not (thing.unknown or thing.refused) and any(
             thing.noun in ("any", other.noun)
             and all(other.query.get(name) == value for name, value in thing.query.items())
             for other in kept

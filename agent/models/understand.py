@@ -19,6 +19,11 @@ ASIDE = re.compile(
     r"|leans?|can|could|would|will|you|runs?)\b[^,.;:!?]*"
 )
 """A relative clause says which thing is meant, not what to do with it."""
+QUESTION = re.compile(
+    r"(?:^|(?<=[.!?;]))\s*(?:what|why|who|how|where|when|which|should|shall|may|isn't|aren't|are|is|was|were|does|did|has|have)"
+    r"\b[^.!?;]*\?"
+)
+"""A question is no instruction, unlike "could you surround it?"."""
 ENDINGS = ("ing", "ed", "es", "s", "e")
 Words = list[str]
 
@@ -40,7 +45,7 @@ class Reading:
 
 def understand(instruction: str) -> Reading:
     """Read an instruction in English."""
-    words = _without_ignored(_words(ASIDE.sub(" ", instruction.lower())))
+    words = _without_ignored(_words(ASIDE.sub(" ", QUESTION.sub(" ", instruction.lower()))))
     side = next(iter(_matches("sides", words)), None)
     relations = _unbeaten(_matches("relations", words))
     if not relations:
@@ -55,7 +60,11 @@ def understand(instruction: str) -> Reading:
         fit=next(iter(_matches("fit", words)), "normal"),
         spacing="free" if any(_found(p, words) for p in _vocabulary()["free"]) else "even",
         clearance=_clearance(instruction),
-        beyond=(*_beyond(words, relations, side), *_foreign_units(instruction)),
+        beyond=(
+            *_beyond(words, relations, side),
+            *_foreign_units(instruction),
+            *_bounds(instruction),
+        ),
     )
 
 
@@ -114,21 +123,35 @@ def _unbeaten(relations: list[str]) -> list[str]:
 def _count(text: str) -> tuple[int | None, str | None]:
     """A number of robots in the words, or what stands there but is none."""
     lowered = text.lower()
-    number = rf"-?[0-9][0-9,.]*|{_number_words()}"
+    number = rf"(?<![\w.])-?[0-9][0-9,.]*|{_number_words()}"
     nouns = "|".join(rf"{noun}s?" for noun in _vocabulary()["robots"] if noun != "one")
     found = re.search(
-        rf"({number}|\bmany|\bseveral|\bsome)(?:\s+[a-z-]+)?\s+(?:{nouns})\b", lowered
+        rf"({number}|\bmany|\bseveral|\bsome)(?:\s+[a-z-]+)?\s*(?:{nouns})\b", lowered
     ) or re.search(
         rf"\b(?:use|with|by)\s+({number})\b|^\s*({number})\s+(?:around|along|inside|between)",
         lowered,
     )
     if re.search(r"\b(?:each|every)\b.*corner", lowered):  # "one robot at each": not one in all
         found = re.search(rf"({number})\s+corners?", lowered)
+    loose = _loose_count(lowered, number, nouns)
+    if loose is not None:
+        return None, loose
     if found is None:
         return None, None
     word = next(group for group in found.groups() if group)
     value = _number(word.strip())
     return (value, None) if value is not None else (None, found[0].strip())
+
+
+def _loose_count(text: str, number: str, nouns: str) -> str | None:
+    """Words that leave the number open: 6 to 8 robots, more than six robots, 3 + 4 robots."""
+    joined = r"\s*(?:to|or|plus|but|,?\s*no,?|[+*x/])\s*"
+    several = rf"(?:{number})(?:{joined})+(?:{number})\s+(?:{nouns})\b"
+    digits = rf"[0-9]+\s*[-\u2013]\s*[0-9]+\s+(?:{nouns})\b"
+    bound = rf"\b(?:(?:more|fewer|less) than|not)\s+(?:{number})\b(?!\s*px|\s*pixel)"
+    share = rf"(?:{number})\s*(?:%|percent\b)"
+    found = re.search(rf"{digits}|{several}|{bound}|{share}", text)
+    return found[0].strip() if found else None
 
 
 def _number_words() -> str:
@@ -154,6 +177,9 @@ def _number(word: str) -> int | None:
 def _beyond(words: Words, relations: list[str], side: str | None) -> tuple[str, ...]:
     """What the words also say that these rules do not carry out."""
     found = _matches("beyond", words)
+    straight = [s for s in _matches("sides", words) if s in ("left", "right", "top", "bottom")]
+    if "along" in relations and len(straight) > 1:
+        found.append(f"the {' and the '.join(straight)} side at once")
     if side and any(r in ("inside", "around", "cage") for r in relations):
         found.append(f"the {side} side of it")
     return tuple(found)
@@ -164,6 +190,17 @@ def _foreign_units(text: str) -> list[str]:
     units = "|".join(_vocabulary()["units"])
     amount = rf"(?:[0-9][0-9.,]*|{_number_words()}|\bhalf\s+an?|\ban?)"
     return re.findall(rf"{amount}\s*(?:{units})s?\b", text.lower())
+
+
+def _bounds(text: str) -> list[str]:
+    """Lengths that are no distance to keep: at most 20 px, 20 px apart, of radius 5 px."""
+    length = r"[0-9]+(?:\.[0-9]+)?\s*(?:px|pixels?)\b"
+    before = (
+        r"(?:at most|up to|less than|no more than|within|radius|diameter|spac\w+"
+        r"|[0-9]+ (?:and|to|or))"
+    )
+    after = r"(?:apart|wide|long|high|tall|big|in diameter|in size|between)"
+    return re.findall(rf"{before}(?: of| a| an)*\s+{length}|{length}\s+{after}\b", text.lower())
 
 
 def _clearance(text: str) -> float | None:

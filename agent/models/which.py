@@ -13,7 +13,10 @@ from typing import Any
 from ...tools.perception.descriptions import SINGLE
 from ..messages import Call, History, Reply, Result, User
 from .describe import Reference
+from .phrases import table
 
+CROWDED, FAINT = 20, 0.6
+"""More things than this, or fainter ones, are rather patches than what people speak of."""
 MOST_ASKED = 24
 """Candidates that one question offers: more cannot be told apart on a picture."""
 POINT = "point at it with --point X,Y, --box X0,Y0,X1,Y1 or --outline X1,Y1,X2,Y2,..."
@@ -38,7 +41,7 @@ class Step:
 
 def find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
     """The candidates meant, as many as are needed, or what to do to learn them."""
-    chosen = [Found(name, "the chosen thing", ()) for name in chosen_candidates(history)]
+    chosen = [Found(name, "the chosen thing", ()) for name in chosen_candidates(history, needed)]
     if len(chosen) >= needed:
         return chosen[:needed]
     if needed == 2 and len(things) == 1 and things[0].plural and not chosen:
@@ -47,7 +50,7 @@ def find(things: Sequence[Reference], needed: int, history: History) -> list[Fou
         named = " or ".join(f'"{t.said}"' for t in things)
         return _ask_all(f"Which thing is the arrangement about: {named}?", history)
     found: list[Found] = []
-    for thing in things[: needed - len(chosen)] if not chosen else []:
+    for thing in things[: needed - len(chosen)] if not chosen else ():
         one = _one(thing, history)
         if isinstance(one, Step):
             return one
@@ -58,15 +61,26 @@ def find(things: Sequence[Reference], needed: int, history: History) -> list[Fou
     return _ask_all(f"{which} The words name none that can be found by its look.", history)
 
 
-def chosen_candidates(history: History) -> list[str]:
-    """Candidates that the person chose among those offered, in order."""
+def chosen_candidates(history: History, needed: int) -> list[str]:
+    """Candidates that the person chose among those offered, in order.
+
+    An answer that names more than are needed, or says which it is not, chooses nothing.
+    """
     chosen: list[str] = []
     for call in _calls(history):
         if call.name == "ask_user" and call.arguments.get("candidates"):
-            answer = next((m.text for m in history if _answers(m, call)), "")
-            names = [f"c{n}" for n in re.findall(r"(?<![-.\w])c?([0-9]{1,4})\b", answer.lower())]
-            chosen += [n for n in names if n in call.arguments["candidates"]]
+            answer = next((m.text for m in history if _answers(m, call)), "").lower()
+            numbers = re.findall(r"(?<![-.\w])c?([0-9]{1,4})(?!\.?[0-9])\b", answer)
+            offered = [f"c{n}" for n in numbers if f"c{n}" in call.arguments["candidates"]]
+            named = list(dict.fromkeys([*chosen, *offered]))
+            if len(named) <= needed and not _excludes(answer):
+                chosen = named
     return chosen
+
+
+def _excludes(answer: str) -> bool:
+    words = set(re.findall(r"[a-z']+", answer))
+    return bool(words & {*table()["blockers"], *table()["differences"]["negation"]})
 
 
 def _answers(message: User | Reply | Result, call: Call) -> bool:
@@ -84,12 +98,12 @@ def _one(thing: Reference, history: History) -> Found | Step:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
     alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and query)
-    if reply["settled"] and (alone or not _says_little(thing)):
+    if reply["settled"] and (alone or not _says_little(thing, _is_clear(reply))):
         return Found(matches[0]["id"], thing.said, tuple(matches[0].get("reasons", ())))
     if matches:
         why = reply["doubt"] or f"{_listed(matches)} may be meant"
         return _ask(f'Which one is "{thing.said}"? {_sentence(why)}', matches)
-    if reply["lacking"] and query == thing.query and not thing.unknown:
+    if reply["absent"] and query == thing.query and not thing.unknown:
         reason = f'"{thing.said}" is not in the picture: {reply["lacking"]}.'
         return Step("report_impossible", {"reason": reason})
     why = reply["lacking"] or reply["doubt"]
@@ -112,7 +126,7 @@ def _trouble(thing: Reference) -> str:
     """Why a description cannot be decided on measures at all, as a question."""
     if thing.plural:
         return f'Which one of "{thing.said}"? Robots are placed about one thing at a time.'
-    if thing.refused or not thing.noun and not thing.query:
+    if thing.refused or (not thing.noun and not thing.query):
         words = thing.refused or thing.said
         return (
             f'Which one is "{thing.said}"? The offline rules know things by colour, shape, size '
@@ -121,17 +135,23 @@ def _trouble(thing: Reference) -> str:
     return ""
 
 
-def _says_little(thing: Reference) -> bool:
+def _is_clear(reply: dict[str, Any]) -> bool:
+    """Whether the match stands out in a picture that is not full of patches."""
+    return reply["things"] <= CROWDED and reply["candidates"][0]["salience"] >= FAINT
+
+
+def _says_little(thing: Reference, clear: bool) -> bool:
     """Whether a noun that measures cannot tell would decide it, alone or by a rank among its kind.
 
-    A rank among mugs is none among all things. Such a thing must be the only one, or fit the
-    noun as the one that stands out most.
+    A rank among mugs is none among all things, nor among the long patches of an aerial picture.
+    Such a thing must be the only one, or fit the noun as the one that stands out most.
     """
     if thing.noun in ("any", ""):
         return not thing.query
     ranked = any(p["by"] not in SINGLE for p in thing.query.get("picks", ()))
     unmeasured = thing.noun != "shape" and thing.whole_query == thing.query
-    return (thing.weak and not thing.query) or (unmeasured and ranked)
+    loose = unmeasured or (thing.weak and not clear)
+    return (thing.weak and not thing.query) or (loose and ranked)
 
 
 def _ask(question: str, matches: Sequence[dict[str, Any]]) -> Step:

@@ -173,7 +173,7 @@ def test_a_candidate_is_a_target_by_its_id() -> None:
     (red,) = call(workspace, "locate_object", query=query)["candidates"]
     data = call(workspace, "segment", id="t1", candidate=red["id"])
     assert data["area_px"] == pytest.approx(3000, rel=0.05)
-    with pytest.raises(ToolError, match="no candidate 'c99'. Candidates: c1 to c3"):
+    with pytest.raises(ToolError, match="no candidate 'c99'"):
         call(workspace, "segment", id="t1", candidate="c99")
 
 

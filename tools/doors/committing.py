@@ -36,7 +36,8 @@ def propose_formation(
 
     Args:
         contract: what the positions must satisfy; its robots must add up to those asked for.
-        targets: things not segmented yet, each by candidate, box, points or outline; they get the ids given.
+        targets: things not segmented yet, each by candidate, box, points or outline; they get
+            the ids given.
         positions: (x, y) of every robot, image pixels, y down, in the order of the groups.
         samples: names of samples (s1, ...) to use as positions, in the order of the groups.
     """

@@ -48,6 +48,7 @@ def sighting(candidate: Candidate, reasons: tuple[str, ...] = ()) -> dict[str, A
         "area_px": round(seen.area),
         "elongation": round(seen.elongation, 2),
         "orientation_deg": round(seen.orientation),
+        "salience": round(candidate.salience, 2),
     }
     if seen.hole > 0:
         data["hole"] = round(seen.hole, 2)

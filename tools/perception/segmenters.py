@@ -20,8 +20,8 @@ class Segmenter:
     """A way to make masks, with the confidence below which it is not believed.
 
     Attributes:
-        thresholds: t per way of pointing (point, box, outline, candidate). Points mean parts as often as
-            wholes, so only the clearest are taken; drawn outlines are mostly right already.
+        thresholds: t per way of pointing (point, box, outline, candidate). Points mean parts as
+            often as wholes, so only the clearest are taken; drawn outlines are mostly right.
     """
 
     name: str

@@ -194,7 +194,7 @@ def test_strong_noise_holds_nothing_that_stands_out() -> None:
         assert all(c.salience < 0.4 for c in find_candidates(picture.astype(np.uint8)))
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (3, 3), (2, 500), (500, 2), (7, 9)])
+@pytest.mark.parametrize("shape", [(1, 1), (3, 3), (2, 500), (500, 2), (1, 5000), (7, 9)])
 def test_tiny_pictures_are_survived(shape: tuple[int, int]) -> None:
     assert find_candidates(np.full((*shape, 3), 130, dtype=np.uint8)) == ()
     noise = np.random.default_rng(0).integers(0, 256, (*shape, 3), dtype=np.uint8)
