@@ -3,9 +3,11 @@
 import asyncio
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
+from ..prompts import Prompt, PromptError, list_prompts, load_prompt
 from ..tools.doors import TOOLS
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
@@ -26,6 +28,7 @@ from .task import task_text
 MAX_INSTRUCTION = 4_000
 """Characters; longer texts are no instruction, and cost whoever reads them."""
 Show = Callable[[User | Reply | Result], None]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -41,25 +44,36 @@ class Agent:
     """Carries out instructions on pictures.
 
     Args:
-        model: a name (`offline`) or any object with a name and a `reply` method.
+        model: a name (`offline`, `openai:NAME` and so on) or any object with a name and a `reply`
+            method. Its `prompt`, if it has one, is the id of the prompt it is given by default;
+            its `aclose`, if it has one, is awaited by `run` and `answer` when they are done.
+        base_url: of the server, for a model given by name.
+        prompt: `id@vNNN`; None for the newest version of the model's own.
         tools: what the model may call.
-        system: the prompt; the offline planner reads none.
+        system: a text in place of a prompt; the offline planner reads neither.
         limits: bounds of each run.
 
     Raises:
-        InputError: an unknown model name.
+        InputError: an unknown model or prompt, or a model that cannot be asked.
     """
 
     def __init__(
         self,
         model: str | Model = "offline",
         *,
+        base_url: str | None = None,
+        prompt: str | None = None,
         tools: tuple[Tool, ...] = TOOLS,
         system: str = "",
         limits: Limits = DEFAULT_LIMITS,
     ) -> None:
-        self.model = model_named(model) if isinstance(model, str) else model
-        self.tools, self.system, self.limits = tools, system, limits
+        if base_url is not None and not isinstance(model, str):
+            raise InputError("A base URL goes with a model's name; this model is an object.")
+        self.model = model_named(model, base_url) if isinstance(model, str) else model
+        own = None if system else getattr(self.model, "prompt", None)
+        self.prompt = _prompt(prompt, own)
+        self.system = self.prompt.text if self.prompt else system
+        self.tools, self.limits = tools, limits
 
     def run(
         self,
@@ -76,7 +90,9 @@ class Agent:
             InputError: something given cannot be used.
         """
         return asyncio.run(
-            self.arun(picture, instruction, pointed=pointed, settings=settings, show=show)
+            self._closing(
+                self.arun(picture, instruction, pointed=pointed, settings=settings, show=show)
+            )
         )
 
     async def arun(
@@ -115,7 +131,7 @@ class Agent:
         Raises:
             InputError: the run asked nothing, or the answer cannot be used.
         """
-        return asyncio.run(self.aanswer(asked, text, show=show))
+        return asyncio.run(self._closing(self.aanswer(asked, text, show=show)))
 
     async def aanswer(self, asked: Run, text: str, *, show: Show | None = None) -> Run:
         """Go on from a question with its answer.
@@ -158,7 +174,34 @@ class Agent:
         )
         seconds = time.perf_counter() - began
         report = _report(outcome, workspace, instruction, self.model.name, seconds)
+        if self.prompt:
+            facts = {"id": self.prompt.id, "version": self.prompt.version}
+            prompt = {**facts, "sha256": self.prompt.sha256}
+            report = report.model_copy(update={"prompt": prompt})
         return Run(report, outcome, workspace)
+
+    async def aclose(self) -> None:
+        """Close what the model keeps open in the running event loop; it may be used again."""
+        close: Callable[[], Awaitable[Any]] | None = getattr(self.model, "aclose", None)
+        if close is not None:
+            await close()
+
+    async def _closing(self, run: Awaitable[T]) -> T:
+        """A run with an event loop of its own: connections cannot outlive it."""
+        try:
+            return await run
+        finally:
+            await self.aclose()
+
+
+def _prompt(name: str | None, own: str | None) -> Prompt | None:
+    """The prompt of a name, else the newest of the model's own, if it has one."""
+    if name is None and own is not None:
+        name = max(n for n in list_prompts() if n.startswith(f"{own}@"))
+    try:
+        return load_prompt(name) if name is not None else None
+    except PromptError as error:
+        raise InputError(str(error)) from None
 
 
 def _check(instruction: str, robots: int | None) -> None:

@@ -35,9 +35,15 @@ class Call(_Value):
 
 
 class Usage(_Value):
-    """What one request cost; zero where nothing is counted."""
+    """What one request cost; zero where nothing is counted.
+
+    Attributes:
+        input_tokens: all of the input.
+        cached_tokens: those of the input that the provider read from its cache.
+    """
 
     input_tokens: int = 0
+    cached_tokens: int = 0
     output_tokens: int = 0
     cost_usd: float = 0.0
 

@@ -8,8 +8,6 @@ from rich.console import Console
 
 from ..agent.agent import Agent, Run
 from ..agent.report import Report
-from ..prompts import PromptError, load_prompt
-from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
 from ..tools.workspace import Settings
 from . import evaluate, inputs, plans, tools
@@ -46,6 +44,7 @@ def run(
     as_json: o.Json = False,
     out: o.Out = None,
     model: o.ModelName = "offline",
+    base_url: o.BaseUrl = None,
     prompt: o.PromptName = None,
     segmenter: o.SegmenterName = "grabcut",
     threshold: o.Threshold = None,
@@ -69,9 +68,8 @@ def run(
         seed=inputs.whole("--seed", seed, least=0),
         may_deploy=not plan_only,
     )
-    settings.check()
     pointed = inputs.pointed(point or [], box or [], outline or [], target or [])
-    agent, picture = _agent(model, prompt), load_picture(image)
+    agent, picture = _agent(model, base_url, prompt), load_picture(image)
     folder, trace = Folder(out), Trace()
     try:
         result = agent.run(picture, instruction, pointed=pointed, settings=settings, show=trace)
@@ -94,19 +92,16 @@ def _told(folder: Folder, result: Run, image: Path, trace: Trace, as_json: bool)
     return report
 
 
-def _agent(model: str, prompt: str | None) -> Agent:
-    agent = Agent(model)
-    if prompt is None:
+def _agent(model: str, base_url: str | None, prompt: str | None) -> Agent:
+    agent = Agent(model, base_url=base_url, prompt=prompt)
+    if model != "offline" or agent.prompt is None:
         return agent
-    try:
-        known = load_prompt(prompt)
-    except PromptError as error:
-        raise InputError(str(error)) from None
     print(  # noqa: T201
-        f"formup: the offline planner is rules and reads no prompt; {known.name} is not used.",
+        "formup: the offline planner is rules and reads no prompt; "
+        f"{agent.prompt.name} is not used.",
         file=sys.stderr,
     )
-    return agent
+    return Agent(model)
 
 
 def _print(report: Report, folder: Path, as_json: bool) -> None:

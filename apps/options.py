@@ -27,7 +27,15 @@ PlanOnly = Annotated[bool, typer.Option("--plan-only", help="Certify a plan but 
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; default: formup-runs/TIME.")
 ]
-ModelName = Annotated[str, typer.Option("--model", help="Who decides; offline is rules, no AI.")]
+ModelName = Annotated[
+    str,
+    typer.Option(
+        "--model", help="Who decides: offline (rules, no AI), openai:, anthropic: or ollama:NAME."
+    ),
+]
+BaseUrl = Annotated[
+    str | None, typer.Option("--base-url", help="The model's server, if not the provider's own.")
+]
 PromptName = Annotated[
     str | None, typer.Option("--prompt", help="ID@VERSION; the offline rules read none.")
 ]

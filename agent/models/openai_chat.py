@@ -1,0 +1,295 @@
+"""OpenAI Chat Completions, and what else speaks it: vLLM, Ollama, llama.cpp, LM Studio, ...
+
+Only fields that every such server knows are sent, and never a null: some refuse either.
+"""
+
+import re
+from functools import lru_cache
+from typing import Annotated, Any, cast
+
+from annotated_types import MinLen
+from pydantic import BaseModel, ValidationError
+from pydantic_core import from_json
+
+from ...tools.tool import Tool
+from ..messages import Reply, Result, Usage, User
+from ..model import Request
+from .failures import AskError, cut_off, empty, foreign, refused
+from .prices import Price
+from .wire import (
+    Once,
+    base64_text,
+    count,
+    dumped,
+    make_calls,
+    media_type,
+    safe_name,
+)
+
+_THOUGHTS = re.compile(r"\A\s*<think>.*?</think>", re.DOTALL)
+_FENCES = re.compile(r"\A(?:```(?:json)?\s(.*)```|<tool_call>(.*)</tool_call>)\Z", re.DOTALL)
+
+
+class _Function(BaseModel):
+    name: str | None = None
+    arguments: Any = None
+
+
+class _Call(BaseModel):
+    index: int | None = None
+    id: str | int | None = None
+    function: _Function = _Function()
+
+
+class _Message(BaseModel):
+    """A message, or in a stream the fragment of one."""
+
+    content: str | list[dict[str, Any]] | None = None
+    refusal: str | None = None
+    tool_calls: list[_Call] | None = None
+
+    @property
+    def text(self) -> str:
+        if isinstance(self.content, list):  # some servers answer in parts, as one may ask
+            return "".join(str(part.get("text") or "") for part in self.content)
+        return self.content or ""
+
+
+class _Choice(BaseModel):
+    message: _Message
+    finish_reason: str | None = None
+
+
+class _Completion(BaseModel):
+    choices: Annotated[list[_Choice], MinLen(1)]
+    usage: Any = None
+
+
+class _Fragment(BaseModel):
+    index: int | None = None
+    delta: _Message | None = None
+    finish_reason: str | None = None
+
+
+class _Chunk(BaseModel):
+    choices: list[_Fragment] | None = None
+    usage: Any = None
+
+
+class OpenAIChat:
+    """Speaks Chat Completions.
+
+    Args:
+        model: as the server calls it.
+        price: of its tokens.
+    """
+
+    path = "/chat/completions"
+
+    def __init__(self, model: str, price: Price) -> None:
+        self._model, self.price = dumped(model), price
+        self._messages = Once(_written)
+
+    def headers(self, key: str | None) -> dict[str, str]:
+        """The key, where there is one."""
+        return {"authorization": f"Bearer {key}"} if key else {}
+
+    def body(self, request: Request, *, stream: bool) -> bytes:
+        """A request as JSON."""
+        written = [_system(request.system)] if request.system else []
+        pictures: list[bytes] = []
+        for message in request.messages:
+            if pictures and not isinstance(message, Result):
+                written += pictures
+                pictures = []
+            text, picture = self._messages(message)
+            written.append(text)
+            if picture:
+                pictures.append(picture)
+        parts = [b'{"model":', self._model, b',"messages":[', b",".join(written + pictures), b"]"]
+        if request.tools:
+            parts += [b',"tools":', _tools(request.tools)]
+        if stream:
+            parts.append(b',"stream":true,"stream_options":{"include_usage":true}')
+        return b"".join([*parts, b"}"])
+
+    def reading(self, request: Request) -> "_Reading":
+        """How the answer to a request is read."""
+        return _Reading(request, self.price)
+
+
+class _Reading:
+    def __init__(self, request: Request, price: Price) -> None:
+        self._request, self._price = request, price
+
+    def assembly(self) -> "_Assembly":
+        return _Assembly()
+
+    def reply(self, data: Any) -> Reply:
+        try:
+            completion = _Completion.model_validate(data)
+        except ValidationError:
+            raise foreign("something that is no chat completion") from None
+        choice = completion.choices[0]
+        message = choice.message
+        if message.refusal:
+            raise refused(message.refusal)
+        _check_end(choice.finish_reason)
+        text = _THOUGHTS.sub("", message.text).strip()
+        written = [
+            (None if c.id is None else str(c.id), c.function.name or "", c.function.arguments)
+            for c in message.tool_calls or ()
+        ]
+        if not written and (call := call_in_text(text, self._request.tools)):
+            text, written = "", [(None, *call)]
+        if not text and not written:
+            raise empty()
+        calls = make_calls(written, self._request.messages)
+        return Reply(text=text, calls=calls, usage=_usage(completion.usage, self._price))
+
+
+class _Assembly:
+    def __init__(self) -> None:
+        self.done = False
+        self._text: list[str] = []
+        self._refusal: list[str] = []
+        self._calls: list[dict[str, Any]] = []
+        self._at: dict[int | None, dict[str, Any]] = {}
+        self._finish: str | None = None
+        self._usage: Any = None
+
+    def add(self, event: Any) -> str:
+        try:
+            chunk = _Chunk.model_validate(event)
+        except ValidationError:
+            raise foreign("a stream of something else than chat completions") from None
+        self._usage = chunk.usage or self._usage
+        shown = ""
+        for choice in chunk.choices or ():
+            if choice.index:
+                continue  # one answer was asked for
+            if choice.finish_reason:
+                self._finish, self.done = choice.finish_reason, True
+            if choice.delta:
+                shown += self._take(choice.delta)
+        return shown
+
+    def whole(self) -> Any:
+        calls = [
+            {"id": c["id"], "function": {"name": c["name"], "arguments": "".join(c["arguments"])}}
+            for c in self._calls
+        ]
+        content, refusal = "".join(self._text), "".join(self._refusal)
+        message = {"content": content, "refusal": refusal, "tool_calls": calls}
+        return {
+            "choices": [{"message": message, "finish_reason": self._finish}],
+            "usage": self._usage,
+        }
+
+    def _take(self, delta: _Message) -> str:
+        self._text.append(delta.text)
+        self._refusal.append(delta.refusal or "")
+        for part in delta.tool_calls or ():
+            call = self._at.get(part.index)
+            # Some servers leave the index out, or give every parallel call the same one.
+            if call is None or (part.id and call["id"] and part.id != call["id"]):
+                call = self._at[part.index] = {"id": None, "name": None, "arguments": []}
+                self._calls.append(call)
+            call["id"] = call["id"] or part.id
+            call["name"] = call["name"] or part.function.name
+            given = part.function.arguments
+            if given is not None:
+                call["arguments"].append(
+                    given if isinstance(given, str) else dumped(given).decode()
+                )
+        return delta.text
+
+
+def call_in_text(text: str, tools: tuple[Tool, ...]) -> tuple[str, dict[str, Any]] | None:
+    """The call that a text is and nothing else: name and arguments, or None.
+
+    Servers that do not know a model's format leave its calls in the text. One is taken as a call
+    only if the whole text, a code fence or tool_call tags aside, is one JSON object of `name` and
+    `arguments` (or `parameters`) and the name is a tool's; anything more may be meant as words.
+    """
+    fenced = _FENCES.match(text)
+    try:
+        data: Any = from_json((fenced[1] or fenced[2]) if fenced else text, allow_inf_nan=False)
+    except ValueError:
+        return None
+    if not isinstance(data, dict):
+        return None
+    fields = dict(cast("dict[str, Any]", data))
+    if fields.get("type") == "function":
+        del fields["type"]
+    name, arguments = fields.get("name"), fields.get("arguments", fields.get("parameters"))
+    known = any(tool.name == name for tool in tools)
+    if len(fields) != 2 or not known or not isinstance(arguments, dict):
+        return None
+    return str(name), cast("dict[str, Any]", arguments)
+
+
+def _check_end(reason: str | None) -> None:
+    if reason == "length":
+        raise cut_off()
+    if reason == "content_filter":
+        raise refused("its provider's filter of contents")
+    if reason == "error":
+        raise AskError("broke its reply off with an error", "try again later", "later")
+
+
+def _usage(usage: Any, price: Price) -> Usage:
+    given, written = count(usage, "prompt_tokens"), count(usage, "completion_tokens")
+    cached = min(given, count(usage, "prompt_tokens_details", "cached_tokens"))
+    cost = price.cost(fresh=given - cached, cached=cached, output=written)
+    return Usage(input_tokens=given, cached_tokens=cached, output_tokens=written, cost_usd=cost)
+
+
+def _written(message: User | Reply | Result) -> tuple[bytes, bytes | None]:
+    """A message, and the one that must follow the last result to show its images."""
+    if isinstance(message, User):
+        return _user(message.text, message.images), None
+    if isinstance(message, Reply):
+        return _assistant(message), None
+    result = {"role": "tool", "tool_call_id": safe_name(message.call_id), "content": message.text}
+    said = f"What {safe_name(message.name)} shows ({safe_name(message.call_id)}):"
+    # Results of tools hold text only in this interface.
+    return dumped(result), _user(said, message.images) if message.images else None
+
+
+def _user(text: str, images: tuple[bytes, ...]) -> bytes:
+    if not images:
+        return dumped({"role": "user", "content": text})
+    urls = [f"data:{media_type(image)};base64,{base64_text(image)}" for image in images]
+    shown = [{"type": "image_url", "image_url": {"url": url}} for url in urls]
+    return dumped({"role": "user", "content": [{"type": "text", "text": text}, *shown]})
+
+
+def _assistant(reply: Reply) -> bytes:
+    message: dict[str, Any] = {"role": "assistant", "content": reply.text}
+    if reply.calls:
+        message["tool_calls"] = [
+            {
+                "id": safe_name(call.id),
+                "type": "function",
+                "function": {
+                    "name": safe_name(call.name),
+                    "arguments": dumped(call.arguments).decode(),
+                },
+            }
+            for call in reply.calls
+        ]
+    return dumped(message)
+
+
+@lru_cache(maxsize=16)
+def _system(text: str) -> bytes:
+    return dumped({"role": "system", "content": text})
+
+
+@lru_cache(maxsize=16)
+def _tools(tools: tuple[Tool, ...]) -> bytes:
+    functions = [
+        {"name": t.name, "description": t.description, "parameters": t.schema} for t in tools
+    ]
+    return dumped([{"type": "function", "function": function} for function in functions])

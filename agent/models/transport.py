@@ -1,0 +1,229 @@
+"""HTTP to a model's server: one client, bounded retries, server-sent events, replies whole.
+
+Whether streamed or not, what comes out is one complete reply; fragments are only shown.
+"""
+
+import asyncio
+import random
+import ssl
+from asyncio import AbstractEventLoop
+from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import cache
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import httpx
+from pydantic_core import from_json
+
+from ...tools.errors import ModelError
+from ..messages import Reply
+from .endpoint import Endpoint
+from .failures import AskError, foreign, of_error_body, of_status
+from .wire import Assembly, Reading, Show
+
+TRIES = 4
+FIRST_PAUSE = 0.5
+"""Seconds before the second try; doubled before each further one."""
+CONNECT_S = 10.0
+SILENCE_S = 300.0
+"""The longest a server may say nothing: large models think for minutes."""
+MAX_BYTES = 64 * 2**20
+
+Sleep = Callable[[float], Awaitable[object]]
+
+
+class Transport:
+    """Asks one URL, again where that may help.
+
+    Args:
+        endpoint: whom.
+        url: where exactly.
+        headers: sent with every request, the key among them.
+        sleep: waits between tries.
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        url: str,
+        headers: dict[str, str],
+        *,
+        sleep: Sleep = asyncio.sleep,
+    ) -> None:
+        common = {"content-type": "application/json", "user-agent": "formup"}
+        self._endpoint, self._url, self._sleep = endpoint, httpx.URL(url), sleep
+        self._headers = httpx.Headers(common | headers)
+        self._clients: WeakKeyDictionary[AbstractEventLoop, httpx.AsyncClient]
+        # Connections belong to an event loop, and every Agent.run has its own.
+        self._clients = WeakKeyDictionary()
+
+    async def ask(self, body: bytes, reading: Reading, show: Show | None = None) -> Reply:
+        """Send a request until it is answered.
+
+        Raises:
+            ModelError: it will not be; one sentence says who did what and what to do.
+        """
+        before: str | None = None
+        tries = 0
+        while True:
+            tries += 1
+            try:
+                return await self._once(body, reading, show)
+            except AskError as failure:
+                if tries == TRIES or failure.ends(before):
+                    raise ModelError(self._sentence(failure, tries)) from None
+                before, pause = failure.what, _pause(failure, tries)
+            if show is not None:
+                show(None)
+            await self._sleep(pause)
+
+    async def aclose(self) -> None:
+        """Close the connections of the running event loop; a later request makes new ones."""
+        client = self._clients.pop(asyncio.get_running_loop(), None)
+        if client is not None:
+            await client.aclose()
+
+    def _sentence(self, failure: AskError, tries: int) -> str:
+        counted = f" (tried {tries} times)" if tries > 1 else ""
+        end = "" if failure.advice.endswith("?") else "."
+        text = f"The model at {self._endpoint.base_url} {failure.what}{counted}: {failure.advice}"
+        return self._endpoint.without_key(text + end)
+
+    def _client(self) -> httpx.AsyncClient:
+        loop = asyncio.get_running_loop()
+        client = self._clients.get(loop)
+        if client is None:
+            timeout = httpx.Timeout(SILENCE_S, connect=CONNECT_S, pool=None)
+            proxied = not self._endpoint.is_loopback
+            client = httpx.AsyncClient(timeout=timeout, trust_env=proxied, verify=_tls())
+            self._clients[loop] = client
+        return client
+
+    async def _once(self, body: bytes, reading: Reading, show: Show | None) -> Reply:
+        # Built here, not by the client: that would merge headers and URLs anew for every turn.
+        request = httpx.Request("POST", self._url, headers=self._headers, content=body)
+        try:
+            response = await self._client().send(request, stream=True)
+            try:
+                return await self._read(response, reading, show)
+            finally:
+                await response.aclose()
+        except httpx.HTTPError as error:
+            raise _of_network(error) from None
+
+    async def _read(self, response: httpx.Response, reading: Reading, show: Show | None) -> Reply:
+        advice = self._endpoint.key_advice
+        if not response.is_success:
+            body = await _all(response)
+            raise of_status(response.status_code, response.headers, body, advice)
+        if response.headers.get("content-type", "").startswith("text/event-stream"):
+            return reading.reply(await self._assembled(response, reading.assembly(), show))
+        data = _parsed(await _all(response))
+        if failure := of_error_body(data, advice):
+            raise failure
+        reply = reading.reply(data)
+        if show is not None:
+            show(reply.text)
+        return reply
+
+    async def _assembled(
+        self, response: httpx.Response, assembly: Assembly, show: Show | None
+    ) -> Any:
+        events = Events()
+        try:
+            async for chunk in _chunks(response):
+                for event in events.feed(chunk):
+                    if event == b"[DONE]":
+                        assembly.done = True
+                        continue
+                    data = _parsed(event)
+                    if failure := of_error_body(data, self._endpoint.key_advice):
+                        raise failure
+                    text = assembly.add(data)
+                    if text and show is not None:
+                        show(text)
+        except httpx.HTTPError:
+            if not assembly.done:
+                raise
+        if not assembly.done:
+            raise _dropped()
+        return assembly.whole()
+
+
+class Events:
+    """Server-sent events out of bytes, however these are cut."""
+
+    def __init__(self) -> None:
+        self._rest: list[bytes] = []
+        self._data: list[bytes] = []
+
+    def feed(self, chunk: bytes) -> list[bytes]:
+        """Data of the events that are complete with this chunk."""
+        self._rest.append(chunk)
+        if b"\n" not in chunk:
+            return []
+        *lines, rest = b"".join(self._rest).split(b"\n")
+        self._rest = [rest]
+        events: list[bytes] = []
+        for line in lines:
+            content = line.rstrip(b"\r")
+            if content.startswith(b"data:"):
+                self._data.append(content[5:].strip())
+            elif not content and self._data:
+                events.append(b"\n".join(self._data))
+                self._data = []
+        return events
+
+
+@cache
+def _tls() -> ssl.SSLContext:
+    """Reading the certificates takes longer than most of a turn; clients share them."""
+    return httpx.create_ssl_context()
+
+
+async def _chunks(response: httpx.Response) -> AsyncIterator[bytes]:
+    size = 0
+    async for chunk in response.aiter_bytes():
+        size += len(chunk)
+        if size > MAX_BYTES:
+            advice = "is the base URL right?"
+            raise AskError(f"answered with more than {MAX_BYTES // 2**20} MiB", advice)
+        yield chunk
+
+
+async def _all(response: httpx.Response) -> bytes:
+    return b"".join([chunk async for chunk in _chunks(response)])
+
+
+def _parsed(body: bytes) -> Any:
+    try:
+        return from_json(body)
+    except ValueError:
+        raise foreign("something that is not JSON") from None
+
+
+def _dropped() -> AskError:
+    return AskError("dropped the connection before its reply was complete", "try again", "later")
+
+
+def _of_network(error: httpx.HTTPError) -> AskError:
+    """What the network did. No request is repeated in the text: it holds the key."""
+    if isinstance(error, httpx.ConnectTimeout):
+        what = f"could not be reached within {CONNECT_S:.0f} s"
+        return AskError(what, "is the address right, and the network up?", "unless-same")
+    if isinstance(error, httpx.TimeoutException):
+        what = f"sent nothing for {SILENCE_S:.0f} s"
+        return AskError(what, "use a faster model, or try again later", "unless-same")
+    if isinstance(error, httpx.ConnectError):
+        what = f"could not be reached ({error})"
+        return AskError(what, "is it running, and the address right?", "unless-same")
+    if isinstance(error, httpx.NetworkError | httpx.RemoteProtocolError):
+        return _dropped()
+    return AskError(f"could not be asked ({type(error).__name__})", "is the base URL right?")
+
+
+def _pause(failure: AskError, tries: int) -> float:
+    """Seconds until the next try: what the server asks for, else doubling; never in step."""
+    if failure.wait is not None:
+        return failure.wait * (1 + 0.1 * random.random())
+    return FIRST_PAUSE * 2 ** (tries - 1) * (0.5 + 0.5 * random.random())

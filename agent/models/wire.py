@@ -1,0 +1,158 @@
+"""What every adapter needs: messages written once, calls read whatever they look like."""
+
+import base64
+import json
+import re
+import weakref
+from collections.abc import Callable, Iterable
+from typing import Any, Generic, Protocol, TypeVar, cast
+
+from pydantic_core import from_json
+
+from ..messages import Call, History, Reply, Result, User
+from ..model import Request
+
+T = TypeVar("T")
+UNREADABLE = "this is not a JSON object"
+"""The argument under which a model gets back what it wrote in place of its arguments. No tool has
+such a parameter, so the call fails and says so, and what is sent on to servers is valid JSON."""
+_JPEG = b"\xff\xd8"
+
+
+Show = Callable[[str | None], None]
+"""Given fragments of text as they come; None: what was shown of this reply is void."""
+
+
+class Assembly(Protocol):
+    """Puts the events of a stream together to what would have come unstreamed."""
+
+    done: bool
+    """Whether the reply is complete, whatever the connection does from here."""
+
+    def add(self, event: Any) -> str:
+        """Take an event in; the text it brings, for display.
+
+        Raises:
+            AskError: it is none of this provider's.
+        """
+        ...
+
+    def whole(self) -> Any:
+        """The complete body."""
+        ...
+
+
+class Reading(Protocol):
+    """How the answer to one request is read."""
+
+    def assembly(self) -> Assembly:
+        """A place for the events of one stream."""
+        ...
+
+    def reply(self, data: Any) -> Reply:
+        """What a complete body says.
+
+        Raises:
+            AskError: it is no reply that may be acted on.
+        """
+        ...
+
+
+class Wire(Protocol):
+    """One provider's language. It does no I/O."""
+
+    path: str
+    """What follows the base URL."""
+
+    def headers(self, key: str | None) -> dict[str, str]:
+        """What it wants beside the body."""
+        ...
+
+    def body(self, request: Request, *, stream: bool) -> bytes:
+        """A request as JSON."""
+        ...
+
+    def reading(self, request: Request) -> Reading:
+        """How the answer to a request is read."""
+        ...
+
+
+class Once(Generic[T]):
+    """Renders each message once, and forgets it together with the message.
+
+    Histories are tuples of frozen messages that grow at their end, so that the next turn finds
+    all but the last two here.
+    """
+
+    def __init__(self, render: Callable[[User | Reply | Result], T]) -> None:
+        self._render = render
+        self._known: dict[int, tuple[weakref.ref[User | Reply | Result], T]] = {}
+
+    def __call__(self, message: User | Reply | Result) -> T:
+        """The message as rendered before, or now."""
+        key = id(message)
+        known = self._known.get(key)
+        if known is None:
+            forget = weakref.ref(message, lambda _: self._known.pop(key, None))
+            known = self._known[key] = (forget, self._render(message))
+        return known[1]
+
+
+def dumped(value: object) -> bytes:
+    """Compact JSON; ASCII, so that no text whatever fails."""
+    return json.dumps(value, separators=(",", ":")).encode()
+
+
+def media_type(image: bytes) -> str:
+    """Of a PNG or JPEG file."""
+    return "image/jpeg" if image.startswith(_JPEG) else "image/png"
+
+
+def base64_text(image: bytes) -> str:
+    """A file as text."""
+    return base64.b64encode(image).decode()
+
+
+def safe_name(name: str) -> str:
+    """A name or id that no server refuses, for models make up others."""
+    return re.sub(r"[^a-zA-Z0-9_-]", "_", name)[:64] or "unnamed"
+
+
+def arguments_of(given: object) -> dict[str, Any]:
+    """A call's arguments, whether they come as text or as an object.
+
+    What is no JSON object is kept under `UNREADABLE`: the tool refuses it, the model reads why.
+    """
+    value: Any = given
+    if isinstance(given, str):
+        try:
+            value = from_json(given, allow_inf_nan=False) if given.strip() else {}
+        except ValueError:
+            return {UNREADABLE: given}
+    if value is None:
+        return {}
+    return cast("dict[str, Any]", value) if isinstance(value, dict) else {UNREADABLE: value}
+
+
+def make_calls(
+    written: Iterable[tuple[str | None, str, object]], history: History
+) -> tuple[Call, ...]:
+    """Calls from (id, name, arguments); ids that lack or repeat are made up, for each means one."""
+    taken = {c.id for m in history if isinstance(m, Reply) for c in m.calls}
+    calls: list[Call] = []
+    for given, name, arguments in written:
+        id, number = given or "call", len(taken)
+        while id in taken or id == "call":
+            number += 1
+            id = f"call_{number}"
+        taken.add(id)
+        calls.append(Call(id=id, name=name, arguments=arguments_of(arguments)))
+    return tuple(calls)
+
+
+def count(usage: object, *path: str) -> int:
+    """A number of tokens somewhere in a usage object; 0 where servers leave it out."""
+    value = usage
+    for name in path:
+        value = cast("dict[str, Any]", value).get(name) if isinstance(value, dict) else None
+    return value if isinstance(value, int) and value > 0 else 0

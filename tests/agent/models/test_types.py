@@ -1,0 +1,105 @@
+"""What is sent and what the tests' server says, held against the providers' own types."""
+
+import warnings
+from collections.abc import Iterable
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from formup.agent.agent import Agent
+from formup.agent.messages import Call, Reply, Result, User
+from formup.agent.model import Request
+from formup.agent.models.anthropic import Anthropic
+from formup.agent.models.openai_chat import OpenAIChat
+from formup.agent.models.prices import UNKNOWN
+from formup.prompts import load_prompt
+from formup.tools.doors import TOOLS
+from formup.tools.perception.image import picture_from_array
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import from_json
+
+WHY = "the provider's package of types is not installed: pip install 'formup[dev]'"
+PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))
+PNG = b"\x89PNG\r\n\x1a\n..."
+HISTORY = (
+    User(text="see", images=(PNG,)),
+    Reply(text="I look.", calls=(Call(id="a", name="look", arguments={"candidates": True}),)),
+    Result(call_id="a", name="look", text="{}", images=(PNG,)),
+    Reply(calls=(Call(id="b", name="measure", arguments={}),)),
+    Result(call_id="b", name="measure", text="b: is missing.", error="arguments"),
+)
+REQUEST = Request(load_prompt("former@v001").text, HISTORY, TOOLS)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def packages() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # theirs, at import
+        pytest.importorskip("openai", reason=WHY)
+        pytest.importorskip("anthropic", reason=WHY)
+
+
+def drained(value: Any) -> Any:
+    """A validated value with its lazy parts validated too."""
+    if isinstance(value, dict):
+        return {name: drained(part) for name, part in cast("dict[str, Any]", value).items()}
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes):
+        return [drained(part) for part in cast("Iterable[Any]", value)]
+    return value
+
+
+def accepted(kind: Any, sent: Any) -> None:
+    """Of the type, and without a field that it does not know."""
+    adapter: TypeAdapter[Any] = TypeAdapter(kind)  # must outlive the lazy parts
+    assert drained(adapter.validate_python(sent)) == sent
+
+
+@pytest.mark.parametrize("stream", [False, True])
+def test_openai_requests(stream: bool) -> None:
+    from openai.types.chat import completion_create_params as params
+
+    sent = from_json(OpenAIChat("m", UNKNOWN).body(REQUEST, stream=stream))
+    kinds = (params.CompletionCreateParamsNonStreaming, params.CompletionCreateParamsStreaming)
+    accepted(kinds[stream], sent)
+    sent["messages"][1]["role"] = "pirate"
+    with pytest.raises(ValidationError):
+        accepted(kinds[stream], sent)
+
+
+@pytest.mark.parametrize("stream", [False, True])
+def test_anthropic_requests(stream: bool) -> None:
+    from anthropic.types import message_create_params as params
+
+    sent = from_json(Anthropic("m", UNKNOWN).body(REQUEST, stream=stream))
+    kinds = (params.MessageCreateParamsNonStreaming, params.MessageCreateParamsStreaming)
+    accepted(kinds[stream], sent)
+    marks = str(sent).count("cache_control")
+    assert 0 < marks <= 4
+    sent["messages"][1]["content"][0]["type"] = "smell"
+    with pytest.raises(ValidationError):
+        accepted(kinds[stream], sent)
+
+
+def test_what_the_tests_server_says_is_what_the_providers_say(dialect: Any) -> None:
+    from anthropic.types import Message, RawMessageStreamEvent
+    from openai.types.chat import ChatCompletion, ChatCompletionChunk
+
+    said = ("text", [("a", "look", {"x": 1})], "calls")
+    whole, event = {
+        "openai": (ChatCompletion, TypeAdapter[Any](ChatCompletionChunk)),
+        "anthropic": (Message, TypeAdapter[Any](RawMessageStreamEvent)),
+    }[dialect.name]
+    whole.model_validate(dialect.body(*said))
+    for data in dialect.events(*said):
+        if data != "[DONE]" and data != {"type": "ping"}:
+            event.validate_python(data)
+
+
+def test_the_default_prompt_and_the_real_tools_are_sent(
+    server: Any, dialect: Any, say: Any
+) -> None:
+    server.script = [say("done")]
+    Agent(server.model(dialect.name)).run(PICTURE, "Surround it with 4 robots")
+    (sent,) = server.requests
+    assert len(sent["tools"]) == len(TOOLS)
+    assert "You place a team of robots" in str(sent)
