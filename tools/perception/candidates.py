@@ -19,7 +19,7 @@ from ..geometry.outline import Outline, outline_of
 from .attributes import Attributes, Candidate
 from .colours import colour_shares, lab_of
 from .contours import outline_of_mask
-from .grabcut import Bytes, Mask, Window, open_window, pieces, resampled
+from .grabcut import Bytes, Floats, Mask, Window, open_window, pieces, resampled
 from .prompts import TargetPrompt
 from .proposals import CELLS, IN_CELL, proposals
 from .segment import Segmentation
@@ -32,6 +32,9 @@ SIDE = 384
 SURE, LEAST = 1.5, 0.4
 # Words are decided among things at least this salient, or this share of the most salient one.
 CLEAR, CLEAR_SHARE = 0.6, 0.62
+# What comes three times or more is likelier a thing: so much its score rises. Alike are sizes to
+# this logarithm of their ratio, and colours to this distance in the features.
+REPEATED, ALIKE_SIZE, ALIKE_COLOUR = 1.15, 0.2, 15.0
 # Regions that share more than this are the same thing.
 SAME, VERY_SAME = 0.5, 0.85
 # One in another may be a part of it, if it is no more than this much the same.
@@ -66,7 +69,8 @@ def find_candidates(pixels: Bytes) -> tuple[Candidate, ...]:
     """The things in a picture (H, W, 3) RGB, numbered c1, c2, ... from the most salient one."""
     height, width = pixels.shape[:2]
     window = open_window(pixels, (0, 0, width, height), SIDE)
-    regions = [r for r in judged(proposals(window.features), window.features) if r.score >= LEAST]
+    least = LEAST / REPEATED
+    regions = [r for r in judged(proposals(window.features), window.features) if r.score >= least]
     small = resampled(pixels, (window.shape[1], window.shape[0]))
     found: list[Candidate] = []
     for thing in _things(_distinct(regions, window.features), window.features):
@@ -184,10 +188,33 @@ def _things(regions: Sequence[Region], features: Bytes) -> list[Thing]:
                 solid &= ~hole
             share = int(np.count_nonzero(solid)) / region.area
             things.append(Thing(region, holes, solid, region.score * share**0.5))
+    things = [t._replace(score=t.score * _repeated(t, things, features)) for t in things]
     clear = [t for t in things if t.score >= LEAST]
     filled = [t for t in clear if not any(_is_hole(t, w) for w in clear)]
     kept = [t for t in filled if not any(_is_part(t, w) for w in filled)]
     return sorted(kept, key=lambda t: -t.score)
+
+
+def _repeated(thing: Thing, things: Sequence[Thing], features: Bytes) -> float:
+    """REPEATED where two others or more have its size, proportions and colour, else 1."""
+    area, colour = np.count_nonzero(thing.solid), _colour(thing, features)
+    height, width = thing.solid.shape
+    alike = 0
+    for other in things:
+        sizes = np.count_nonzero(other.solid) / area
+        sides = np.sort(other.solid.shape) / np.sort((height, width))
+        near = np.abs(np.log([sizes, *sides])).max() < ALIKE_SIZE
+        if other is not thing and near:
+            alike += float(np.linalg.norm(_colour(other, features) - colour)) < ALIKE_COLOUR
+    return REPEATED if alike >= 2 else 1.0
+
+
+def _colour(thing: Thing, features: Bytes) -> Floats:
+    """The median colour of a thing, in features."""
+    x, y = thing.region.proposal.origin
+    height, width = thing.solid.shape
+    inside = features[y : y + height, x : x + width][thing.solid]
+    return np.median(inside.astype(np.float32), axis=0)
 
 
 def _is_hole(thing: Thing, other: Thing) -> bool:
