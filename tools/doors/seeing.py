@@ -47,6 +47,7 @@ def sighting(candidate: Candidate, reasons: tuple[str, ...] = ()) -> dict[str, A
         "lightness": round(seen.lab[0]),
         "area_px": round(seen.area),
         "elongation": round(seen.elongation, 2),
+        "roundness": round(seen.roundness, 2),
         "orientation_deg": round(seen.orientation),
         "salience": round(candidate.salience, 2),
     }
