@@ -97,7 +97,8 @@ def _one(thing: Reference, history: History) -> Found | Step:
     if reply is None:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
-    alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and query)
+    told = not thing.unknown or thing.query  # who adds words nobody understands sees several
+    alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and query and told)
     if reply["settled"] and (alone or not _says_little(thing, _is_clear(reply))):
         return Found(matches[0]["id"], thing.said, tuple(matches[0].get("reasons", ())))
     if matches:
@@ -146,10 +147,13 @@ def _says_little(thing: Reference, clear: bool) -> bool:
     A rank among mugs is none among all things, nor among the long patches of an aerial picture.
     Such a thing must be the only one, or fit the noun as the one that stands out most.
     """
+    if thing.unknown and not thing.query:
+        return True
     if thing.noun in ("any", ""):
         return not thing.query
     ranked = any(p["by"] not in SINGLE for p in thing.query.get("picks", ()))
-    unmeasured = thing.noun != "shape" and thing.whole_query == thing.query
+    nouns = {name for name in thing.whole_query if name not in thing.query}
+    unmeasured = thing.noun != "shape" and nouns <= {"colours", "shade"}  # not all blue is pond
     loose = unmeasured or (thing.weak and not clear)
     return (thing.weak and not thing.query) or (loose and ranked)
 
