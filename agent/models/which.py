@@ -144,17 +144,17 @@ def _is_clear(reply: dict[str, Any]) -> bool:
 def _says_little(thing: Reference, clear: bool) -> bool:
     """Whether a noun that measures cannot tell would decide it, alone or by a rank among its kind.
 
-    A rank among mugs is none among all things, nor among the long patches of an aerial picture.
+    A rank among mugs is none among all things, and a full picture of patches settles no rank.
     Such a thing must be the only one, or fit the noun as the one that stands out most.
     """
     if thing.unknown and not thing.query:
         return True
-    if thing.noun in ("any", ""):
-        return not thing.query
     ranked = any(p["by"] not in SINGLE for p in thing.query.get("picks", ()))
+    if thing.noun in ("any", ""):
+        return not thing.query or (ranked and not clear)
     nouns = {name for name in thing.whole_query if name not in thing.query}
     unmeasured = thing.noun != "shape" and nouns <= {"colours", "shade"}  # not all blue is pond
-    loose = unmeasured or (thing.weak and not clear)
+    loose = unmeasured or not clear
     return (thing.weak and not thing.query) or (loose and ranked)
 
 
