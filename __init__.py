@@ -4,11 +4,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .agent.agent import Agent, Run
+    from .agent.agent import Agent
+    from .agent.limits import Limits
     from .agent.messages import Call, Reply, Result, User
     from .agent.models.doubles import FunctionModel, ScriptedModel
     from .agent.outcomes import Answered, Cancelled, Paused, Stopped
+    from .agent.policy import Policy
     from .agent.report import Report
+    from .agent.runs import Run, load_run
     from .tools.errors import (
         FleetError,
         FormupError,
@@ -30,11 +33,14 @@ if TYPE_CHECKING:
     from .tools.workspace import Settings, Workspace
 
 _HOMES = {
-    "agent.agent": ("Agent", "Run"),
+    "agent.agent": ("Agent",),
+    "agent.limits": ("Limits",),
     "agent.messages": ("Call", "Reply", "Result", "User"),
     "agent.models.doubles": ("FunctionModel", "ScriptedModel"),
     "agent.outcomes": ("Answered", "Cancelled", "Paused", "Stopped"),
+    "agent.policy": ("Policy",),
     "agent.report": ("Report",),
+    "agent.runs": ("Run", "load_run"),
     "tools.errors": (
         "FleetError",
         "FormupError",
@@ -72,11 +78,13 @@ __all__ = [
     "Group",
     "ImageError",
     "InputError",
+    "Limits",
     "ModelError",
     "Outline",
     "Paused",
     "Picture",
     "Plan",
+    "Policy",
     "Reply",
     "Report",
     "Result",
@@ -95,6 +103,7 @@ __all__ = [
     "Workspace",
     "certify",
     "load_picture",
+    "load_run",
     "make_outline",
     "make_plan",
     "tool",

@@ -1,43 +1,35 @@
 """The agent: a model, the tools and the loop put together for one instruction on one picture."""
 
 import asyncio
-import json
 import time
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass, replace
+from contextlib import nullcontext
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any, TypeVar
 
 from ..prompts import Prompt, PromptError, list_prompts, load_prompt
 from ..tools.doors import TOOLS
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
-from ..tools.formation.plan import Plan
 from ..tools.perception.image import Picture
 from ..tools.perception.prompts import TargetPrompt
 from ..tools.scene import Scene
 from ..tools.tool import Tool
 from ..tools.workspace import Settings, Workspace
-from .loop import DEFAULT_LIMITS, Limits, run
-from .messages import History, Reply, Result, User
+from .limits import DEFAULT_LIMITS, Limits
+from .loop import ANYTHING, Show, run
+from .messages import Call, History, Reply, Result, User
 from .model import Model
 from .models import model_named
-from .outcomes import Cancelled, Outcome, Paused, Stopped
-from .report import Report, Status, Totals, candidate_choice, target_choice, target_data
+from .outcomes import Outcome, Paused, Stopped
+from .policy import Policy
+from .report import Report, make_report
+from .runs import Run, check_text, going_on
 from .task import task_text
+from .trace import TraceWriter, settings_facts
 
-MAX_INSTRUCTION = 4_000
-"""Characters; longer texts are no instruction, and cost whoever reads them."""
-Show = Callable[[User | Reply | Result], None]
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Run:
-    """A finished or paused run: its report, how it ended, and what it worked on."""
-
-    report: Report
-    outcome: Outcome
-    workspace: Workspace
 
 
 class Agent:
@@ -45,13 +37,15 @@ class Agent:
 
     Args:
         model: a name (`offline`, `openai:NAME` and so on) or any object with a name and a `reply`
-            method. Its `prompt`, if it has one, is the id of the prompt it is given by default;
-            its `aclose`, if it has one, is awaited by `run` and `answer` when they are done.
+            method. Its `prompt`, if it has one, is the id, or the `id@vNNN`, of the prompt it is
+            given by default; its `aclose`, if it has one, is awaited by `run` and `resume` when
+            they are done.
         base_url: of the server, for a model given by name.
         prompt: `id@vNNN`; None for the newest version of the model's own.
         tools: what the model may call.
         system: a text in place of a prompt; the offline planner reads neither.
         limits: bounds of each run.
+        policy: which calls go ahead, wait for a person, or are refused.
 
     Raises:
         InputError: an unknown model or prompt, or a model that cannot be asked.
@@ -66,6 +60,7 @@ class Agent:
         tools: tuple[Tool, ...] = TOOLS,
         system: str = "",
         limits: Limits = DEFAULT_LIMITS,
+        policy: Policy = ANYTHING,
     ) -> None:
         if base_url is not None and not isinstance(model, str):
             raise InputError("A base URL goes with a model's name; this model is an object.")
@@ -73,7 +68,7 @@ class Agent:
         own = None if system else getattr(self.model, "prompt", None)
         self.prompt = _prompt(prompt, own)
         self.system = self.prompt.text if self.prompt else system
-        self.tools, self.limits = tools, limits
+        self.base_url, self.tools, self.limits, self.policy = base_url, tools, limits, policy
 
     def run(
         self,
@@ -82,6 +77,7 @@ class Agent:
         *,
         pointed: Sequence[TargetPrompt] = (),
         settings: Settings | None = None,
+        trace: Path | None = None,
         show: Show | None = None,
     ) -> Run:
         """Carry out one instruction; the synchronous door to `arun`.
@@ -89,11 +85,10 @@ class Agent:
         Raises:
             InputError: something given cannot be used.
         """
-        return asyncio.run(
-            self._closing(
-                self.arun(picture, instruction, pointed=pointed, settings=settings, show=show)
-            )
+        made = self.arun(
+            picture, instruction, pointed=pointed, settings=settings, trace=trace, show=show
         )
+        return asyncio.run(self._closing(made))
 
     async def arun(
         self,
@@ -102,6 +97,7 @@ class Agent:
         *,
         pointed: Sequence[TargetPrompt] = (),
         settings: Settings | None = None,
+        trace: Path | None = None,
         show: Show | None = None,
     ) -> Run:
         """Carry out one instruction on one picture.
@@ -111,6 +107,7 @@ class Agent:
             instruction: what, in the person's words.
             pointed: the things meant, if the person points.
             settings: what the person fixed.
+            trace: a file to write the run to as it goes: it can be resumed and replayed from it.
             show: is given every message as it comes.
 
         Raises:
@@ -120,65 +117,107 @@ class Agent:
         _check(instruction, fixed.robots)
         workspace = Workspace(Scene(picture), fixed, tuple(pointed))
         _check_candidates(workspace)
+        writer = None if trace is None else TraceWriter(trace)
+        if writer is not None:
+            writer.start(self._facts(instruction, fixed), workspace)
+        note = _noting(workspace, writer, show)
         first = User(text=task_text(instruction, workspace))
-        if show is not None:
-            show(first)
-        return await self.resume(workspace, (first,), instruction, show)
+        note(first)
+        return await self._go(workspace, (first,), instruction, note, writer=writer)
 
-    def answer(self, asked: Run, text: str, *, show: Show | None = None) -> Run:
-        """Go on from a question with its answer; the synchronous door to `aanswer`.
+    def resume(
+        self,
+        paused: Run,
+        *,
+        answer: str | None = None,
+        approve: bool | None = None,
+        show: Show | None = None,
+    ) -> Run:
+        """Go on where a run was left; the synchronous door to `aresume`.
 
         Raises:
-            InputError: the run asked nothing, or the answer cannot be used.
+            InputError: the run is over, or waits for something else.
         """
-        return asyncio.run(self._closing(self.aanswer(asked, text, show=show)))
+        made = self.aresume(paused, answer=answer, approve=approve, show=show)
+        return asyncio.run(self._closing(made))
 
-    async def aanswer(self, asked: Run, text: str, *, show: Show | None = None) -> Run:
-        """Go on from a question with its answer.
+    async def aresume(
+        self,
+        paused: Run,
+        *,
+        answer: str | None = None,
+        approve: bool | None = None,
+        show: Show | None = None,
+    ) -> Run:
+        """Go on where a run was left, here or, with `load_run`, in another process.
 
         Args:
-            asked: a run whose report's status is `question`; its workspace is worked on further.
-            text: what the person says; "3" or "c3" is the third candidate.
-            show: is given every new message as it comes, the answer first.
+            paused: a run that waits for a person, was stopped, cancelled or killed; its
+                workspace is worked on further, and its trace written on.
+            answer: to a question; "3" or "c3" is the third candidate. With a no, the reason.
+            approve: a person's yes or no to the very call that waits, such as moving robots.
+            show: is given every new message as it comes, the person's first.
 
         Raises:
-            InputError: the run asked nothing, or the answer cannot be used.
+            InputError: the run is over, or waits for something else.
         """
-        outcome = asked.outcome
-        if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
-            raise InputError(f"The run asked nothing: it is {asked.report.status}.")
-        _check_text("answer", text, "say it in words, or the number of a candidate")
-        answer = Result(call_id=outcome.call.id, name=outcome.call.name, text=text.strip())
-        if show is not None:
-            show(answer)
-        history = (*outcome.messages, answer)
-        run = await self.resume(asked.workspace, history, asked.report.instruction, show)
-        spent = asked.report.usage.seconds + run.report.usage.seconds
-        usage = run.report.usage.model_copy(update={"seconds": round(spent, 3)})
-        return replace(run, report=run.report.model_copy(update={"usage": usage}))
-
-    async def resume(
-        self, workspace: Workspace, messages: History, instruction: str, show: Show | None = None
-    ) -> Run:
-        """Go on from a history, answered where it had paused."""
-        began = time.perf_counter()
-        outcome = await run(
-            self.model,
-            self.tools,
-            workspace,
-            messages,
-            system=self.system,
-            limits=self.limits,
-            allowed=lambda call: workspace.settings.fleet == "simulated",
-            show=show or (lambda message: None),
+        said, approved = going_on(paused, answer, approve)
+        workspace, instruction = paused.workspace, paused.report.instruction
+        writer = None if paused.trace is None else TraceWriter(paused.trace, resumed=True)
+        if writer is not None:
+            writer.resume(workspace)
+        note = _noting(workspace, writer, show)
+        history = paused.outcome.messages
+        if said is not None:
+            note(said)
+            history = (*history, said)
+        spent = paused.report.usage.seconds
+        return await self._go(
+            workspace, history, instruction, note, writer=writer, spent=spent, approved=approved
         )
-        seconds = time.perf_counter() - began
-        report = _report(outcome, workspace, instruction, self.model.name, seconds)
-        if self.prompt:
-            facts = {"id": self.prompt.id, "version": self.prompt.version}
-            prompt = {**facts, "sha256": self.prompt.sha256}
-            report = report.model_copy(update={"prompt": prompt})
-        return Run(report, outcome, workspace)
+
+    async def _go(
+        self,
+        workspace: Workspace,
+        messages: History,
+        instruction: str,
+        note: Show,
+        *,
+        writer: TraceWriter | None,
+        spent: float = 0.0,
+        approved: Call | None = None,
+    ) -> Run:
+        began = time.perf_counter()
+        with writer or nullcontext():
+            outcome = await run(
+                self.model,
+                self.tools,
+                workspace,
+                messages,
+                system=self.system,
+                limits=self.limits,
+                policy=self.policy,
+                approved=approved,
+                show=note,
+            )
+            seconds = round(spent + time.perf_counter() - began, 3)
+            report = make_report(outcome, workspace, instruction, self.model.name, seconds)
+            report = report.model_copy(update={"prompt": _prompt_facts(self.prompt)})
+            if writer is not None:
+                writer.end(_end(outcome, report))
+        return Run(report, outcome, workspace, writer and writer.path)
+
+    def _facts(self, instruction: str, settings: Settings) -> dict[str, Any]:
+        """What a trace begins with, enough to go on in another process."""
+        return {
+            "instruction": instruction,
+            "model": self.model.name,
+            "base_url": self.base_url,
+            "prompt": _prompt_facts(self.prompt),
+            "settings": settings_facts(settings),
+            "limits": asdict(self.limits),
+            "policy": self.policy.rules,
+        }
 
     async def aclose(self) -> None:
         """Close what the model keeps open in the running event loop; it may be used again."""
@@ -197,31 +236,49 @@ class Agent:
 def _prompt(name: str | None, own: str | None) -> Prompt | None:
     """The prompt of a name, else the newest of the model's own, if it has one."""
     if name is None and own is not None:
-        name = max(n for n in list_prompts() if n.startswith(f"{own}@"))
+        name = own if "@" in own else max(n for n in list_prompts() if n.startswith(f"{own}@"))
     try:
         return load_prompt(name) if name is not None else None
     except PromptError as error:
         raise InputError(str(error)) from None
 
 
+def _prompt_facts(prompt: Prompt | None) -> dict[str, Any] | None:
+    return prompt and {"id": prompt.id, "version": prompt.version, "sha256": prompt.sha256}
+
+
+def _noting(workspace: Workspace, writer: TraceWriter | None, show: Show | None) -> Show:
+    """Writes a message down, then shows it."""
+
+    def note(message: User | Reply | Result) -> None:
+        if writer is not None:
+            writer.message(message, workspace)
+        if show is not None:
+            show(message)
+
+    return note
+
+
+def _end(outcome: Outcome, report: Report) -> dict[str, Any]:
+    """The last line of a trace."""
+    facts = {
+        "outcome": type(outcome).__name__.lower(),
+        "status": report.status,
+        "message": report.message,
+        "usage": report.usage.model_dump(),
+    }
+    if isinstance(outcome, Stopped):
+        facts |= {"kind": outcome.kind, "reason": outcome.reason}
+    if isinstance(outcome, Paused):
+        facts |= {"call": outcome.call.id}
+    return facts
+
+
 def _check(instruction: str, robots: int | None) -> None:
     example = 'say what to do, such as "Surround the car at the corners"'
-    _check_text("instruction", instruction, example)
+    check_text("instruction", instruction, example)
     if robots is not None and not 1 <= robots <= MAX_ROBOTS:
         raise InputError(f"{robots} robots cannot be placed; 1 to {MAX_ROBOTS:,} can.")
-
-
-def _check_text(name: str, text: str, advice: str) -> None:
-    if not text.strip():
-        raise InputError(f"The {name} is empty; {advice}.")
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        raise InputError(f"The {name} holds bytes that are not text in UTF-8.") from None
-    if len(text) > MAX_INSTRUCTION:
-        raise InputError(
-            f"The {name} has {len(text):,} characters; {MAX_INSTRUCTION:,} can be read."
-        )
 
 
 def _check_candidates(workspace: Workspace) -> None:
@@ -232,89 +289,3 @@ def _check_candidates(workspace: Workspace) -> None:
                 workspace.candidate(prompt.candidate)
     except ToolError as error:
         raise InputError(str(error)) from None
-
-
-def _report(
-    outcome: Outcome, workspace: Workspace, instruction: str, model: str, seconds: float
-) -> Report:
-    picture = workspace.scene.picture
-    plan = _last_plan(workspace)
-    arrival = workspace.arrivals.get(plan.id) if plan else None
-    status, message = _status(outcome, workspace, plan)
-    return Report(
-        status=status,
-        message=message,
-        instruction=instruction,
-        image={"sha256": picture.sha256, "width": picture.width, "height": picture.height},
-        targets=tuple(target_data(t) for t in workspace.scene.targets),
-        candidates=_candidates(outcome, workspace),
-        contract=plan.formation.contract if plan else None,
-        plan_id=plan.id if plan else None,
-        positions=plan.formation.positions if plan else None,
-        verdict=plan.verdict if plan else None,
-        arrival=arrival,
-        model=model,
-        usage=_totals(outcome.messages, seconds),
-    )
-
-
-def _last_plan(workspace: Workspace) -> Plan | None:
-    """The plan deployed last, else the one proposed last that is not void."""
-    if workspace.arrivals:
-        return workspace.plans[list(workspace.arrivals)[-1]]
-    version = workspace.scene.version
-    valid = [p for p in workspace.plans.values() if p.formation.scene_version == version]
-    return valid[-1] if valid else None
-
-
-def _status(outcome: Outcome, workspace: Workspace, plan: Plan | None) -> tuple[Status, str]:
-    arrival = workspace.arrivals.get(plan.id) if plan else None
-    if arrival is not None:  # robots have moved, whatever was said after that
-        arrived = arrival.arrived and not isinstance(outcome, Stopped)
-        return ("deployed" if arrived else "failed"), _last_words(outcome)
-    if isinstance(outcome, Paused):
-        asked = outcome.call.name == "ask_user"
-        return ("question" if asked else "needs_approval"), _last_words(outcome)
-    if isinstance(outcome, Stopped):
-        ours = outcome.kind in ("limit", "repeat")
-        return ("stopped" if ours else "failed"), outcome.reason
-    if isinstance(outcome, Cancelled):
-        return "stopped", _last_words(outcome)
-    given_up = isinstance(outcome.messages[-1], Result)
-    certified = plan is not None and plan.verdict.certified
-    return ("planned" if certified and not given_up else "impossible"), _last_words(outcome)
-
-
-def _last_words(outcome: Outcome) -> str:
-    if isinstance(outcome, Paused):
-        named = outcome.call.arguments
-        return str(named.get("question") or f"A person must approve {named.get('plan_id')}.")
-    if isinstance(outcome, Stopped):
-        return outcome.reason
-    if isinstance(outcome, Cancelled):
-        return "The run was cancelled."
-    last = outcome.messages[-1]
-    return json.loads(outcome.text)["reason"] if isinstance(last, Result) else outcome.text
-
-
-def _candidates(outcome: Outcome, workspace: Workspace) -> tuple[dict[str, object], ...] | None:
-    """What a question offers, in its order; ids that mean nothing are left out."""
-    if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
-        return None
-    named = outcome.call.arguments.get("candidates", ())
-    known = {t.id: target_choice(t) for t in workspace.scene.targets}
-    if any(n not in known for n in named):
-        known |= {c.id: candidate_choice(c) for c in workspace.candidates()}
-    return tuple(known[n] for n in named if n in known)
-
-
-def _totals(messages: History, seconds: float) -> Totals:
-    replies = [m for m in messages if isinstance(m, Reply)]
-    return Totals(
-        requests=len(replies),
-        tool_calls=sum(len(m.calls) for m in replies),
-        input_tokens=sum(m.usage.input_tokens for m in replies),
-        output_tokens=sum(m.usage.output_tokens for m in replies),
-        cost_usd=sum(m.usage.cost_usd for m in replies),
-        seconds=round(seconds, 3),
-    )

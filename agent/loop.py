@@ -2,29 +2,33 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from ..tools.errors import FleetError, ModelError, ToolError
+from ..tools.errors import ArgumentsError, FleetError, ModelError
 from ..tools.tool import Tool
 from ..tools.workspace import Workspace
-from .messages import Call, History, Reply, Result, User, failed_before, unanswered
+from .calls import BrokenToolError, answer, refused, tool_named
+from .limits import DEFAULT_LIMITS, Limits, exhausted
+from .messages import Call, History, Reply, Result, User, times_repeated, unanswered
 from .model import Model, Request
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
+from .policy import Decision, Policy
+
+Show = Callable[[User | Reply | Result], None]
+ANYTHING = Policy()
 
 
-@dataclass(frozen=True)
-class Limits:
-    """Bounds of one run."""
+@dataclass
+class Conversation:
+    """The messages so far, there whatever happens to the loop that adds to them."""
 
-    requests: int = 20
-    tool_calls: int = 60
+    messages: History
+    show: Show = field(default=lambda message: None)
 
-
-DEFAULT_LIMITS = Limits()
-
-
-def _nothing(message: User | Reply | Result) -> None:
-    """Shows nobody anything."""
+    def add(self, message: Reply | Result) -> None:
+        """Append, and show it for display and traces."""
+        self.messages = (*self.messages, message)
+        self.show(message)
 
 
 async def run(
@@ -35,84 +39,92 @@ async def run(
     *,
     system: str = "",
     limits: Limits = DEFAULT_LIMITS,
-    allowed: Callable[[Call], bool] = lambda call: True,
-    show: Callable[[User | Reply | Result], None] = _nothing,
+    policy: Policy = ANYTHING,
+    approved: Call | None = None,
+    show: Show = lambda message: None,
 ) -> Outcome:
     """Run a conversation until it is answered, paused, stopped or cancelled.
 
     Args:
         messages: the history so far; unanswered calls at its end are answered first.
         system: the prompt.
-        limits: bounds of the whole history.
-        allowed: whether an actuating call may go ahead without a person.
-        show: is given every new message, for display and traces.
+        limits: bounds; those of numbers and cost hold for the whole history.
+        policy: which calls go ahead.
+        approved: the one call a person has said yes to, exactly as it stands.
+        show: is given every new message.
     """
-    history = messages
+    talk, clock = Conversation(messages, show), asyncio.timeout(limits.seconds)
+
+    def permit(call: Call) -> Decision:
+        return "allow" if call == approved else _decide(policy, tools, workspace, call)
+
     try:
-        while True:
-            for call in unanswered(history):
-                tool = _named(tools, call.name)
-                if tool and _waits(tool, call, allowed):
-                    return Paused(history, call)
-                result = await _answer(tool, tools, workspace, call)
-                history = (*history, result)
-                show(result)
-                if result.error and failed_before(history, call):
-                    reason = f"The model repeated a failing call to {call.name}: {result.text}"
-                    return Stopped(history, "repeat", reason)
-                if tool and tool.kind == "end" and not result.error:
-                    return Answered(history, result.text)
-            if reason := _exhausted(history, limits):
-                return Stopped(history, "limit", reason)
-            reply = await model.reply(Request(system, history, tools))
-            history = (*history, reply)
-            show(reply)
-            if not reply.calls:
-                return Answered(history, reply.text)
+        async with clock:
+            return await _converse(model, tools, workspace, talk, system, limits, permit)
     except asyncio.CancelledError:
-        return Cancelled(history)
-    except (ModelError, FleetError) as error:
-        kind = "model" if isinstance(error, ModelError) else "fleet"
-        return Stopped(history, kind, str(error))
+        return Cancelled(talk.messages)
+    except TimeoutError:
+        if not clock.expired():
+            raise
+        return Stopped(talk.messages, "limit", f"The limit of {limits.seconds:g} s was reached.")
+    except BrokenToolError as error:
+        return Stopped(talk.messages, "tool", str(error), error.__cause__)
+    except ModelError as error:
+        return Stopped(talk.messages, "model", str(error))
+    except FleetError as error:
+        return Stopped(talk.messages, "fleet", str(error))
 
 
-async def _answer(
-    tool: Tool | None, tools: tuple[Tool, ...], workspace: Workspace, call: Call
-) -> Result:
-    """Run one call; what the model got wrong comes back as a result it can act on."""
-    if tool is None:
-        known = ", ".join(t.name for t in tools)
-        text = f"Unknown tool {call.name!r}. Available: {known}."
-        return Result(call_id=call.id, name=call.name, text=text, error="unknown_tool")
-    try:
-        tool.parse(call.arguments)
-    except ToolError as error:
-        return Result(call_id=call.id, name=call.name, text=str(error), error="arguments")
-    try:
-        result = await tool.call(workspace, call.arguments)
-    except ToolError as error:
-        return Result(call_id=call.id, name=call.name, text=str(error), error="tool")
-    return Result(call_id=call.id, name=call.name, text=result.text, images=result.images)
+async def _converse(
+    model: Model,
+    tools: tuple[Tool, ...],
+    workspace: Workspace,
+    talk: Conversation,
+    system: str,
+    limits: Limits,
+    permit: Callable[[Call], Decision],
+) -> Outcome:
+    while True:
+        for call in unanswered(talk.messages):
+            decision = permit(call)
+            if decision == "ask":
+                return Paused(talk.messages, call)
+            if decision == "refuse":
+                talk.add(refused(call, f"{call.name} may not be called here; do without it."))
+            else:
+                talk.add(await answer(tools, workspace, call, limits.tool_seconds))
+            if outcome := _ended(talk.messages, tools):
+                return outcome
+        if reason := exhausted(talk.messages, limits):
+            return Stopped(talk.messages, "limit", reason)
+        reply = await model.reply(Request(system, talk.messages, tools))
+        talk.add(reply)
+        if not reply.calls:
+            return Answered(talk.messages, reply.text)
 
 
-def _named(tools: tuple[Tool, ...], name: str) -> Tool | None:
-    return next((tool for tool in tools if tool.name == name), None)
+def _decide(policy: Policy, tools: tuple[Tool, ...], workspace: Workspace, call: Call) -> Decision:
+    """What the policy says; a call that cannot be made does not trouble a person."""
+    tool = tool_named(tools, call.name)
+    decision = policy.decide(tool, workspace) if tool else "allow"
+    if tool and decision == "ask":
+        try:
+            tool.parse(call.arguments)
+        except ArgumentsError:
+            return "allow"
+    return decision
 
 
-def _waits(tool: Tool, call: Call, allowed: Callable[[Call], bool]) -> bool:
-    """Whether a person comes first. A malformed call does not trouble them."""
-    try:
-        tool.parse(call.arguments)
-    except ToolError:
-        return False
-    return tool.kind == "ask" or (tool.kind == "actuate" and not allowed(call))
-
-
-def _exhausted(history: History, limits: Limits) -> str | None:
-    replies = [m for m in history if isinstance(m, Reply)]
-    calls = sum(len(m.calls) for m in replies)
-    if len(replies) >= limits.requests:
-        return f"The limit of {limits.requests} requests was reached."
-    if calls >= limits.tool_calls:
-        return f"The limit of {limits.tool_calls} tool calls was reached."
+def _ended(messages: History, tools: tuple[Tool, ...]) -> Outcome | None:
+    """How the last result ends the run, if it does: the model goes in circles, or is done."""
+    result = messages[-1]
+    assert isinstance(result, Result)
+    most = 1 if result.error else 2
+    if times_repeated(messages) >= most:
+        what = "a failing call to" if result.error else "the same call to"
+        reason = f"The model repeated {what} {result.name}: {result.text}"
+        return Stopped(messages, "repeat", reason)
+    tool = tool_named(tools, result.name)
+    if tool and tool.kind == "end" and not result.error:
+        return Answered(messages, result.text)
     return None

@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 from pydantic_core import to_json
 
-ErrorKind = Literal["unknown_tool", "arguments", "tool"]
-"""unknown_tool: no such tool; arguments: against its schema; tool: it could not do that."""
+ErrorKind = Literal["unknown_tool", "arguments", "tool", "timeout", "refused"]
+"""unknown_tool: no such tool; arguments: against its schema; tool: it could not do that;
+timeout: it took too long; refused: it may not be called, or a person said no."""
 
 
 class _Value(BaseModel):
@@ -56,6 +57,20 @@ class User(_Value):
     images: tuple[bytes, ...] = ()
 
 
+class Opaque(_Value):
+    """A reply as its server wrote it, with the signed or encrypted thoughts that belong to it.
+
+    It goes back to the model it came from, which may refuse the conversation without; no other
+    model and nothing else reads it.
+
+    Attributes:
+        model: whose it is, such as gemini:NAME.
+    """
+
+    model: str
+    items: tuple[dict[str, Any], ...]
+
+
 class Reply(_Value):
     """What the model says: text, calls, or both; without calls the turn is over."""
 
@@ -63,6 +78,7 @@ class Reply(_Value):
     text: str = ""
     calls: tuple[Call, ...] = ()
     usage: Usage = Usage()
+    opaque: Opaque | None = None
 
 
 class Result(_Value):
@@ -95,14 +111,32 @@ def unanswered(history: Sequence[User | Reply | Result]) -> tuple[Call, ...]:
     return ()
 
 
-def failed_before(history: Sequence[User | Reply | Result], call: Call) -> bool:
-    """Whether the very same call, name and arguments, got an error earlier."""
-    failed = {m.call_id for m in history if isinstance(m, Result) and m.error is not None}
-    return any(
-        past.id in failed
-        and past.id != call.id
-        and (past.name, past.arguments) == (call.name, call.arguments)
-        for m in history
-        if isinstance(m, Reply)
-        for past in m.calls
-    )
+def times_repeated(history: Sequence[User | Reply | Result]) -> int:
+    """In how many earlier replies the last result was had already, since the person spoke.
+
+    That is: the same call, name and arguments, with the same answer.
+    """
+    last = history[-1]
+    if not isinstance(last, Result):
+        return 0
+    turn = _turn(history)
+    alike = {
+        m.call_id
+        for m in turn
+        if isinstance(m, Result) and (m.text, m.name) == (last.text, last.name)
+    }
+    if len(alike) == 1:
+        return 0
+    asked = [[c for c in m.calls if c.id in alike] for m in turn if isinstance(m, Reply)]
+    now = next(c.arguments for calls in asked for c in calls if c.id == last.call_id)
+    return sum(any(c.arguments == now for c in calls) for calls in asked) - 1
+
+
+def _turn(history: Sequence[User | Reply | Result]) -> list[User | Reply | Result]:
+    """What came after the person's last message."""
+    turn: list[User | Reply | Result] = []
+    for message in reversed(history):
+        if isinstance(message, User):
+            break
+        turn.append(message)
+    return turn

@@ -5,8 +5,9 @@ from typing import Literal
 
 from .messages import Call, History
 
-StopKind = Literal["limit", "repeat", "model", "fleet"]
-"""limit: a bound of this run; repeat: the same failing call again; model, fleet: they failed."""
+StopKind = Literal["limit", "repeat", "model", "tool", "fleet"]
+"""limit: a bound of this run; repeat: the same call with the same answer, twice if it failed, three
+times if not; model, tool, fleet: they failed."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,12 @@ class Paused:
 
 @dataclass(frozen=True)
 class Stopped:
-    """Ended early; `reason` is one sentence."""
+    """Ended early; `reason` is one sentence, `error` what a broken tool raised."""
 
     messages: History
     kind: StopKind
     reason: str
+    error: BaseException | None = None
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,20 @@
 """What a run came to, as one value: the object `formup run --json` prints."""
 
+import json
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
 from ..tools.fleet.deploy import Arrival
 from ..tools.formation.contract import Contract
+from ..tools.formation.plan import Plan
 from ..tools.formation.verdict import Verdict
 from ..tools.perception.attributes import Candidate
 from ..tools.scene import Box, Target
 from ..tools.store import rings
+from ..tools.workspace import Workspace
+from .messages import History, Reply, Result
+from .outcomes import Cancelled, Outcome, Paused, Stopped
 
 Status = Literal[
     "deployed", "planned", "needs_approval", "question", "impossible", "stopped", "failed"
@@ -99,6 +104,95 @@ def candidate_choice(candidate: Candidate) -> dict[str, Any]:
         "shape": seen.shape,
         "area_px": round(seen.area),
     }
+
+
+def make_report(
+    outcome: Outcome, workspace: Workspace, instruction: str, model: str, seconds: float
+) -> Report:
+    """What a run that ended so has come to, after so many seconds."""
+    picture = workspace.scene.picture
+    plan = _last_plan(workspace)
+    arrival = workspace.arrivals.get(plan.id) if plan else None
+    status, message = _status(outcome, workspace, plan)
+    return Report(
+        status=status,
+        message=message,
+        instruction=instruction,
+        image={"sha256": picture.sha256, "width": picture.width, "height": picture.height},
+        targets=tuple(target_data(t) for t in workspace.scene.targets),
+        candidates=_candidates(outcome, workspace),
+        contract=plan.formation.contract if plan else None,
+        plan_id=plan.id if plan else None,
+        positions=plan.formation.positions if plan else None,
+        verdict=plan.verdict if plan else None,
+        arrival=arrival,
+        model=model,
+        usage=_totals(outcome.messages, seconds),
+    )
+
+
+def _last_plan(workspace: Workspace) -> Plan | None:
+    """The plan deployed last, else the one proposed last that is not void."""
+    if workspace.arrivals:
+        return workspace.plans[list(workspace.arrivals)[-1]]
+    version = workspace.scene.version
+    valid = [p for p in workspace.plans.values() if p.formation.scene_version == version]
+    return valid[-1] if valid else None
+
+
+def _status(outcome: Outcome, workspace: Workspace, plan: Plan | None) -> tuple[Status, str]:
+    arrival = workspace.arrivals.get(plan.id) if plan else None
+    if arrival is not None:  # robots have moved, whatever was said after that
+        arrived = arrival.arrived and not isinstance(outcome, Stopped)
+        return ("deployed" if arrived else "failed"), _last_words(outcome)
+    if isinstance(outcome, Paused):
+        asked = outcome.call.name == "ask_user"
+        return ("question" if asked else "needs_approval"), _last_words(outcome)
+    if isinstance(outcome, Stopped):
+        ours = outcome.kind in ("limit", "repeat")
+        return ("stopped" if ours else "failed"), outcome.reason
+    if isinstance(outcome, Cancelled):
+        return "stopped", _last_words(outcome)
+    given_up = isinstance(outcome.messages[-1], Result)
+    certified = plan is not None and plan.verdict.certified
+    return ("planned" if certified and not given_up else "impossible"), _last_words(outcome)
+
+
+def _last_words(outcome: Outcome) -> str:
+    if isinstance(outcome, Paused):
+        call = outcome.call
+        if call.name == "ask_user":
+            return str(call.arguments["question"])
+        return f"A person must approve {call.name} of {json.dumps(call.arguments)}."
+    if isinstance(outcome, Stopped):
+        return outcome.reason
+    if isinstance(outcome, Cancelled):
+        return "The run was cancelled."
+    last = outcome.messages[-1]
+    return json.loads(outcome.text)["reason"] if isinstance(last, Result) else outcome.text
+
+
+def _candidates(outcome: Outcome, workspace: Workspace) -> tuple[dict[str, object], ...] | None:
+    """What a question offers, in its order; ids that mean nothing are left out."""
+    if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
+        return None
+    named = outcome.call.arguments.get("candidates", ())
+    known = {t.id: target_choice(t) for t in workspace.scene.targets}
+    if any(n not in known for n in named):
+        known |= {c.id: candidate_choice(c) for c in workspace.candidates()}
+    return tuple(known[n] for n in named if n in known)
+
+
+def _totals(messages: History, seconds: float) -> Totals:
+    replies = [m for m in messages if isinstance(m, Reply)]
+    return Totals(
+        requests=len(replies),
+        tool_calls=sum(len(m.calls) for m in replies),
+        input_tokens=sum(m.usage.input_tokens for m in replies),
+        output_tokens=sum(m.usage.output_tokens for m in replies),
+        cost_usd=sum(m.usage.cost_usd for m in replies),
+        seconds=round(seconds, 3),
+    )
 
 
 def _box(box: Box) -> list[float]:

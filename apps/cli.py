@@ -1,22 +1,21 @@
-"""The command line: `formup run`, `deploy`, `tools`, `eval`."""
+"""The command line: `formup run`, `resume`, `deploy`, `trace`, `tools`, `eval`."""
 
 import sys
-from pathlib import Path
 
 import typer
-from rich.console import Console
 
-from ..agent.agent import Agent, Run
-from ..agent.report import Report
+from ..agent.agent import Agent
+from ..agent.limits import Limits
+from ..agent.outcomes import Paused
+from ..agent.policy import Policy
+from ..agent.runs import load_run
+from ..agent.trace import NAME, prompt_name, read_trace
 from ..tools.perception.image import load_picture
 from ..tools.workspace import Settings
-from . import evaluate, inputs, plans, tools
+from . import evaluate, inputs, plans, tools, traces
 from . import options as o
-from .output import Folder, Trace, write_files
-from .screen import ask, at_terminal, show_report
-
-MOST_ANSWERS = 5
-"""Questions answered in one run at a terminal."""
+from .carry import Desk
+from .output import Folder
 
 app = typer.Typer(
     name="formup",
@@ -28,7 +27,6 @@ app = typer.Typer(
 )
 app.add_typer(tools.app, name="tools", help="The tools the model sees.")
 app.add_typer(evaluate.app, name="eval", help="How good it is.")
-app.command(name="deploy")(plans.deploy)
 
 
 @app.command()
@@ -43,9 +41,12 @@ def run(
     plan_only: o.PlanOnly = False,
     as_json: o.Json = False,
     out: o.Out = None,
+    record: o.Record = None,
     model: o.ModelName = "offline",
     base_url: o.BaseUrl = None,
     prompt: o.PromptName = None,
+    limit: o.LimitList = None,
+    policy: o.PolicyList = None,
     segmenter: o.SegmenterName = "grabcut",
     threshold: o.Threshold = None,
     descriptor: o.DescriptorName = "edges",
@@ -69,31 +70,50 @@ def run(
         may_deploy=not plan_only,
     )
     pointed = inputs.pointed(point or [], box or [], outline or [], target or [])
-    agent, picture = _agent(model, base_url, prompt), load_picture(image)
-    folder, trace = Folder(out), Trace()
-    try:
-        result = agent.run(picture, instruction, pointed=pointed, settings=settings, show=trace)
-        report = _told(folder, result, image, trace, as_json)
-        for _ in range(0 if as_json or not at_terminal() else MOST_ANSWERS):
-            if report.status != "question" or not (text := ask()):
-                break
-            result = agent.answer(result, text, show=trace)
-            report = _told(folder, result, image, trace, as_json)
-    finally:
-        folder.remove_if_empty()
-    raise typer.Exit(report.exit_code)
+    agent = _agent(model, base_url, prompt, inputs.limits(limit), inputs.policy(policy))
+    picture, keep = load_picture(image), inputs.recording(record)
+    with Folder(out) as folder:
+        trace = folder.path / NAME
+        made = agent.run(picture, instruction, pointed=pointed, settings=settings, trace=trace)
+        raise typer.Exit(Desk(agent, folder, as_json, keep).serve(made))
 
 
-def _told(folder: Folder, result: Run, image: Path, trace: Trace, as_json: bool) -> Report:
-    """The report with its files, written and printed."""
-    files = write_files(folder, result, image, trace)
-    report = result.report.model_copy(update={"files": files})
-    _print(report, folder.path, as_json)
-    return report
+@app.command()
+def resume(
+    folder: o.RunFolder,
+    answer: o.Answer = None,
+    approve: o.Approve = None,
+    as_json: o.Json = False,
+    model: o.ResumeModel = None,
+    base_url: o.BaseUrl = None,
+    limit: o.LimitList = None,
+    policy: o.PolicyList = None,
+) -> None:
+    """Go on with a run that waits for a person, was stopped, interrupted or killed."""
+    trace, left = read_trace(folder), load_run(folder)
+    start = trace.start
+    agent = Agent(
+        model or start["model"],
+        base_url=base_url or (None if model else start["base_url"]),
+        prompt=prompt_name(start["prompt"]),
+        limits=inputs.limits(limit, start["limits"]),
+        policy=inputs.policy(policy, start["policy"]),
+    )
+    with Folder(trace.path.parent, resumed=True) as home:
+        desk = Desk(agent, home, as_json)
+        if not (desk.can_ask and isinstance(left.outcome, Paused) and answer is approve is None):
+            left = agent.resume(left, answer=answer, approve=approve)
+        raise typer.Exit(desk.serve(left))
 
 
-def _agent(model: str, base_url: str | None, prompt: str | None) -> Agent:
-    agent = Agent(model, base_url=base_url, prompt=prompt)
+app.command(name="deploy")(plans.deploy)
+app.command(name="trace")(traces.show_trace)
+
+
+def _agent(
+    model: str, base_url: str | None, prompt: str | None, limits: Limits, policy: Policy
+) -> Agent:
+    agent = Agent(model, base_url=base_url, prompt=prompt, limits=limits, policy=policy)
     if model != "offline" or agent.prompt is None:
         return agent
     print(  # noqa: T201
@@ -101,12 +121,4 @@ def _agent(model: str, base_url: str | None, prompt: str | None) -> Agent:
         f"{agent.prompt.name} is not used.",
         file=sys.stderr,
     )
-    return Agent(model)
-
-
-def _print(report: Report, folder: Path, as_json: bool) -> None:
-    if as_json:
-        print(report.model_dump_json(indent=2))  # noqa: T201
-        print(f"formup: files in {folder}", file=sys.stderr)  # noqa: T201
-    else:
-        show_report(Console(highlight=False), report, str(folder))
+    return Agent(model, limits=limits, policy=policy)

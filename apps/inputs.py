@@ -3,12 +3,16 @@
 import json
 import math
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import ValidationError
 
+from ..agent.limits import Limits
+from ..agent.policy import Policy
 from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_ROBOTS
 from ..tools.geometry.outline import FARTHEST, FloatArray
@@ -169,6 +173,51 @@ def starts(path: Path | None) -> FloatArray | None:
             f"--starts {path} must hold one x,y a line, or JSON [[x, y], ...], in pixels."
         )
     return values
+
+
+def limits(given: list[str] | None, before: Mapping[str, Any] | None = None) -> Limits:
+    """Limits from NAME=VALUE, over those there were before.
+
+    Raises:
+        InputError: no such limit, or no number above 0.
+    """
+    names = [field.name for field in fields(Limits)]
+    found: dict[str, Any] = dict(before or {})
+    for text in given or []:
+        name, _, written = text.partition("=")
+        value = _number(written)
+        whole = name in ("requests", "tool_calls", "tokens")
+        lifted = written == "none"
+        if name not in names or not (lifted or (value and (not whole or value == int(value)))):
+            raise InputError(
+                f"--limit {text!r} cannot be used; give NAME=NUMBER, or NAME=none for no limit, "
+                f"with one of {', '.join(names)}."
+            )
+        found[name] = None if lifted or value is None else int(value) if whole else value
+    return Limits(**found)
+
+
+def policy(given: list[str] | None, before: Sequence[Sequence[str]] = ()) -> Policy:
+    """A policy from GLOB=DECISION, these rules before those there were.
+
+    Raises:
+        InputError: no such rule.
+    """
+    rules: list[Any] = [*(text.rpartition("=")[::2] for text in given or []), *before]
+    return Policy(tuple((glob, decision) for glob, decision in rules))
+
+
+def recording(path: Path | None) -> Path | None:
+    """Where a recording goes; that it can is found out before the run.
+
+    Raises:
+        InputError: there is no such folder, or a folder lies there.
+    """
+    if path is not None and (path.is_dir() or not path.parent.is_dir()):
+        raise InputError(
+            f"--record {path} cannot be written; name a file in a folder that is there."
+        )
+    return path
 
 
 def _candidate(text: str) -> str:

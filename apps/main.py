@@ -3,15 +3,14 @@
 import io
 import signal
 import sys
-from types import FrameType
 
 INTERRUPTED = 130
 
 
 def main() -> None:
     """Run the command line and exit."""
-    # Not the default handler: asyncio would turn that into a cancellation at the next await.
-    signal.signal(signal.SIGINT, _interrupt)
+    # Python's own, which asyncio turns into a cancellation: a run then ends with its messages kept.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -22,10 +21,6 @@ def main() -> None:
         code = INTERRUPTED
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # too late: the work is done
     sys.exit(code)
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
 
 
 def _run() -> int:

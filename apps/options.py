@@ -39,6 +39,34 @@ BaseUrl = Annotated[
 PromptName = Annotated[
     str | None, typer.Option("--prompt", help="ID@VERSION; the offline rules read none.")
 ]
+Record = Annotated[
+    Path | None,
+    typer.Option("--record", help="Where to keep the run, for --model replay:FILE."),
+]
+LimitList = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--limit",
+        help="NAME=VALUE: requests, tool_calls, tokens, cost_usd, seconds, tool_seconds; "
+        "repeatable.",
+    ),
+]
+PolicyList = Annotated[
+    list[str] | None,
+    typer.Option("--policy", help="GLOB=allow, ask or refuse, for tools' names; repeatable."),
+]
+RunFolder = Annotated[Path, typer.Argument(help="A run's folder, or its trace.")]
+Answer = Annotated[
+    str | None, typer.Option("--answer", help="To the question; with --refuse, why.")
+]
+Approve = Annotated[
+    bool | None,
+    typer.Option("--approve/--refuse", help="Your yes or no to what waits.", show_default=False),
+]
+ResumeModel = Annotated[
+    str | None, typer.Option("--model", help="Another than before, as in formup run.")
+]
+TraceFile = Annotated[Path, typer.Argument(help="A run's trace, or its folder.")]
 SegmenterName = Annotated[str, typer.Option("--segmenter", help="How outlines are measured.")]
 Threshold = Annotated[
     str | None, typer.Option("--threshold", help="Least confidence a mask is used at, 0 to 1.")

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic_core import to_json
 
-from ..agent.agent import Run
-from ..agent.messages import Reply, Result, User
+from ..agent.runs import Run
+from ..agent.trace import NAME
 from ..tools.draw import draw_deployment, draw_look, draw_plan, save_gif
 from ..tools.errors import InputError
 from ..tools.formation.plan import Plan
@@ -19,6 +18,7 @@ from ..tools.scene import Scene
 from ..tools.store import store, write_whole
 from ..tools.workspace import Workspace
 
+PICTURES = ("plan.png", "question.png", "found.png")
 MAX_ANIMATED = 1_000
 """More robots than this are drawn but not animated."""
 
@@ -26,9 +26,9 @@ MAX_ANIMATED = 1_000
 class Folder:
     """Where a run's files go; made at once so that an unusable place is found before the work."""
 
-    def __init__(self, path: Path | None) -> None:
+    def __init__(self, path: Path | None, *, resumed: bool = False) -> None:
         self.path = path or _fresh(Path("formup-runs"))
-        self._drawn: set[str] = set()
+        self._drawn = {name for name in PICTURES if resumed and (self.path / name).exists()}
         try:
             self._made = not self.path.exists()
             self.path.mkdir(parents=True, exist_ok=True)
@@ -56,7 +56,10 @@ class Folder:
             (self.path / old).unlink(missing_ok=True)
         self._drawn -= stale
 
-    def remove_if_empty(self) -> None:
+    def __enter__(self) -> "Folder":
+        return self
+
+    def __exit__(self, *raised: object) -> None:
         """Leave no empty folder behind when nothing came of the run."""
         if self._made:
             with suppress(OSError):
@@ -64,43 +67,19 @@ class Folder:
                 self.path.parent.rmdir()
 
 
-class Trace:
-    """Gathers the messages of a run as JSON lines, images as their sizes."""
-
-    def __init__(self) -> None:
-        self._began = time.perf_counter()
-        self.lines: list[bytes] = []
-
-    def __call__(self, message: User | Reply | Result) -> None:
-        """Add a message."""
-        images = () if isinstance(message, Reply) else message.images
-        line = {
-            "seconds": round(time.perf_counter() - self._began, 4),
-            **message.model_dump(exclude={"images"}),
-            "images": [len(image) for image in images],
-        }
-        self.lines.append(to_json(line))
-
-    def text(self) -> bytes:
-        """The lines as a file."""
-        return b"".join(line + b"\n" for line in self.lines)
-
-
-def write_files(
-    folder: Folder, run: Run, image: Path | None, trace: Trace
-) -> dict[str, str | None]:
+def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
     """Write what there is; names relative to the folder, None for what there is not."""
     files: dict[str, str | None] = {
         "plan": None,
         "picture": None,
         "animation": None,
-        "trace": "trace.jsonl",
+        "trace": NAME,
     }
     workspace, report = run.workspace, run.report
     plan = workspace.plans.get(report.plan_id or "")
     title = report.instruction
     if plan is not None:
-        stored = store(workspace, image, plan_id=plan.id, instruction=title)
+        stored = store(workspace, plan_id=plan.id, instruction=title)
         write_whole(folder.path / "plan.json", stored.model_dump_json(indent=1).encode())
         files["plan"] = "plan.json"
         if animate(folder.path / "deploy.gif", workspace, plan, title):
@@ -114,7 +93,6 @@ def write_files(
         shown = scene.with_target(workspace.doubted) if workspace.doubted else scene
         files["picture"] = folder.draw("found.png", draw_look(shown))
     folder.drop_pictures_but(files["picture"])
-    write_whole(folder.path / "trace.jsonl", trace.text())
     return files
 
 

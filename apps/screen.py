@@ -63,6 +63,8 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     written = [name for name in (report.files or {}).values() if name]
     if written:
         _line(console, "files", f"{folder}/ {', '.join(written)}")
+    if written and report.status in ("question", "needs_approval", "stopped", "failed"):
+        _line(console, "go on", f"formup resume {folder}")
 
 
 def at_terminal() -> bool:
@@ -70,9 +72,9 @@ def at_terminal() -> bool:
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
-def ask() -> str:
+def ask(what: str) -> str:
     """The person's answer to the question just shown; empty to leave it open."""
-    print("your answer (Enter leaves it open): ", end="", flush=True)  # noqa: T201
+    print(f"{what} (Enter leaves it open): ", end="", flush=True)  # noqa: T201
     line = sys.stdin.buffer.readline()  # not input(): it chokes on bytes that are no text
     if not line.endswith(b"\n"):
         print()  # noqa: T201
@@ -85,7 +87,7 @@ def say_failed(message: str) -> None:
     if len(message) > LONGEST:
         message = f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
     print(f"formup: {message}", file=sys.stderr)  # noqa: T201
-    if "--json" in sys.argv and sys.argv[1] in ("run", "deploy"):
+    if "--json" in sys.argv and sys.argv[1] in ("run", "resume", "deploy"):
         report = Report(status="failed", message=message, instruction="", model="offline")
         print(report.model_dump_json(indent=2))  # noqa: T201
 

@@ -42,7 +42,6 @@ def call_tool(
         raise InputError(f"Unknown tool {name!r}. There are: {', '.join(t.name for t in TOOLS)}.")
     arguments = _arguments(args)
     workspace = _workspace(image, state)
-    path = image or Path(read_stored(state).image.path or "") if state and state.exists() else image
     try:
         result = asyncio.run(tool.call(workspace, arguments))
     except ToolError as error:
@@ -54,7 +53,7 @@ def call_tool(
         write_whole(written, png)
         data.setdefault("pictures", []).append(str(written))
     if state is not None:
-        write_whole(state, store(workspace, path).model_dump_json(indent=1).encode())
+        write_whole(state, store(workspace).model_dump_json(indent=1).encode())
     print(json.dumps(data, indent=2, ensure_ascii=False))  # noqa: T201
 
 
@@ -70,7 +69,8 @@ def _arguments(text: str) -> dict[str, Any]:
 
 def _workspace(image: Path | None, state: Path | None) -> Workspace:
     if state is not None and state.exists():
-        return restore(read_stored(state), image, Settings())
+        picture = None if image is None else load_picture(image)
+        return restore(read_stored(state), picture, Settings())
     if image is None:
         raise InputError(
             "Name the picture with --image, or a state file that has one with --state."

@@ -4,6 +4,7 @@ FormupError
 ├── InputError     a person gave something that cannot be used; the text says what would do
 │   └── ImageError     the picture file: missing, broken, too large, of a foreign format
 ├── ToolError      a model asked a tool for something it cannot do; goes back to the model
+│   └── ArgumentsError the arguments are against the tool's schema
 ├── ModelError     a model or its provider failed, or does not exist
 └── FleetError     robots could not be moved or observed
 """
@@ -23,6 +24,10 @@ class ImageError(InputError):
 
 class ToolError(FormupError):
     """A tool cannot do what its arguments ask; the model is told why and may repair."""
+
+
+class ArgumentsError(ToolError):
+    """Arguments against the tool's schema; the text names every violation."""
 
 
 class ModelError(FormupError):

@@ -17,7 +17,7 @@ from pydantic_core import to_json
 from .errors import ImageError, InputError
 from .formation.plan import Plan
 from .geometry.outline import make_outline
-from .perception.image import load_picture
+from .perception.image import Picture, load_picture
 from .perception.prompts import Box, Point, TargetPrompt
 from .scene import Scene, Target
 from .tool import violations
@@ -74,11 +74,7 @@ class Stored(_Value):
 
 
 def store(
-    workspace: Workspace,
-    image: Path | None,
-    *,
-    plan_id: str | None = None,
-    instruction: str | None = None,
+    workspace: Workspace, *, plan_id: str | None = None, instruction: str | None = None
 ) -> Stored:
     """The workspace as a value; with a plan id only that plan is kept."""
     picture = workspace.scene.picture
@@ -87,7 +83,7 @@ def store(
         plan_id=plan_id,
         instruction=instruction,
         image=StoredImage(
-            path=None if image is None else str(image.resolve()),
+            path=None if picture.path is None else str(picture.path),
             sha256=picture.sha256,
             width=picture.width,
             height=picture.height,
@@ -148,20 +144,21 @@ def read_text(path: Path) -> str:
         raise InputError(f"{path} is not JSON or text in UTF-8.") from None
 
 
-def restore(stored: Stored, image: Path | None, settings: Settings) -> Workspace:
-    """The workspace again, its picture loaded from `image` or from where it lay.
+def restore(stored: Stored, picture: Picture | None, settings: Settings) -> Workspace:
+    """The workspace again, on `picture` or on what lies where its own lay.
 
     Raises:
         ImageError: the picture cannot be loaded.
         InputError: the picture has changed since.
     """
-    path = image or (Path(stored.image.path) if stored.image.path else None)
-    if path is None:
-        raise ImageError("The stored scene names no picture file; give one.")
-    picture = load_picture(path)
+    if picture is None:
+        if stored.image.path is None:
+            raise ImageError("The stored scene names no picture file; give one.")
+        picture = load_picture(stored.image.path)
     if picture.sha256 != stored.image.sha256:
+        shown = picture.path or picture.name
         raise InputError(
-            f"{path} is not the picture this was made for, or it has changed since, which voids "
+            f"{shown} is not the picture this was made for, or it has changed since, which voids "
             "its targets and plans; run again on the new picture."
         )
     return Workspace(

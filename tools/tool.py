@@ -4,16 +4,20 @@ The first parameter is the Workspace the call works on; the rest is what the mod
 Every parameter must be described, with unit and frame where it has one: this fails at import.
 """
 
+import asyncio
+import contextvars
 import inspect
 import json
 import re
+import threading
 from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from .errors import ToolError
+from .errors import ArgumentsError
 from .workspace import Workspace
 
 Kind = Literal["read", "commit", "actuate", "ask", "end"]
@@ -61,23 +65,55 @@ class Tool:
         """Validated arguments.
 
         Raises:
-            ToolError: naming every violation at once.
+            ArgumentsError: naming every violation at once.
         """
         try:
             return self.arguments.model_validate(dict(arguments))
         except ValidationError as error:
-            raise ToolError(f"{self.name}: {violations(error)}") from None
+            raise ArgumentsError(f"{self.name}: {violations(error)}") from None
 
     async def call(self, workspace: Workspace, arguments: Mapping[str, Any]) -> ToolResult:
-        """Validate and run.
+        """Validate and run; a plain function runs in a thread of its own.
 
         Raises:
-            ToolError: the arguments or what they ask for are not possible; for the model.
+            ArgumentsError: they are against the schema.
+            ToolError: what they ask for is not possible; for the model.
         """
         parsed = self.parse(arguments)
         values = {name: getattr(parsed, name) for name in type(parsed).model_fields}
-        result = self.function(workspace, **values)
-        return await result if inspect.isawaitable(result) else result
+        if inspect.iscoroutinefunction(self.function):
+            return await self.function(workspace, **values)
+        return await _in_thread(lambda: self.function(workspace, **values))
+
+
+async def _in_thread(work: Callable[[], Any]) -> Any:
+    """Run without blocking the event loop, so that time limits and Ctrl-C work.
+
+    A daemon thread of its own: no pool waits at the end of the program for one that hangs.
+    """
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[Any] = loop.create_future()
+
+    def settle(value: Any, error: BaseException | None) -> None:
+        if done.cancelled():
+            return
+        if error is None:
+            done.set_result(value)
+        else:
+            done.set_exception(error)
+
+    def run() -> None:
+        value, error = None, None
+        try:
+            value = work()
+        except BaseException as raised:
+            error = raised
+        with suppress(RuntimeError):  # the loop has been closed: nobody waits any more
+            loop.call_soon_threadsafe(settle, value, error)
+
+    context = contextvars.copy_context()
+    threading.Thread(target=context.run, args=(run,), daemon=True).start()
+    return await done
 
 
 def tool(kind: Kind) -> Callable[[ToolFunction], Tool]:

@@ -6,6 +6,7 @@ target id means the same in the next call.
 
 import math
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -94,6 +95,17 @@ class Workspace:
         problems = [p for q in self.pointed for p in q.problems(*self.scene.picture.size)]
         if problems:
             raise InputError(" ".join(problems))
+
+    def copy(self) -> "Workspace":
+        """One to work on that leaves this one as it is."""
+        made = copy(self)
+        for name in ("plans", "samples", "arrivals", "frames"):
+            setattr(made, name, dict(getattr(self, name)))
+        return made
+
+    def adopt(self, other: "Workspace") -> None:
+        """Become what a copy has become."""
+        vars(self).update(vars(other))
 
     def segment(self, prompt: TargetPrompt) -> Target:
         """Find the outline of the thing pointed at and keep it as a target.

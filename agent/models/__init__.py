@@ -1,13 +1,14 @@
 """Models by name: who decides in a run."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from ...tools.errors import InputError
 from ..model import Model
 from .offline import OfflinePlanner
 
-PROVIDERS = ("openai", "anthropic", "ollama")
-MODELS = ("offline", *(f"{provider}:NAME" for provider in PROVIDERS))
+PROVIDERS = ("openai", "openai-responses", "anthropic", "gemini", "ollama")
+MODELS = ("offline", *(f"{provider}:NAME" for provider in PROVIDERS), "replay:FILE")
 
 
 def model_named(
@@ -32,8 +33,13 @@ def model_named(
         from .remote import remote_model  # not before: it loads the HTTP library
 
         return remote_model(provider, model.strip(), base_url, show=show)
-    if name != "offline":
+    if name != "offline" and not (provider == "replay" and model):
         raise InputError(f"Unknown model {name!r}. There are: {', '.join(MODELS)}.")
     if base_url is not None:
-        raise InputError("The offline rules ask no server; a base URL goes with openai:NAME.")
+        asks = "A replay asks" if model else "The offline rules ask"
+        raise InputError(f"{asks} no server; a base URL goes with openai:NAME.")
+    if model:
+        from .replay import ReplayModel
+
+        return ReplayModel(Path(model))
     return OfflinePlanner()

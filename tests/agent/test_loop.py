@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formup.agent.loop import Limits, run
+from formup.agent.limits import Limits
+from formup.agent.loop import run
 from formup.agent.messages import HISTORY, Call, History, Reply, Result, User, unanswered
 from formup.agent.model import Request
 from formup.agent.models.doubles import FunctionModel, ScriptedModel
 from formup.agent.outcomes import Answered, Cancelled, Outcome, Paused, Stopped
+from formup.agent.policy import Policy
 from formup.tools.doors import TOOLS
 from formup.tools.errors import ModelError
 from formup.tools.perception.image import picture_from_array
@@ -28,10 +30,6 @@ def workspace(**settings: Any) -> Workspace:
     pixels = np.full((140, 200, 3), 60, np.uint8)
     pixels[40:90, 60:120] = (200, 40, 40)
     return Workspace(Scene(picture_from_array(pixels)), Settings(**settings))
-
-
-def nobody(call: Call) -> bool:
-    return False
 
 
 def call(name: str, arguments: dict[str, Any] | None = None, id: str = "c1") -> Reply:
@@ -130,11 +128,11 @@ def test_a_limit_is_an_outcome_that_keeps_the_messages() -> None:
     def ever(request: Request) -> Reply:
         return call("locate_object", id=f"c{len(request.messages)}")
 
-    outcome = go(FunctionModel(ever), limits=Limits(requests=3))
+    outcome = go(FunctionModel(ever), limits=Limits(requests=2))
     assert isinstance(outcome, Stopped)
     assert outcome.kind == "limit"
-    assert "3 requests" in outcome.reason
-    assert len(outcome.messages) == 1 + 2 * 3
+    assert "2 requests" in outcome.reason
+    assert len(outcome.messages) == 1 + 2 * 2
     many = go(FunctionModel(ever), limits=Limits(tool_calls=2))
     assert isinstance(many, Stopped)
     assert "2 tool calls" in many.reason
@@ -173,11 +171,14 @@ def test_robots_that_need_leave_wait_for_it_and_then_move() -> None:
     assert isinstance(proposed, Answered)
     (plan_id,) = work.plans
     replies = [call("deploy", {"plan_id": plan_id}, "d"), Reply(text="there")]
-    paused = go(ScriptedModel(replies[:1]), work=work, allowed=nobody)
+    paused = go(ScriptedModel(replies[:1]), work=work, policy=Policy((("deploy", "ask"),)))
     assert isinstance(paused, Paused)
     assert paused.call.name == "deploy"
     assert not work.arrivals
-    moved = go(ScriptedModel(replies[1:]), paused.messages, work=work)
+    policy = Policy((("*", "ask"),))
+    moved = go(
+        ScriptedModel(replies[1:]), paused.messages, work=work, policy=policy, approved=paused.call
+    )
     assert isinstance(moved, Answered)
     assert work.arrivals[plan_id].arrived
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from formup.agent.agent import Agent
-from formup.agent.messages import Reply, Result
+from formup.agent.messages import Reply
 from formup.agent.models import model_named
 from formup.agent.models.understand import understand
 from formup.agent.outcomes import Answered, Paused
@@ -212,11 +212,7 @@ def test_an_answer_resumes_where_it_asked() -> None:
     asked = agent.run(picture, "Ring the coin", pointed=[COIN])
     assert isinstance(asked.outcome, Paused)
     assert asked.report.status == "question"
-    answer = Result(call_id=asked.outcome.call.id, name="ask_user", text="9")
-    import asyncio
-
-    history = (*asked.outcome.messages, answer)
-    resumed = asyncio.run(agent.resume(asked.workspace, history, "Ring the coin"))
+    resumed = agent.resume(asked, answer="9")
     assert isinstance(resumed.outcome, Answered)
     assert resumed.report.status == "deployed"
     assert resumed.report.positions is not None

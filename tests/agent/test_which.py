@@ -131,7 +131,7 @@ def test_the_question_offers_the_things_that_fit() -> None:
 
 @pytest.mark.parametrize("answer", ["3", "c3", "C3", "number 3", "I mean 3.", " 3 "])
 def test_an_answer_chooses(answer: str) -> None:
-    done = Agent().answer(run("Surround the coin"), answer)
+    done = Agent().resume(run("Surround the coin"), answer=answer)
     assert taken(done) == ["c3"]
     assert is_settled(done.outcome.messages)
 
@@ -141,7 +141,7 @@ def test_an_answer_chooses(answer: str) -> None:
     ["99", "c99", "0", "-3", "3.5", "3,5", "the 3rd", "3 or 5", "not 3", "neither", "yes", "c"],
 )
 def test_other_answers_are_asked_again(answer: str) -> None:
-    done = Agent().answer(run("Surround the coin"), answer)
+    done = Agent().resume(run("Surround the coin"), answer=answer)
     assert done.report.status == "question"
     assert not taken(done)
 
@@ -150,13 +150,13 @@ def test_two_things_are_found_for_between() -> None:
     done = run("Put 3 robots between the red lighter and the white disc", "table_stuff.jpg")
     assert done.report.status in ("planned", "question")
     if done.report.status == "question":
-        done = Agent().answer(done, "3 and 4")
+        done = Agent().resume(done, answer="3 and 4")
     assert sorted(taken(done)) == ["c3", "c4"]
 
 
 def test_between_takes_no_third_choice() -> None:
     asked = run("Put 3 robots in a line between the dog and the cat")
-    done = Agent().answer(asked, "1, 2 and 3")
+    done = Agent().resume(asked, answer="1, 2 and 3")
     assert done.report.status == "question"
 
 

@@ -73,8 +73,9 @@ def test_main_job_prints_one_json_object_and_writes_its_files(tmp_path: Path) ->
         assert (tmp_path / "out" / name).stat().st_size > 0
     with Image.open(tmp_path / "out" / "deploy.gif") as animation:
         assert getattr(animation, "n_frames") > 10  # noqa: B009
-    lines = (tmp_path / "out/trace.jsonl").read_text().splitlines()
-    roles = [json.loads(line)["role"] for line in lines]
+    lines = [json.loads(t) for t in (tmp_path / "out/trace.jsonl").read_text().splitlines()]
+    assert (lines[0]["type"], lines[-1]["type"]) == ("start", "end")
+    roles = [line["role"] for line in lines if line["type"] == "message"]
     assert roles == ["user", "assistant", "tool", "assistant", "tool", "assistant"]
 
 
@@ -308,4 +309,6 @@ def test_ctrl_c_stops_at_once_and_leaves_no_half_written_file(tmp_path: Path) ->
     assert process.returncode == 130
     assert "interrupted" in err
     assert "Traceback" not in err
-    assert not list(tmp_path.glob("out/*"))
+    left = sorted((tmp_path / "out").iterdir()) if (tmp_path / "out").exists() else []
+    assert [p.name for p in left] in ([], ["trace.jsonl"])
+    assert all(json.loads(line) for p in left for line in p.read_text().splitlines())

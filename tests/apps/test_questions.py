@@ -13,7 +13,7 @@ from formup.agent.agent import Agent
 from formup.agent.messages import Call, Reply, Result, User
 from formup.agent.models.doubles import ScriptedModel
 from formup.apps.inputs import pointed
-from formup.apps.output import Folder, Trace, write_files
+from formup.apps.output import Folder, write_files
 from formup.tools.draw import draw_look
 from formup.tools.errors import InputError
 from formup.tools.perception.image import load_picture
@@ -219,13 +219,13 @@ def test_an_answer_in_python_goes_on_where_it_paused() -> None:
     paused = agent.run(load_picture(SMARTIES), "Ring one")
     assert [c["id"] for c in paused.report.candidates or ()] == ["c2", "c1"]
     shown: list[User | Reply | Result] = []
-    done = agent.answer(paused, " 2 ", show=shown.append)
+    done = agent.resume(paused, answer=" 2 ", show=shown.append)
     assert shown == [Result(call_id="q", name="ask_user", text="2"), Reply(text="done")]
     assert (done.report.message, done.report.candidates) == ("done", None)
     assert done.report.usage.requests == 3
     assert done.report.usage.seconds >= paused.report.usage.seconds > 0
     with pytest.raises(InputError, match="asked nothing"):
-        agent.answer(done, "2")
+        agent.resume(done, answer="2")
 
 
 @pytest.mark.parametrize(
@@ -235,7 +235,7 @@ def test_answers_that_are_none(text: str, word: str) -> None:
     agent = Agent(ScriptedModel([asking("c1")]))
     paused = agent.run(load_picture(SMARTIES), "Ring one")
     with pytest.raises(InputError, match=word):
-        agent.answer(paused, text)
+        agent.resume(paused, answer=text)
 
 
 def test_targets_that_are_asked_about_are_shown_without_the_others(tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ def test_targets_that_are_asked_about_are_shown_without_the_others(tmp_path: Pat
     other = run.workspace.scene.target("t2")
     box = pytest.approx(other.box, abs=0.1)
     assert run.report.candidates == ({"id": "t2", "label": other.label, "box": box},)
-    files = write_files(Folder(tmp_path / "out"), run, SMARTIES, Trace())
+    files = write_files(Folder(tmp_path / "out"), run)
     assert files["picture"] == "question.png"
     with Image.open(tmp_path / "out/question.png") as image:
         wanted = draw_look(Scene(picture, (other,)))

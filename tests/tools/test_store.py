@@ -34,7 +34,7 @@ def work() -> Workspace:
 
 
 def written(work: Workspace, path: Path) -> Path:
-    path.write_text(store(work, PHOTO).model_dump_json())
+    path.write_text(store(work).model_dump_json())
     return path
 
 

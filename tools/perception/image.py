@@ -13,7 +13,7 @@ import stat
 import warnings
 from collections.abc import Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -65,12 +65,14 @@ class Picture:
     sha256: hex digest of the file's bytes, or of shape and pixels for an array.
     name: file name, for messages.
     notes: what a person should know of how the pixels came about; often empty.
+    path: absolute, of the file it was loaded from; None where it came from none.
     """
 
     pixels: NDArray[np.uint8]
     sha256: str
     name: str
     notes: tuple[str, ...]
+    path: Path | None = None
 
     @property
     def width(self) -> int:
@@ -99,7 +101,7 @@ def load_picture(path: str | os.PathLike[str]) -> Picture:
         data = _read(Path(path), shown)
     except (OSError, ValueError) as error:
         raise _unreadable(shown, error) from None
-    return picture_from_bytes(data, Path(path).name)
+    return replace(picture_from_bytes(data, Path(path).name), path=Path(path).resolve())
 
 
 def picture_from_bytes(data: bytes, name: str) -> Picture:

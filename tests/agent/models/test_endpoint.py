@@ -17,7 +17,6 @@ from formup.agent.models.openai_chat import OpenAIChat
 from formup.agent.models.prices import UNKNOWN, price_of
 from formup.agent.models.remote import remote_model
 from formup.agent.models.wire import Once
-from formup.apps.output import Trace
 from formup.tools.errors import InputError, ModelError
 from formup.tools.perception.image import picture_from_array
 
@@ -112,16 +111,16 @@ def test_a_key_that_cannot_be_sent_is_not_repeated(monkeypatch: pytest.MonkeyPat
 
 
 def test_the_key_is_sent_and_appears_nowhere_else(
-    server: Any, dialect: Any, http: Any, monkeypatch: pytest.MonkeyPatch
+    server: Any, dialect: Any, http: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv(dialect.variable, KEY)
     server.script = [http.response(dialect.error(f"Incorrect API key provided: {KEY}"), 401)]
-    model, trace = server.model(dialect.name), Trace()
-    run = Agent(model).run(PICTURE, "Surround it with 4 robots", show=trace)
+    model, trace = server.model(dialect.name), tmp_path / "trace.jsonl"
+    run = Agent(model).run(PICTURE, "Surround it with 4 robots", trace=trace)
     sent = server.headers[0]
     assert KEY in (sent.get("authorization", "") + sent.get("x-api-key", ""))
     assert f"check the key in {dialect.variable}" in run.report.message
-    texts = [run.report.model_dump_json(), trace.text().decode(), json.dumps(server.requests)]
+    texts = [run.report.model_dump_json(), trace.read_text(), json.dumps(server.requests)]
     texts += [
         repr(run.outcome),
         repr(model),

@@ -1,0 +1,61 @@
+"""Bounds of a run. Reaching one is an outcome like any other: the messages are all there."""
+
+from dataclasses import dataclass, fields
+
+from ..tools.errors import InputError
+from .messages import History, Reply
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a run may use; None is no limit.
+
+    Numbers and cost count the whole history and are checked before each request, so that the last
+    one may go over; seconds count from where the run was begun or resumed.
+
+    Attributes:
+        requests: to the model.
+        tool_calls: all tools together.
+        tokens: input and output together.
+        cost_usd: as far as prices are known.
+        seconds: wall time; what runs then is interrupted.
+        tool_seconds: of one tool call.
+
+    Raises:
+        InputError: one that is not above 0.
+    """
+
+    requests: int | None = 20
+    tool_calls: int | None = 60
+    tokens: int | None = None
+    cost_usd: float | None = None
+    seconds: float | None = None
+    tool_seconds: float | None = 120.0
+
+    def __post_init__(self) -> None:
+        for name in (field.name for field in fields(self)):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise InputError(f"A limit of {value:g} for {name} lets nothing run; give more.")
+
+
+DEFAULT_LIMITS = Limits()
+
+
+def exhausted(history: History, limits: Limits) -> str | None:
+    """The limit that has been reached, as a sentence."""
+    replies = [m for m in history if isinstance(m, Reply)]
+    if limits.requests is not None and len(replies) >= limits.requests:
+        return f"The limit of {limits.requests} requests was reached."
+    calls = sum(len(m.calls) for m in replies)
+    if limits.tool_calls is not None and calls >= limits.tool_calls:
+        return f"The limit of {limits.tool_calls} tool calls was reached."
+    if limits.tokens is not None:
+        used = sum(m.usage.input_tokens + m.usage.output_tokens for m in replies)
+        if used >= limits.tokens:
+            return f"The limit of {limits.tokens:,} tokens was reached: {used:,} were used."
+    if limits.cost_usd is not None:
+        spent = sum(m.usage.cost_usd for m in replies)
+        if spent >= limits.cost_usd:
+            return f"The limit of {limits.cost_usd:g} USD was reached: {spent:.4f} were spent."
+    return None

@@ -1,0 +1,46 @@
+"""Which tool calls may go ahead, which wait for a person, which are refused.
+
+A policy can only be stricter than the tools are: questions always wait, and so do real robots.
+"""
+
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Literal
+
+from ..tools.errors import InputError
+from ..tools.tool import Tool
+from ..tools.workspace import Workspace
+
+Decision = Literal["allow", "ask", "refuse"]
+DECISIONS: tuple[Decision, ...] = ("allow", "ask", "refuse")
+"""From the least strict to the strictest."""
+
+
+@dataclass(frozen=True)
+class Policy:
+    """Rules of (glob, decision); the first whose glob fits a tool's name decides.
+
+    Raises:
+        InputError: a decision that is none.
+    """
+
+    rules: tuple[tuple[str, Decision], ...] = ()
+
+    def __post_init__(self) -> None:
+        for glob, decision in self.rules:
+            if decision not in DECISIONS:
+                raise InputError(
+                    f"{glob}={decision} is no rule of a policy: say allow, ask or refuse."
+                )
+
+    def decide(self, tool: Tool, workspace: Workspace) -> Decision:
+        """What is to happen with a call of a tool."""
+        rules = [decision for glob, decision in self.rules if fnmatchcase(tool.name, glob)]
+        wanted = (rules[0] if rules else DECISIONS[0], _least(tool, workspace))
+        return DECISIONS[max(map(DECISIONS.index, wanted))]
+
+
+def _least(tool: Tool, workspace: Workspace) -> Decision:
+    """What the tool itself wants: a person answers questions, and moves real robots."""
+    real = workspace.settings.fleet != "simulated"
+    return "ask" if tool.kind == "ask" or (tool.kind == "actuate" and real) else "allow"
