@@ -40,13 +40,13 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
         InputError: it cannot be read, or the picture is not the same.
     """
     trace = read_trace(Path(path))
+    try:
+        settings, outcome = _settings(trace), _outcome(trace)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"{trace.path} is damaged: its settings or its end.") from None
     stored, arrivals = trace.state()
-    facts = dict(trace.start["settings"])
-    starts = facts.pop("starts")
-    settings = Settings(**facts, starts=None if starts is None else np.asarray(starts, float))
     workspace = restore(stored, picture, settings)
     workspace.arrivals.update(arrivals)
-    outcome = _outcome(trace)
     start = trace.start
     report = make_report(
         outcome, workspace, start["instruction"], start["model"], round(trace.seconds, 3)
@@ -98,6 +98,12 @@ def check_text(name: str, text: str, advice: str) -> None:
         raise InputError(f"The {name} holds bytes that are not text in UTF-8.") from None
     if len(text) > MAX_TEXT:
         raise InputError(f"The {name} has {len(text):,} characters; {MAX_TEXT:,} can be read.")
+
+
+def _settings(trace: Trace) -> Settings:
+    facts = dict(trace.start["settings"])
+    starts = facts.pop("starts")
+    return Settings(**facts, starts=None if starts is None else np.asarray(starts, float))
 
 
 def _outcome(trace: Trace) -> Outcome:

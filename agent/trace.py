@@ -6,7 +6,7 @@ process that is killed loses at most what it was doing. Keys and times of day ar
 
 import hashlib
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -22,6 +22,13 @@ from .messages import HISTORY, History, Reply, Result, User
 
 FORMAT = "formup-trace-1"
 NAME = "trace.jsonl"
+_KEYS: dict[str, set[str]] = {
+    "start": {"instruction", "model", "base_url", "prompt", "settings", "limits", "policy"},
+    "state": {"workspace", "arrivals"},
+    "message": {"role", "text", "images"},
+    "resume": set(),
+    "end": {"outcome", "status", "message", "usage"},
+}
 PICTURES = "pictures"
 """The folder beside a trace that holds the pictures of its messages, named by their hash."""
 
@@ -135,25 +142,21 @@ class Trace:
         """The messages, their images read from beside the trace.
 
         Raises:
-            InputError: a picture is missing or not what it was, or a message is damaged.
+            InputError: a picture is missing or not what it was.
         """
-        found: list[dict[str, Any]] = []
-        for line in self.of_type("message"):
-            facts = {k: v for k, v in line.items() if k not in ("type", "seconds", "images")}
-            images = {"images": [self._image(image) for image in line["images"]]}
-            found.append(facts | (images if line["role"] != "assistant" else {}))
-        try:
-            return HISTORY.validate_python(found)
-        except ValidationError:
-            raise InputError(f"{self.path} is damaged: a message cannot be read.") from None
+        lines = self.of_type("message")
+        return _history(lines, [[self._image(i) for i in line["images"]] for line in lines])
 
     def state(self) -> tuple[Stored, dict[str, Arrival]]:
         """The workspace as it was last, and the arrivals by plan id.
 
         Raises:
-            InputError: it is damaged.
+            InputError: there is none, or it is damaged.
         """
-        last = self.of_type("state")[-1]
+        states = self.of_type("state")
+        if not states:
+            raise InputError(f"{self.path} was broken off before anything began; run again.")
+        last = states[-1]
         try:
             arrivals = {k: Arrival.model_validate(v) for k, v in last["arrivals"].items()}
             return Stored.model_validate(last["workspace"]), arrivals
@@ -188,13 +191,24 @@ def read_trace(path: Path) -> Trace:
     try:
         lines: list[Any] = [from_json(line) for line in whole.split(b"\n")]
         first = lines[0]["format"] == FORMAT and lines[0]["type"] == "start"
-        known = all(line["type"] and line["seconds"] >= 0 for line in lines)
-    except (ValueError, TypeError, KeyError):
+        known = all(line["seconds"] >= 0 and line.keys() >= _KEYS[line["type"]] for line in lines)
+        prompt_name(lines[0]["prompt"])
+        messages = [line for line in lines if line["type"] == "message"]
+        _history(messages, [[] for _ in messages])
+    except (ValueError, TypeError, KeyError, AttributeError):  # a ValidationError is a ValueError
         first = known = False
-        lines = []
     if not (first and known):
-        raise InputError(f"{path} is no trace that formup wrote ({FORMAT}).")
+        raise InputError(f"{path} is no trace that formup wrote ({FORMAT}), or it is damaged.")
     return Trace(path, tuple(lines))
+
+
+def _history(lines: Sequence[dict[str, Any]], images: Sequence[Sequence[bytes]]) -> History:
+    """Messages from their lines."""
+    found: list[dict[str, Any]] = []
+    for line, shown in zip(lines, images, strict=True):
+        facts = {k: v for k, v in line.items() if k not in ("type", "seconds", "images")}
+        found.append(facts | ({} if line["role"] == "assistant" else {"images": shown}))
+    return HISTORY.validate_python(found)
 
 
 def prompt_name(facts: Mapping[str, Any] | None) -> str | None:

@@ -1,8 +1,11 @@
 """The entry point: exit codes, one sentence for every error a user can cause, Ctrl-C at once."""
 
 import io
+import os
 import signal
 import sys
+import threading
+from contextlib import suppress
 
 INTERRUPTED = 130
 
@@ -20,7 +23,19 @@ def main() -> None:
         print("formup: interrupted; nothing more was done.", file=sys.stderr)  # noqa: T201
         code = INTERRUPTED
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # too late: the work is done
-    sys.exit(code)
+    _leave(code)
+
+
+def _leave(code: int) -> None:
+    """Exit; native code of a tool that was given up must not be torn down while it runs."""
+    from ..tools.tool import THREAD
+
+    if not any(thread.name == THREAD for thread in threading.enumerate()):
+        sys.exit(code)
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(code)
 
 
 def _run() -> int:

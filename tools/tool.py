@@ -43,6 +43,8 @@ class ToolResult:
         return json.dumps(self.data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
+THREAD = "formup tool"
+"""Name of the threads that tools run in."""
 ToolFunction = Callable[..., ToolResult | Awaitable[ToolResult]]
 
 
@@ -112,7 +114,7 @@ async def _in_thread(work: Callable[[], Any]) -> Any:
             loop.call_soon_threadsafe(settle, value, error)
 
     context = contextvars.copy_context()
-    threading.Thread(target=context.run, args=(run,), daemon=True).start()
+    threading.Thread(target=context.run, args=(run,), name=THREAD, daemon=True).start()
     return await done
 
 
