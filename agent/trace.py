@@ -189,17 +189,22 @@ def read_trace(path: Path) -> Trace:
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     try:
-        lines: list[Any] = [from_json(line) for line in whole.split(b"\n")]
-        first = lines[0]["format"] == FORMAT and lines[0]["type"] == "start"
-        known = all(line["seconds"] >= 0 and line.keys() >= _KEYS[line["type"]] for line in lines)
-        prompt_name(lines[0]["prompt"])
-        messages = [line for line in lines if line["type"] == "message"]
-        _history(messages, [[] for _ in messages])
-    except (ValueError, TypeError, KeyError, AttributeError):  # a ValidationError is a ValueError
-        first = known = False
-    if not (first and known):
-        raise InputError(f"{path} is no trace that formup wrote ({FORMAT}), or it is damaged.")
-    return Trace(path, tuple(lines))
+        return Trace(path, _lines(whole))
+    except (ValueError, TypeError, KeyError, AttributeError):  # ValidationErrors are ValueErrors
+        raise InputError(f"{path} is no whole trace of {FORMAT} that formup wrote.") from None
+
+
+def _lines(whole: bytes) -> tuple[dict[str, Any], ...]:
+    """The lines of a trace; one exception or the other where they are none."""
+    lines: list[dict[str, Any]] = [from_json(line) for line in whole.split(b"\n")]
+    start = lines[0]
+    known = all(line["seconds"] >= 0 and line.keys() >= _KEYS[line["type"]] for line in lines)
+    if not known or (start["type"], start["format"]) != ("start", FORMAT):
+        raise ValueError
+    prompt_name(start["prompt"])
+    messages = [line for line in lines if line["type"] == "message"]
+    _history(messages, [[] for _ in messages])
+    return tuple(lines)
 
 
 def _history(lines: Sequence[dict[str, Any]], images: Sequence[Sequence[bytes]]) -> History:

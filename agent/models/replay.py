@@ -1,6 +1,5 @@
 """A recorded run in a model's place: the same replies, as long as everything else is the same."""
 
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -38,25 +37,26 @@ class ReplayModel:
             ModelError: they are others, or the recording ends here.
         """
         count = len(request.messages)
-        for number, (line, message) in enumerate(
-            zip_longest(self._lines[:count], request.messages), start=1
-        ):
-            now = message_facts(message)
-            if line is None or _facts(line) != now:
-                raise ModelError(self._parted(number, line, now))
-        if count == len(self._lines):
-            raise ModelError(f"The recording {self._path} ends after message {count}.")
-        facts = _facts(self._lines[count])
-        if facts.pop("role") != "assistant":
-            raise ModelError(self._parted(count + 1, self._lines[count], None))
-        return Reply.model_validate({k: v for k, v in facts.items() if k != "images"})
+        for number, message in enumerate(request.messages):
+            then, now = self._at(number), message_facts(message)
+            if _facts(then) != now:
+                raise ModelError(self._parted(number + 1, then["text"], repr(_short(now["text"]))))
+        line = self._at(count)
+        facts = {k: v for k, v in _facts(line).items() if k not in ("role", "images")}
+        if line["role"] != "assistant":
+            raise ModelError(self._parted(count + 1, line["text"], "the model's turn"))
+        return Reply.model_validate(facts)
 
-    def _parted(self, number: int, line: dict[str, Any] | None, now: dict[str, Any] | None) -> str:
-        then_text = "nothing" if line is None else repr(_short(line.get("text", "")))
-        now_text = "a request" if now is None else repr(_short(now.get("text", "")))
+    def _at(self, number: int) -> dict[str, Any]:
+        if number >= len(self._lines):
+            text = f"The recording {self._path} ends after message {len(self._lines)}."
+            raise ModelError(text)
+        return self._lines[number]
+
+    def _parted(self, number: int, then: str, now: str) -> str:
         return (
             f"The recording {self._path} parts from this run at message {number}: it was "
-            f"{then_text} and is {now_text} now; replay it with the same picture, instruction and "
+            f"{_short(then)!r} and is {now} now; replay it with the same picture, instruction and "
             "options."
         )
 

@@ -1,0 +1,383 @@
+"""Limits, policy, repetition and broken tools: every one an outcome that keeps the messages."""
+
+import asyncio
+import threading
+import time
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from formup.agent.agent import Agent
+from formup.agent.limits import Limits
+from formup.agent.loop import run
+from formup.agent.messages import Call, History, Reply, Result, Usage, User
+from formup.agent.model import Request
+from formup.agent.models.doubles import FunctionModel, ScriptedModel
+from formup.agent.outcomes import Answered, Cancelled, Outcome, Paused, Stopped
+from formup.agent.policy import Policy
+from formup.tools.doors import TOOLS
+from formup.tools.errors import FleetError, InputError, ToolError
+from formup.tools.perception.image import picture_from_array
+from formup.tools.scene import Scene
+from formup.tools.tool import Tool, ToolResult, tool
+from formup.tools.workspace import Settings, Workspace
+
+START: History = (User(text="go"),)
+PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))
+
+
+def call(name: str, id: str = "c1", **arguments: Any) -> Reply:
+    return Reply(calls=(Call(id=id, name=name, arguments=arguments),))
+
+
+def go(model: Any, *tools: Tool, messages: History = START, **more: Any) -> Outcome:
+    work = more.pop("work", None) or Workspace(Scene(PICTURE))
+    return asyncio.run(run(model, tools or TOOLS, work, messages, **more))
+
+
+def spending(tokens: int, cost: float) -> FunctionModel:
+    """Looks at another number of things each time."""
+
+    def reply(request: Request) -> Reply:
+        count = len(request.messages)
+        usage = Usage(input_tokens=tokens - 1, output_tokens=1, cost_usd=cost)
+        asked = Call(id=f"c{count}", name="report", arguments={"number": count})
+        return Reply(calls=(asked,), usage=usage)
+
+    return FunctionModel(reply)
+
+
+@tool("read")
+def report(workspace: Workspace, number: int) -> ToolResult:
+    """Repeat a number.
+
+    Args:
+        number: any.
+    """
+    return ToolResult({"number": number})
+
+
+@pytest.mark.parametrize(
+    ("limits", "requests", "word"),
+    [
+        (Limits(requests=3), 3, "3 requests"),
+        (Limits(tool_calls=2), 2, "2 tool calls"),
+        (Limits(tokens=250), 3, "250 tokens was reached: 300"),
+        (Limits(cost_usd=0.25), 3, "0.25 USD was reached: 0.3000"),
+    ],
+)
+def test_a_limit_is_an_outcome(limits: Limits, requests: int, word: str) -> None:
+    outcome = go(spending(100, 0.1), report, limits=limits)
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "limit"
+    assert word in outcome.reason
+    assert len(outcome.messages) == 1 + 2 * requests
+
+
+def test_a_limit_that_is_lifted_lets_the_run_go_on() -> None:
+    stopped = go(spending(100, 0.1), report, limits=Limits(requests=2))
+    script = ScriptedModel([Reply(text="done")])
+    outcome = go(script, report, messages=stopped.messages, limits=Limits(requests=3))
+    assert isinstance(outcome, Answered)
+    assert outcome.messages[: len(stopped.messages)] == stopped.messages
+
+
+@pytest.mark.parametrize("name", ["requests", "tokens", "cost_usd", "seconds", "tool_seconds"])
+@pytest.mark.parametrize("value", [0, -1, float("nan")])
+def test_limits_that_let_nothing_run_are_refused(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=name):
+        Limits(**{name: cast("Any", value)})
+
+
+class Waiting:
+    """Answers only when it is let."""
+
+    name = "waiting"
+
+    async def reply(self, request: Request) -> Reply:
+        await asyncio.Event().wait()
+        raise AssertionError
+
+
+def test_the_limit_of_time_interrupts_a_model() -> None:
+    outcome = go(Waiting(), limits=Limits(seconds=0.05))
+    assert isinstance(outcome, Stopped)
+    assert (outcome.kind, outcome.messages) == ("limit", START)
+    assert "0.05 s" in outcome.reason
+
+
+def test_a_timeout_of_the_models_own_is_not_the_limits() -> None:
+    def late(request: Request) -> Reply:
+        raise TimeoutError
+
+    with pytest.raises(TimeoutError):
+        go(FunctionModel(late), limits=Limits(seconds=60))
+
+
+class Hanging:
+    """A tool that does not end until it is let."""
+
+    def __init__(self) -> None:
+        self.released = threading.Event()
+
+        @tool("commit")
+        def hang(workspace: Workspace) -> ToolResult:
+            """Change something and hang."""
+            workspace.samples["s1"] = np.zeros((1, 2))
+            self.released.wait(60)
+            workspace.samples["s2"] = np.zeros((1, 2))
+            return ToolResult({})
+
+        @tool("commit")
+        async def hang_async(workspace: Workspace) -> ToolResult:
+            """Change something and wait for ever."""
+            workspace.samples["s1"] = np.zeros((1, 2))
+            await asyncio.Event().wait()
+            raise AssertionError
+
+        self.tools = (hang, hang_async)
+
+
+@pytest.fixture
+def hanging() -> Any:
+    made = Hanging()
+    yield made
+    made.released.set()
+    for thread in threading.enumerate():
+        if thread.name == "formup tool":
+            thread.join()
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_tool_that_hangs_is_given_up_and_has_changed_nothing(
+    hanging: Hanging, index: int
+) -> None:
+    tool_ = hanging.tools[index]
+    work = Workspace(Scene(PICTURE))
+    script = ScriptedModel([call(tool_.name), Reply(text="I do without.")])
+    outcome = go(script, tool_, work=work, limits=Limits(tool_seconds=0.05))
+    assert isinstance(outcome, Answered)
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert result.error == "timeout"
+    assert "0.05 s" in result.text
+    hanging.released.set()
+    assert not work.samples
+
+
+def test_a_move_that_hangs_ends_the_run(hanging: Hanging) -> None:
+    move = replace(hanging.tools[1], kind="actuate")
+    outcome = go(ScriptedModel([call(move.name)]), move, limits=Limits(tool_seconds=0.05))
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "fleet"
+    assert "where the robots are is not known" in outcome.reason
+
+
+def test_ctrl_c_comes_through_while_a_tool_works(hanging: Hanging) -> None:
+    async def scenario() -> Outcome:
+        work = Workspace(Scene(PICTURE))
+        script = ScriptedModel([call("hang")])
+        task = asyncio.create_task(run(script, hanging.tools, work, START))
+        while not any(t.name == "formup tool" for t in threading.enumerate()):
+            await asyncio.sleep(0.01)
+        task.cancel()
+        return await task
+
+    outcome = asyncio.run(scenario())
+    assert isinstance(outcome, Cancelled)
+    assert len(outcome.messages) == 2
+
+
+def test_a_tool_that_works_does_not_stop_the_others() -> None:
+    """Two conversations in one event loop: each tool waits until the other one runs."""
+    both = threading.Barrier(2)
+
+    @tool("read")
+    def meet(workspace: Workspace) -> ToolResult:
+        """Wait for the other one."""
+        both.wait(30)
+        return ToolResult({})
+
+    async def scenario() -> list[Outcome]:
+        one = [
+            run(
+                ScriptedModel([call("meet"), Reply(text="met")]),
+                (meet,),
+                Workspace(Scene(PICTURE)),
+                START,
+            )
+            for _ in range(2)
+        ]
+        return await asyncio.gather(*one)
+
+    assert all(isinstance(outcome, Answered) for outcome in asyncio.run(scenario()))
+
+
+@tool("read")
+def broken(workspace: Workspace) -> ToolResult:
+    """Have a mistake."""
+    workspace.samples["s1"] = np.zeros((1, 2))
+    raise KeyError("colour\nof it")
+
+
+def test_a_broken_tool_is_named_with_its_line() -> None:
+    work = Workspace(Scene(PICTURE))
+    outcome = go(ScriptedModel([call("broken")]), broken, work=work)
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "tool"
+    assert isinstance(outcome.error, KeyError)
+    assert "broken broke (KeyError: 'colour\\nof it') at line" in outcome.reason
+    assert "test_limits.py" in outcome.reason
+    assert len(outcome.messages) == 2
+    assert not work.samples
+
+
+def test_what_a_tool_cannot_do_keeps_what_it_found() -> None:
+    @tool("read")
+    def doubt(workspace: Workspace) -> ToolResult:
+        """Find something, but not enough."""
+        workspace.samples["s1"] = np.zeros((1, 2))
+        raise ToolError("not enough")
+
+    work = Workspace(Scene(PICTURE))
+    go(ScriptedModel([call("doubt"), Reply(text="oh")]), doubt, work=work)
+    assert list(work.samples) == ["s1"]
+
+
+def test_errors_of_fleet_and_person_are_theirs() -> None:
+    @tool("actuate")
+    async def move(workspace: Workspace, wrong: str) -> ToolResult:
+        """Fail.
+
+        Args:
+            wrong: how.
+        """
+        raise FleetError("no radio") if wrong == "fleet" else InputError("bad starts")
+
+    outcome = go(ScriptedModel([call("move", wrong="fleet")]), move)
+    assert isinstance(outcome, Stopped)
+    assert (outcome.kind, outcome.reason) == ("fleet", "no radio")
+    with pytest.raises(InputError, match="bad starts"):
+        go(ScriptedModel([call("move", wrong="person")]), move)
+
+
+def same(count: int, **arguments: Any) -> list[Reply]:
+    return [call("report", id=f"c{i}", **arguments) for i in range(count)]
+
+
+def test_the_same_call_with_the_same_answer_three_times_stops() -> None:
+    outcome = go(ScriptedModel(same(9, number=1)), report)
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "repeat"
+    assert len(outcome.messages) == 1 + 2 * 3
+
+
+def test_other_arguments_or_other_answers_are_no_repetition() -> None:
+    mixed = [call("report", id=f"c{i}", number=i % 9) for i in range(18)]
+    assert isinstance(go(ScriptedModel([*mixed, Reply(text="x")]), report), Answered)
+
+    @tool("read")
+    def clock(workspace: Workspace) -> ToolResult:
+        """Tell the time."""
+        return ToolResult({"seconds": time.perf_counter_ns()})
+
+    ticking = [call("clock", id=f"c{i}") for i in range(9)]
+    assert isinstance(go(ScriptedModel([*ticking, Reply(text="x")]), clock), Answered)
+
+
+def test_calls_made_together_are_no_repetition() -> None:
+    calls = tuple(Call(id=f"c{i}", name="report", arguments={"number": 1}) for i in range(5))
+    assert isinstance(go(ScriptedModel([Reply(calls=calls), Reply(text="x")]), report), Answered)
+
+
+def test_a_person_who_speaks_allows_it_anew() -> None:
+    twice = go(ScriptedModel([*same(2, number=1), Reply(text="so")]), report)
+    later = tuple(
+        Reply(calls=tuple(c.model_copy(update={"id": f"d{c.id}"}) for c in r.calls), text=r.text)
+        for r in [*same(2, number=1), Reply(text="so")]
+    )
+    outcome = go(ScriptedModel(later), report, messages=(*twice.messages, User(text="again")))
+    assert isinstance(outcome, Answered)
+
+
+POLICIES: list[tuple[tuple[tuple[str, Any], ...], type[Outcome]]] = [
+    ((), Answered),
+    ((("*", "allow"),), Answered),
+    ((("report", "ask"),), Paused),
+    ((("re*", "ask"), ("*", "allow")), Paused),
+    ((("report", "allow"), ("*", "ask")), Answered),
+    ((("REPORT", "ask"),), Answered),
+]
+
+
+@pytest.mark.parametrize(("rules", "ends"), POLICIES)
+def test_the_first_rule_that_fits_decides(rules: Any, ends: type[Outcome]) -> None:
+    script = ScriptedModel([call("report", number=1), Reply(text="x")])
+    outcome = go(script, report, policy=Policy(rules))
+    assert isinstance(outcome, ends)
+
+
+def test_what_is_refused_goes_back_to_the_model() -> None:
+    script = ScriptedModel([call("report", number=1), Reply(text="x")])
+    outcome = go(script, report, policy=Policy((("report", "refuse"),)))
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert (result.error, "may not be called" in result.text) == ("refused", True)
+
+
+def test_no_rule_lets_a_question_or_a_real_robot_go_ahead() -> None:
+    work = Workspace(Scene(PICTURE))
+    real = replace(Settings(), fleet="mqtt")
+    work.settings = real
+    policy = Policy((("*", "allow"),))
+    kinds = {t.name: policy.decide(t, work) for t in TOOLS}
+    assert kinds["ask_user"] == kinds["deploy"] == "ask"
+    assert kinds["propose_formation"] == "allow"
+
+
+def test_a_decision_that_is_none_is_refused() -> None:
+    rules: Any = (("deploy", "maybe"),)
+    with pytest.raises(InputError, match="deploy=maybe"):
+        Policy(rules)
+
+
+def test_only_the_very_call_a_person_approved_goes_ahead() -> None:
+    policy = Policy((("report", "ask"),))
+    paused = go(ScriptedModel([call("report", number=1)]), report, policy=policy)
+    assert isinstance(paused, Paused)
+    other = paused.call.model_copy(update={"arguments": {"number": 2}})
+    for approved, ends in ((other, Paused), (paused.call, Answered)):
+        script = ScriptedModel([Reply(text="x")])
+        more: dict[str, Any] = {"policy": policy, "approved": approved}
+        outcome = go(script, report, messages=paused.messages, **more)
+        assert isinstance(outcome, ends)
+
+
+def test_a_malformed_call_does_not_trouble_the_person() -> None:
+    script = ScriptedModel([call("report", number="many"), Reply(text="x")])
+    outcome = go(script, report, policy=Policy((("*", "ask"),)))
+    assert isinstance(outcome, Answered)
+
+
+def test_an_agent_says_yes_no_and_why() -> None:
+    policy = Policy((("report", "ask"),))
+
+    def agent() -> Agent:
+        replies = [call("report", number=1), Reply(text="done")]
+        return Agent(ScriptedModel(replies), tools=(report,), policy=policy)
+
+    first = agent()
+    asked = first.run(PICTURE, "count")
+    assert asked.report.status == "needs_approval"
+    assert 'must approve report of {"number": 1}' in asked.report.message
+    with pytest.raises(InputError, match="yes or no"):
+        first.resume(asked, answer="sure")
+    yes = first.resume(asked, approve=True)
+    assert [m.text for m in yes.outcome.messages if isinstance(m, Result)] == ['{"number":1}']
+    second = agent()
+    no = second.resume(second.run(PICTURE, "count"), approve=False, answer="too many")
+    (result,) = [m for m in no.outcome.messages if isinstance(m, Result)]
+    assert (result.error, result.text) == ("refused", "A person said no: too many")
+    with pytest.raises(InputError, match="is over"):
+        second.resume(no)
