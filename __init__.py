@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .agent.policy import Policy
     from .agent.report import Report
     from .agent.runs import Run, load_run
+    from .tools.doors import TOOLS
     from .tools.errors import (
         FleetError,
         FormupError,
@@ -41,6 +42,7 @@ _HOMES = {
     "agent.policy": ("Policy",),
     "agent.report": ("Report",),
     "agent.runs": ("Run", "load_run"),
+    "tools.doors": ("TOOLS",),
     "tools.errors": (
         "FleetError",
         "FormupError",
@@ -93,6 +95,7 @@ __all__ = [
     "ScriptedModel",
     "Settings",
     "Stopped",
+    "TOOLS",
     "Target",
     "TargetPrompt",
     "Tool",

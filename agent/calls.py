@@ -43,6 +43,7 @@ async def answer(
     try:
         async with clock:
             result = await tool.call(trial, call.arguments)
+            text = result.text
     except ArgumentsError as error:
         return failed(call, "arguments", str(error))
     except ToolError as error:
@@ -55,7 +56,7 @@ async def answer(
             return _late(tool, call, seconds)
         raise BrokenToolError(_where(tool, error)) from error
     workspace.adopt(trial)
-    return Result(call_id=call.id, name=call.name, text=result.text, images=result.images)
+    return Result(call_id=call.id, name=call.name, text=text, images=result.images)
 
 
 def failed(call: Call, kind: ErrorKind, text: str) -> Result:

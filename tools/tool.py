@@ -45,7 +45,8 @@ class ToolResult:
 
 THREAD = "formup tool"
 """Name of the threads that tools run in."""
-ToolFunction = Callable[..., ToolResult | Awaitable[ToolResult]]
+Answer = ToolResult | dict[str, Any]
+ToolFunction = Callable[..., Answer | Awaitable[Answer]]
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,10 @@ class Tool:
         parsed = self.parse(arguments)
         values = {name: getattr(parsed, name) for name in type(parsed).model_fields}
         if inspect.iscoroutinefunction(self.function):
-            return await self.function(workspace, **values)
-        return await _in_thread(lambda: self.function(workspace, **values))
+            answer = await self.function(workspace, **values)
+        else:
+            answer = await _in_thread(lambda: self.function(workspace, **values))
+        return answer if isinstance(answer, ToolResult) else ToolResult(dict(answer))
 
 
 async def _in_thread(work: Callable[[], Any]) -> Any:
@@ -120,6 +123,9 @@ async def _in_thread(work: Callable[[], Any]) -> Any:
 
 def tool(kind: Kind) -> Callable[[ToolFunction], Tool]:
     """Make a Tool of a function: name, types and docstring become name, schema and description.
+
+    The function takes the Workspace and what the model fills in, and returns a ToolResult or, where
+    there are no pictures, its data alone. It may be async; if not it runs in a thread.
 
     Raises:
         TypeError: at import, when a parameter has no type or no line under `Args:`.

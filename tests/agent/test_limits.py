@@ -381,3 +381,27 @@ def test_an_agent_says_yes_no_and_why() -> None:
     assert (result.error, result.text) == ("refused", "A person said no: too many")
     with pytest.raises(InputError, match="is over"):
         second.resume(no)
+
+
+@pytest.mark.parametrize("answer", [{"wind": object()}, {"wind": float("nan")}, "3 m/s", None])
+def test_an_answer_that_is_no_json_is_a_broken_tool(answer: Any) -> None:
+    @tool("read")
+    def wind(workspace: Workspace) -> Any:
+        """How it blows."""
+        return answer
+
+    outcome = go(ScriptedModel([call("wind")]), wind)
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "tool"
+    assert "wind broke" in outcome.reason
+
+
+def test_data_alone_is_an_answer() -> None:
+    @tool("read")
+    def wind(workspace: Workspace) -> dict[str, Any]:
+        """How it blows, m/s."""
+        return {"wind": 3}
+
+    outcome = go(ScriptedModel([call("wind"), Reply(text="x")]), wind)
+    assert isinstance(outcome.messages[2], Result)
+    assert outcome.messages[2].text == '{"wind":3}'
