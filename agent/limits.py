@@ -46,10 +46,10 @@ def exhausted(history: History, limits: Limits) -> str | None:
     """The limit that has been reached, as a sentence."""
     replies = [m for m in history if isinstance(m, Reply)]
     if limits.requests is not None and len(replies) >= limits.requests:
-        return f"The limit of {limits.requests} requests was reached."
+        return f"The limit of {_counted(limits.requests, 'request')} was reached."
     calls = sum(len(m.calls) for m in replies)
     if limits.tool_calls is not None and calls >= limits.tool_calls:
-        return f"The limit of {limits.tool_calls} tool calls was reached."
+        return f"The limit of {_counted(limits.tool_calls, 'tool call')} was reached."
     if limits.tokens is not None:
         used = sum(m.usage.input_tokens + m.usage.output_tokens for m in replies)
         if used >= limits.tokens:
@@ -59,3 +59,7 @@ def exhausted(history: History, limits: Limits) -> str | None:
         if spent >= limits.cost_usd:
             return f"The limit of {limits.cost_usd:g} USD was reached: {spent:.4f} were spent."
     return None
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

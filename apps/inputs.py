@@ -203,6 +203,12 @@ def policy(given: list[str] | None, before: Sequence[Sequence[str]] = ()) -> Pol
     Raises:
         InputError: no such rule.
     """
+    for text in given or []:
+        if not re.fullmatch("[^=]+=(allow|ask|refuse)", text):
+            raise InputError(
+                f"--policy {text!r} cannot be used; give GLOB=allow, GLOB=ask or GLOB=refuse, such "
+                "as deploy=ask."
+            )
     rules: list[Any] = [*(text.rpartition("=")[::2] for text in given or []), *before]
     return Policy(tuple((glob, decision) for glob, decision in rules))
 

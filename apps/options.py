@@ -30,7 +30,9 @@ Out = Annotated[
 ModelName = Annotated[
     str,
     typer.Option(
-        "--model", help="Who decides: offline (rules, no AI), openai:, anthropic: or ollama:NAME."
+        "--model",
+        help="Who decides: offline (rules, no AI), or openai:, openai-responses:, anthropic:, "
+        "gemini: or ollama:NAME.",
     ),
 ]
 BaseUrl = Annotated[

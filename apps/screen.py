@@ -25,6 +25,12 @@ PLACES = {
     "centre": "at the centre of",
     "shape": "as placed",
 }
+GOING_ON = {
+    "question": " --answer TEXT",
+    "needs_approval": " --approve, or --refuse",
+    "stopped": "",
+    "failed": "",
+}
 STATUS_STYLE = {
     "deployed": "bold green",
     "planned": "bold green",
@@ -63,8 +69,8 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     written = [name for name in (report.files or {}).values() if name]
     if written:
         _line(console, "files", f"{folder}/ {', '.join(written)}")
-    if written and report.status in ("question", "needs_approval", "stopped", "failed"):
-        _line(console, "go on", f"formup resume {folder}")
+    if written and report.status in GOING_ON:
+        _line(console, "go on", f"formup resume {folder}{GOING_ON[report.status]}")
 
 
 def at_terminal() -> bool:

@@ -10,7 +10,7 @@ from ..messages import Reply, Result, Usage, User
 from ..model import Request
 from .failures import cut_off, empty, foreign, refused
 from .prices import Price
-from .wire import Once, base64_text, count, dumped, make_calls, media_type, safe_name
+from .wire import Once, Wire, base64_text, count, dumped, make_calls, media_type, safe_name
 
 VERSION = "2023-06-01"
 MAX_TOKENS = 8_192
@@ -53,7 +53,7 @@ class _Event(BaseModel):
     usage: dict[str, Any] | None = None
 
 
-class Anthropic:
+class Anthropic(Wire):
     """Speaks Messages.
 
     Args:
@@ -61,11 +61,13 @@ class Anthropic:
         price: of its tokens.
     """
 
-    path = "/v1/messages"
-
     def __init__(self, model: str, price: Price) -> None:
         self._model, self.price = dumped(model), price
         self._blocks = Once(_blocks)
+
+    def path(self, *, stream: bool) -> str:
+        """What follows the base URL."""
+        return "/v1/messages"
 
     def headers(self, key: str | None) -> dict[str, str]:
         """The version of the interface, and the key where there is one."""

@@ -37,20 +37,23 @@ class Endpoint:
         return text.replace(self.key, "[key]") if self.key else text
 
 
-def endpoint(base_url: str, variable: str | None) -> Endpoint:
+def endpoint(base_url: str, *variables: str) -> Endpoint:
     """An endpoint with the key that the environment holds for it.
 
     Args:
         base_url: such as https://api.openai.com/v1.
-        variable: the environment variable of the key; the one named like it with _FILE names a
-            file that holds it. None for servers that take no key.
+        variables: environment variables of the key, of which the first that is set counts; the
+            one named like it with _FILE names a file that holds it. None for servers that take
+            no key.
 
     Raises:
         InputError: no usable URL, or a key is needed and there is none.
     """
     url = _checked(base_url)
-    if variable is None:
+    if not variables:
         return Endpoint(url, None, "it asks for a key, and none is sent to such a server")
+    given = [v for v in variables if os.environ.get(v) or os.environ.get(f"{v}_FILE")]
+    variable = (given or variables)[0]
     found = Endpoint(url, _key(variable), f"check the key in {variable}")
     if found.key is None and not found.is_loopback:
         raise InputError(

@@ -18,6 +18,7 @@ _LATER = {429, 503, 529}
 _UNLESS_SAME = {408, 409, 500, 502, 504}
 _STATUS_OF = {
     "authentication_error": 401,
+    "invalid_prompt": 400,
     "invalid_request_error": 400,
     "not_found_error": 404,
     "overloaded_error": 529,
@@ -54,12 +55,15 @@ class AskError(Exception):
 
 def of_status(status: int, headers: Mapping[str, str], body: bytes, key_advice: str) -> AskError:
     """The failure that an HTTP status other than success is."""
+    wait = _wait(headers)
     try:
-        message, code = _said(json.loads(body))
+        data = json.loads(body)
+        message, code = _said(data)
+        wait = _retry_delay(data) if wait is None else wait
     except ValueError:
         text = body.decode(errors="replace")
         message, code = ("" if text.lstrip().startswith("<") else text), ""
-    return _failure(f"answered {status}", status, message, code, key_advice, _wait(headers))
+    return _failure(f"answered {status}", status, message, code, key_advice, wait)
 
 
 def of_error_body(data: object, key_advice: str) -> AskError | None:
@@ -125,6 +129,7 @@ def _advice(status: int, key_advice: str) -> str:
 
 def _said(data: object) -> tuple[str, str]:
     """Message and code of an error body, of whichever of the usual shapes."""
+    data = _alone(data)
     if not isinstance(data, dict):
         return (data, "") if isinstance(data, str) else ("", "")
     whole = cast("dict[str, Any]", data)
@@ -142,6 +147,23 @@ def _quoted(words: str) -> str:
     line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
     shown = line.rstrip(".") if len(line) <= MAX_SAID else line[: MAX_SAID - 3] + "..."
     return f" ({shown})" if shown else ""
+
+
+def _alone(data: object) -> object:
+    """What stands alone in a list, as Gemini writes errors where a stream was asked for."""
+    listed = cast("list[Any]", data) if isinstance(data, list) else []
+    alone = len(listed) == 1 and isinstance(listed[0], dict)
+    return cast("object", listed[0] if alone else data)
+
+
+def _retry_delay(data: object) -> float | None:
+    """Seconds of a wait that Gemini asks for among an error's details."""
+    try:
+        details = cast("Any", _alone(data))["error"]["details"]
+        delays = [detail["retryDelay"] for detail in details if "retryDelay" in detail]
+        return max(0.0, float(delays[0].removesuffix("s")))
+    except (TypeError, KeyError, IndexError, AttributeError, ValueError):
+        return None
 
 
 def _wait(headers: Mapping[str, str]) -> float | None:

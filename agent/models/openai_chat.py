@@ -18,6 +18,7 @@ from .failures import AskError, cut_off, empty, foreign, refused
 from .prices import Price
 from .wire import (
     Once,
+    Wire,
     base64_text,
     count,
     dumped,
@@ -76,7 +77,7 @@ class _Chunk(BaseModel):
     usage: Any = None
 
 
-class OpenAIChat:
+class OpenAIChat(Wire):
     """Speaks Chat Completions.
 
     Args:
@@ -84,11 +85,13 @@ class OpenAIChat:
         price: of its tokens.
     """
 
-    path = "/chat/completions"
-
     def __init__(self, model: str, price: Price) -> None:
         self._model, self.price = dumped(model), price
         self._messages = Once(_written)
+
+    def path(self, *, stream: bool) -> str:
+        """What follows the base URL."""
+        return "/chat/completions"
 
     def headers(self, key: str | None) -> dict[str, str]:
         """The key, where there is one."""

@@ -1,6 +1,8 @@
 """A model behind a server: a provider's language, an endpoint and the transport put together."""
 
 import asyncio
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...tools.errors import ModelError
@@ -8,26 +10,47 @@ from ..messages import Reply
 from ..model import Request
 from .anthropic import Anthropic
 from .endpoint import endpoint
+from .gemini import Gemini
 from .openai_chat import OpenAIChat
-from .prices import UNKNOWN, price_of
+from .openai_responses import OpenAIResponses
+from .prices import UNKNOWN, Price, price_of
 from .transport import Sleep, Transport
 from .wire import Show, Wire
 
 
 @dataclass(frozen=True)
 class _Provider:
-    """Where a provider is asked; `variable` holds its key in the environment."""
+    """Where a provider is asked.
 
-    wire: type[OpenAIChat] | type[Anthropic]
+    Attributes:
+        variables: hold its key in the environment.
+        billed_as: the name its prices are listed under.
+    """
+
+    wire: Callable[[str, Price], Wire]
     base_url: str
-    variable: str | None
+    variables: tuple[str, ...]
+    billed_as: str
 
 
+_OPENAI, _OPENAI_KEYS = "https://api.openai.com/v1", ("OPENAI_API_KEY",)
+_GOOGLE, _GOOGLE_KEYS = (
+    "https://generativelanguage.googleapis.com",
+    ("GEMINI_API_KEY", "GOOGLE_API_KEY"),
+)
 _PROVIDERS = {
-    "openai": _Provider(OpenAIChat, "https://api.openai.com/v1", "OPENAI_API_KEY"),
-    "anthropic": _Provider(Anthropic, "https://api.anthropic.com", "ANTHROPIC_API_KEY"),
-    "ollama": _Provider(OpenAIChat, "http://127.0.0.1:11434/v1", None),
+    "openai": _Provider(OpenAIChat, _OPENAI, _OPENAI_KEYS, "openai"),
+    "openai-responses": _Provider(OpenAIResponses, _OPENAI, _OPENAI_KEYS, "openai"),
+    "anthropic": _Provider(
+        Anthropic, "https://api.anthropic.com", ("ANTHROPIC_API_KEY",), "anthropic"
+    ),
+    "gemini": _Provider(Gemini, _GOOGLE, _GOOGLE_KEYS, "gemini"),
+    "ollama": _Provider(OpenAIChat, "http://127.0.0.1:11434/v1", (), "ollama"),
 }
+
+
+_VERSION_AT_START, _VERSION_AT_END = re.compile(r"\A/v\d\w*"), re.compile(r"/v\d\w*\Z")
+"""Of an interface: people write it at the end of a base URL, or leave it out."""
 
 
 class RemoteModel:
@@ -60,15 +83,20 @@ class RemoteModel:
         try:
             return await self._ask(request)
         except ModelError as error:
-            # Strict servers refuse this field by name; without it usage would not be counted.
-            if not self._streams or "stream_options" not in str(error):
+            if not self._gives_up(str(error)):
                 raise
-        self._streams = False
         return await self._ask(request)
 
     async def aclose(self) -> None:
         """Close the connections of the running event loop."""
         await self._transport.aclose()
+
+    def _gives_up(self, refusal: str) -> bool:
+        """Do without what a server refuses by name; False if it can not be done without."""
+        if self._streams and "stream_options" in refusal:
+            self._streams = False  # without this field usage would not be counted
+            return True
+        return self._wire.gives_up(refusal)
 
     async def _ask(self, request: Request) -> Reply:
         body = self._wire.body(request, stream=self._streams)
@@ -86,7 +114,7 @@ def remote_model(
     """A model of a provider, at its own address or another that speaks the same.
 
     Args:
-        provider: openai, anthropic or ollama.
+        provider: openai, openai-responses, anthropic, gemini or ollama.
         model: as the server calls it.
         base_url: None for the provider's own.
         show: see `RemoteModel`.
@@ -97,8 +125,10 @@ def remote_model(
     """
     known = _PROVIDERS[provider]
     # Who runs another server sets other prices.
-    wire = known.wire(model, UNKNOWN if base_url else price_of(provider, model))
-    at = endpoint(base_url or known.base_url, known.variable)
-    path = wire.path.removeprefix("/v1") if at.base_url.endswith("/v1") else wire.path
+    wire = known.wire(model, UNKNOWN if base_url else price_of(known.billed_as, model))
+    at = endpoint(base_url or known.base_url, *known.variables)
+    path = wire.path(stream=show is not None)
+    if _VERSION_AT_END.search(at.base_url):
+        path = _VERSION_AT_START.sub("", path)
     transport = Transport(at, at.base_url + path, wire.headers(at.key), sleep=sleep)
     return RemoteModel(f"{provider}:{model}", wire, transport, show)

@@ -61,8 +61,9 @@ class Reading(Protocol):
 class Wire(Protocol):
     """One provider's language. It does no I/O."""
 
-    path: str
-    """What follows the base URL."""
+    def path(self, *, stream: bool) -> str:
+        """What follows the base URL, with the version of the interface if it has one."""
+        ...
 
     def headers(self, key: str | None) -> dict[str, str]:
         """What it wants beside the body."""
@@ -75,6 +76,10 @@ class Wire(Protocol):
     def reading(self, request: Request) -> Reading:
         """How the answer to a request is read."""
         ...
+
+    def gives_up(self, refusal: str) -> bool:
+        """Do without what a server refused in these words; False if there is no such thing."""
+        return False
 
 
 class Once(Generic[T]):

@@ -36,7 +36,9 @@ def formup(*arguments: object, cwd: Path, said: str = "") -> subprocess.Complete
     )
 
 
-def at_terminal(*arguments: object, cwd: Path, answers: Sequence[str]) -> tuple[int, str]:
+def at_terminal(
+    *arguments: object, cwd: Path, answers: Sequence[str], prompt: str = PROMPT
+) -> tuple[int, str]:
     """Exit code and all that was shown to a person who types these at the prompts."""
     import pty
 
@@ -51,7 +53,7 @@ def at_terminal(*arguments: object, cwd: Path, answers: Sequence[str]) -> tuple[
     shown, left = b"", list(answers)
     while more := _read(ours):
         shown += more
-        if left and shown.count(PROMPT.encode()) > len(answers) - len(left):
+        if left and shown.count(prompt.encode()) > len(answers) - len(left):
             os.write(ours, os.fsencode(left.pop(0)))
     os.close(ours)
     code = process.wait(timeout=60)
@@ -255,3 +257,18 @@ def test_targets_that_are_asked_about_are_shown_without_the_others(tmp_path: Pat
     with Image.open(tmp_path / "out/question.png") as image:
         wanted = draw_look(Scene(picture, (other,)))
         assert ImageChops.difference(image.convert("RGB"), wanted).getbbox() is None
+
+
+@person
+@pytest.mark.parametrize(
+    ("said", "word", "code"),
+    [("y\n", "deployed:", 0), ("no, it rains\n", "said no: no, it rains", 0)],
+)
+def test_leave_to_move_is_asked_for_at_a_terminal(
+    said: str, word: str, code: int, tmp_path: Path
+) -> None:
+    coins = SMARTIES.with_name("us_coins.jpg")
+    words = (coins, "Cage the largest coin", "-n", "6", "--policy", "deploy=ask")
+    ended, shown = at_terminal(*words, cwd=tmp_path, answers=[said], prompt="yes, or no and why")
+    assert word in " ".join(shown.split())
+    assert ended == code

@@ -1,4 +1,4 @@
-"""A real HTTP server on loopback that says what a test wrote down, in two providers' languages."""
+"""A real HTTP server on loopback that says what a test wrote down, in four interfaces' terms."""
 
 import json
 import socketserver
@@ -42,6 +42,8 @@ class OpenAI:
     """Chat Completions as the provider answers them."""
 
     name, variable = "openai", "OPENAI_API_KEY"
+    turns, spare = "messages", 1
+    """The field that holds the conversation; events that may be lost, for all is said by then."""
     stops = {"done": "stop", "cut": "length", "calls": "tool_calls"}  # noqa: RUF012
 
     def body(self, text: str = "", calls: Calls = (), stop: str = "done") -> dict[str, Any]:
@@ -93,6 +95,7 @@ class Anthropic:
     """Messages as the provider answers them."""
 
     name, variable = "anthropic", "ANTHROPIC_API_KEY"
+    turns, spare = "messages", 1
     stops = {"done": "end_turn", "cut": "max_tokens", "calls": "tool_use"}  # noqa: RUF012
 
     def body(self, text: str = "", calls: Calls = (), stop: str = "done") -> dict[str, Any]:
@@ -142,6 +145,118 @@ class Anthropic:
     def _frame(self) -> dict[str, Any]:
         empty: dict[str, Any] = {"content": [], "stop_reason": None, "stop_sequence": None}
         return {"id": "x", "type": "message", "role": "assistant", "model": "m"} | empty
+
+
+class Responses:
+    """OpenAI's Responses as the provider answers them."""
+
+    name, variable = "openai-responses", "OPENAI_API_KEY"
+    turns, spare = "input", 0
+
+    def body(self, text: str = "", calls: Calls = (), stop: str = "done") -> dict[str, Any]:
+        output = [self._message(text)] if text else []
+        output += [self._call(number, *call) for number, call in enumerate(calls)]
+        cut = {"status": "incomplete", "incomplete_details": {"reason": "max_output_tokens"}}
+        ends = {"status": "completed", "incomplete_details": None} if stop != "cut" else cut
+        return self._frame() | {"output": output, "usage": self.usage()} | ends
+
+    def events(self, text: str = "", calls: Calls = (), stop: str = "done") -> list[object]:
+        whole = self.body(text, calls, stop)
+        events: list[dict[str, Any]] = [{"type": "response.created", "response": self._frame()}]
+        for index, item in enumerate(whole["output"]):
+            at = {"output_index": index}
+            begun: dict[str, Any] = (
+                {"content": []} if item["type"] == "message" else {"arguments": ""}
+            )
+            started = item | begun | {"status": "in_progress"}
+            events.append({"type": "response.output_item.added", "item": started} | at)
+            events += [delta | at | {"item_id": item["id"]} for delta in self._deltas(item)]
+            events.append({"type": "response.output_item.done", "item": item} | at)
+        events.append({"type": f"response.{whole['status']}", "response": whole})
+        return [event | {"sequence_number": number} for number, event in enumerate(events)]
+
+    def refusal(self) -> dict[str, Any]:
+        body = self.body("x")
+        body["output"][0]["content"] = [{"type": "refusal", "refusal": "I will not."}]
+        return body
+
+    def error(self, message: str, code: str = "some_error") -> dict[str, Any]:
+        return {"error": {"message": message, "type": code, "code": code, "param": None}}
+
+    def usage(self) -> dict[str, Any]:
+        given = {"cached_tokens": 60, "cache_write_tokens": 30}
+        counts = {"input_tokens": 100, "output_tokens": 20, "total_tokens": 120}
+        more = {"input_tokens_details": given, "output_tokens_details": {"reasoning_tokens": 15}}
+        return counts | more
+
+    def _message(self, text: str) -> dict[str, Any]:
+        content: list[Any] = [{"type": "output_text", "text": text, "annotations": []}]
+        head = {"id": "msg_1", "type": "message", "role": "assistant", "status": "completed"}
+        return head | {"content": content}
+
+    def _call(self, number: int, id: str, name: str, arguments: Any) -> dict[str, Any]:
+        head = {"id": f"fc_{number}", "type": "function_call", "status": "completed"}
+        return head | {"call_id": id, "name": name, "arguments": _text(arguments)}
+
+    def _deltas(self, item: dict[str, Any]) -> list[dict[str, Any]]:
+        if item["type"] == "function_call":
+            kind = "response.function_call_arguments.delta"
+            return [{"type": kind, "delta": piece} for piece in _pieces(item["arguments"])]
+        text, part = item["content"][0]["text"], item["content"][0] | {"text": ""}
+        head: dict[str, Any] = {"logprobs": [], "content_index": 0}
+        deltas = [{"delta": text[i : i + 4]} for i in range(0, len(text), 4)]
+        begin = head | {"type": "response.content_part.added", "part": part}
+        return [begin, *(head | {"type": "response.output_text.delta"} | d for d in deltas)]
+
+    def _frame(self) -> dict[str, Any]:
+        empty: dict[str, Any] = {"error": None, "tools": [], "output": [], "status": "in_progress"}
+        asked = {"parallel_tool_calls": True, "tool_choice": "auto"}
+        return empty | asked | {"id": "r", "object": "response", "created_at": 1, "model": "m"}
+
+
+class Gemini:
+    """Contents as Google generates them."""
+
+    name, variable = "gemini", "GEMINI_API_KEY"
+    turns, spare = "contents", 0
+    stops = {"done": "STOP", "cut": "MAX_TOKENS", "calls": "STOP"}  # noqa: RUF012
+    codes = {  # noqa: RUF012
+        "not_found_error": (404, "NOT_FOUND"),
+        "overloaded_error": (503, "UNAVAILABLE"),
+    }
+
+    def body(self, text: str = "", calls: Calls = (), stop: str = "done") -> dict[str, Any]:
+        parts: list[dict[str, Any]] = [{"text": text}] if text else []
+        parts += [self._call(*call) for call in calls]
+        return self.frame(parts, self.stops[stop])
+
+    def events(self, text: str = "", calls: Calls = (), stop: str = "done") -> list[object]:
+        parts: list[dict[str, Any]] = [{"text": text[i : i + 2]} for i in range(0, len(text), 2)]
+        parts += [self._call(*call) for call in calls]
+        return [*(self.frame([part]) for part in parts), self.frame([], self.stops[stop])]
+
+    def refusal(self) -> dict[str, Any]:
+        ended = {"finishReason": "SAFETY", "finishMessage": "I will not.", "index": 0}
+        return self.frame([]) | {"candidates": [ended]}
+
+    def error(self, message: str, code: str = "some_error") -> dict[str, Any]:
+        number, status = self.codes.get(code, (400, "INVALID_ARGUMENT"))
+        return {"error": {"code": number, "message": message, "status": status}}
+
+    def frame(self, parts: list[dict[str, Any]], stop: str | None = None) -> dict[str, Any]:
+        counts = {"promptTokenCount": 100, "cachedContentTokenCount": 60, "totalTokenCount": 120}
+        written = {"candidatesTokenCount": 5, "thoughtsTokenCount": 15}
+        candidate = {"content": {"role": "model", "parts": parts}, "index": 0}
+        ended = {"finishReason": stop} if stop else {}
+        head = {"candidates": [candidate | ended], "modelVersion": "m", "responseId": "x"}
+        return head | {"usageMetadata": counts | written}
+
+    def _call(self, id: str, name: str, arguments: Any) -> dict[str, Any]:
+        return {"functionCall": {"name": name, "args": arguments} | ({"id": id} if id else {})}
+
+
+Dialect = OpenAI | Responses | Anthropic | Gemini
+DIALECTS = {kind.name: kind for kind in (OpenAI, Responses, Anthropic, Gemini)}
 
 
 class Server(socketserver.ThreadingTCPServer):
@@ -216,7 +331,7 @@ def _pieces(text: str) -> list[str]:
 
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
-    for variable in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
+    for variable in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GEMINI_API_KEY", "GOOGLE_API_KEY"):
         monkeypatch.delenv(variable, raising=False)
         monkeypatch.delenv(f"{variable}_FILE", raising=False)
     with Server() as made:
@@ -228,9 +343,9 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
         thread.join()
 
 
-@pytest.fixture(params=[OpenAI, Anthropic], ids=["openai", "anthropic"])
-def dialect(request: pytest.FixtureRequest) -> OpenAI | Anthropic:
-    return request.param()
+@pytest.fixture(params=list(DIALECTS))
+def dialect(request: pytest.FixtureRequest) -> Dialect:
+    return DIALECTS[request.param]()
 
 
 @pytest.fixture
@@ -241,6 +356,16 @@ def openai() -> OpenAI:
 @pytest.fixture
 def anthropic() -> Anthropic:
     return Anthropic()
+
+
+@pytest.fixture
+def responses() -> Responses:
+    return Responses()
+
+
+@pytest.fixture
+def gemini() -> Gemini:
+    return Gemini()
 
 
 @pytest.fixture(params=[False, True], ids=["whole", "streamed"])
@@ -260,7 +385,7 @@ def http() -> Any:
 
 
 @pytest.fixture
-def say(dialect: OpenAI | Anthropic, streamed: bool) -> Callable[..., bytes]:
+def say(dialect: Dialect, streamed: bool) -> Callable[..., bytes]:
     """A response in the language and manner of the test: say(text, calls, stop)."""
 
     def made(*said: Any, **more: Any) -> bytes:

@@ -1,4 +1,4 @@
-"""Whole conversations with real tools over HTTP: two providers, streamed and not, to the letter."""
+"""Whole conversations with real tools over HTTP: four interfaces, streamed and not."""
 
 import asyncio
 import json
@@ -103,7 +103,7 @@ def test_no_null_is_ever_sent(server: Any, dialect: Any, say: Say, picture: Any)
     server.script = [say("", [("c1", "locate_object", {})], "calls"), say("done")]
     Agent(server.model(dialect.name)).run(picture, "Surround it with 6 robots")
     for sent in server.requests:
-        assert not nulls(sent["messages"])
+        assert not nulls(sent[dialect.turns])
         assert "stream" not in sent
 
 

@@ -27,18 +27,18 @@ PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))
 
 @pytest.fixture(autouse=True)
 def no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
-    for variable in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
+    for variable in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GEMINI_API_KEY", "GOOGLE_API_KEY"):
         monkeypatch.delenv(variable, raising=False)
         monkeypatch.delenv(f"{variable}_FILE", raising=False)
 
 
-@pytest.mark.parametrize("name", ["gpt-9", "openai", "openai:", "openai: ", "gemini:x", ":x", ""])
+@pytest.mark.parametrize("name", ["gpt-9", "openai", "openai:", "gemini: ", "groq:x", ":x", ""])
 def test_unknown_names_list_those_there_are(name: str) -> None:
-    with pytest.raises(InputError, match="offline, openai:NAME, anthropic:NAME, ollama:NAME"):
+    with pytest.raises(InputError, match=r"offline, openai:NAME, .*gemini:NAME, ollama:NAME"):
         model_named(name)
 
 
-@pytest.mark.parametrize("provider", ["openai", "anthropic"])
+@pytest.mark.parametrize("provider", ["openai", "anthropic", "gemini"])
 def test_a_missing_key_is_one_sentence(provider: str) -> None:
     variable = f"{provider.upper()}_API_KEY"
     with pytest.raises(InputError, match=f"set {variable}, or {variable}_FILE"):
@@ -103,6 +103,20 @@ def test_a_key_file_that_holds_none(
     assert "a b" not in str(caught.value)
 
 
+def test_the_key_of_gemini_has_either_of_two_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "key").write_text("from-a-file")
+    names = ("GEMINI_API_KEY", "GOOGLE_API_KEY")
+    monkeypatch.setenv("GOOGLE_API_KEY_FILE", str(tmp_path / "key"))
+    assert endpoint(URL, *names).key == "from-a-file"
+    assert "GOOGLE_API_KEY" in endpoint(URL, *names).key_advice
+    monkeypatch.setenv("GOOGLE_API_KEY", "google")
+    assert endpoint(URL, *names).key == "google"
+    monkeypatch.setenv("GEMINI_API_KEY", KEY)
+    assert endpoint(URL, *names).key == KEY
+
+
 def test_a_key_that_cannot_be_sent_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sk-täglich")
     with pytest.raises(InputError, match="OPENAI_API_KEY") as caught:
@@ -118,9 +132,11 @@ def test_the_key_is_sent_and_appears_nowhere_else(
     model, trace = server.model(dialect.name), tmp_path / "trace.jsonl"
     run = Agent(model).run(PICTURE, "Surround it with 4 robots", trace=trace)
     sent = server.headers[0]
-    assert KEY in (sent.get("authorization", "") + sent.get("x-api-key", ""))
+    names = ("authorization", "x-api-key", "x-goog-api-key")
+    assert [KEY in sent[name] for name in names if name in sent] == [True]
     assert f"check the key in {dialect.variable}" in run.report.message
     texts = [run.report.model_dump_json(), trace.read_text(), json.dumps(server.requests)]
+    texts += server.paths
     texts += [
         repr(run.outcome),
         repr(model),

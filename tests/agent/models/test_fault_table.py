@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -78,11 +78,12 @@ def done(say: Any) -> list[bytes]:
     return [say("Done.")]
 
 
+Script = Callable[[Any, Any, Any], list[bytes]]
 Row = tuple[type[Outcome], str | None, str, int, str]
 """Outcome, kind of stop, status, exit code, and words of the message or of the last result."""
 FAILED: tuple[type[Outcome], str, str, int] = (Stopped, "model", "failed", 4)
 MENDED: tuple[type[Outcome], None, str, int] = (Answered, None, "impossible", 3)
-TABLE: dict[str, tuple[Any, Row]] = {
+TABLE: dict[str, tuple[Script, Row]] = {
     "429": (lambda say, d, http: [http.response(d.error("busy"), 429)] * 4, (*FAILED, "busy")),
     "429 with Retry-After": (
         lambda say, d, http: [http.response(d.error("busy"), 429, retry_after="9"), *done(say)],

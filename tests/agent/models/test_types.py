@@ -7,10 +7,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from formup.agent.agent import Agent
-from formup.agent.messages import Call, Reply, Result, User
+from formup.agent.messages import Call, Opaque, Reply, Result, User
 from formup.agent.model import Request
 from formup.agent.models.anthropic import Anthropic
 from formup.agent.models.openai_chat import OpenAIChat
+from formup.agent.models.openai_responses import OpenAIResponses
 from formup.agent.models.prices import UNKNOWN
 from formup.prompts import load_prompt
 from formup.tools.doors import TOOLS
@@ -67,6 +68,25 @@ def test_openai_requests(stream: bool) -> None:
 
 
 @pytest.mark.parametrize("stream", [False, True])
+def test_responses_requests(stream: bool) -> None:
+    from openai.types.responses import response_create_params as params
+
+    thought: dict[str, Any]
+    thought = {"id": "rs_1", "type": "reasoning", "summary": [], "encrypted_content": "gAAA"}
+    call = {"type": "function_call", "call_id": "b", "name": "measure", "arguments": "{}"}
+    opaque = Opaque(model="openai-responses:m", items=(thought, call))
+    thoughtful = HISTORY[3].model_copy(update={"opaque": opaque})
+    request = Request(REQUEST.system, (*HISTORY[:3], thoughtful, *HISTORY[4:]), TOOLS)
+    sent = from_json(OpenAIResponses("m", UNKNOWN).body(request, stream=stream))
+    kinds = (params.ResponseCreateParamsNonStreaming, params.ResponseCreateParamsStreaming)
+    accepted(kinds[stream], sent)
+    assert sent["input"][-3:-1] == [thought, call]
+    sent["input"][0]["role"] = "pirate"
+    with pytest.raises(ValidationError):
+        accepted(kinds[stream], sent)
+
+
+@pytest.mark.parametrize("stream", [False, True])
 def test_anthropic_requests(stream: bool) -> None:
     from anthropic.types import message_create_params as params
 
@@ -80,13 +100,16 @@ def test_anthropic_requests(stream: bool) -> None:
         accepted(kinds[stream], sent)
 
 
+@pytest.mark.parametrize("dialect", ["openai", "openai-responses", "anthropic"], indirect=True)
 def test_what_the_tests_server_says_is_what_the_providers_say(dialect: Any) -> None:
     from anthropic.types import Message, RawMessageStreamEvent
     from openai.types.chat import ChatCompletion, ChatCompletionChunk
+    from openai.types.responses import Response, ResponseStreamEvent
 
     said = ("text", [("a", "look", {"x": 1})], "calls")
     whole, event = {
         "openai": (ChatCompletion, TypeAdapter[Any](ChatCompletionChunk)),
+        "openai-responses": (Response, TypeAdapter[Any](ResponseStreamEvent)),
         "anthropic": (Message, TypeAdapter[Any](RawMessageStreamEvent)),
     }[dialect.name]
     whole.model_validate(dialect.body(*said))
@@ -101,5 +124,6 @@ def test_the_default_prompt_and_the_real_tools_are_sent(
     server.script = [say("done")]
     Agent(server.model(dialect.name)).run(PICTURE, "Surround it with 4 robots")
     (sent,) = server.requests
-    assert len(sent["tools"]) == len(TOOLS)
+    tools = sent["tools"][0].get("functionDeclarations") or sent["tools"]
+    assert [tool.get("function", tool)["name"] for tool in tools] == [t.name for t in TOOLS]
     assert "You place a team of robots" in str(sent)

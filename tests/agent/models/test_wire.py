@@ -1,6 +1,7 @@
 """A history with everything in it, as it goes over each provider's wire, to the letter."""
 
 import base64
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -8,10 +9,12 @@ import pytest
 from formup.agent.messages import Call, History, Reply, Result, User
 from formup.agent.model import Request
 from formup.agent.models.anthropic import Anthropic
+from formup.agent.models.gemini import Gemini
 from formup.agent.models.openai_chat import OpenAIChat
-from formup.agent.models.prices import UNKNOWN
+from formup.agent.models.openai_responses import OpenAIResponses
+from formup.agent.models.prices import UNKNOWN, Price
 from formup.agent.models.transport import Events
-from formup.agent.models.wire import arguments_of, safe_name
+from formup.agent.models.wire import Wire, arguments_of, safe_name
 from formup.tools.doors import TOOLS
 from hypothesis import given
 from hypothesis import strategies as st
@@ -106,6 +109,75 @@ def test_anthropic() -> None:
     }
 
 
+def test_responses() -> None:
+    request = Request("Be brief.", HISTORY, ())
+    sent = from_json(OpenAIResponses("m", UNKNOWN).body(request, stream=True))
+    calls = [
+        {"type": "function_call", "call_id": id, "name": name, "arguments": arguments}
+        for id, name, arguments in (
+            ("a", "look", "{}"),
+            ("b_c", "functions_x", '{"k":"\\u00fc"}'),
+        )
+    ]
+
+    def shown(words: str, kind: str, data: str) -> list[dict[str, str]]:
+        url = f"data:image/{kind};base64,{data}"
+        image = {"type": "input_image", "detail": "auto", "image_url": url}
+        return [{"type": "input_text", "text": words}, image]
+
+    output = {"type": "function_call_output"}
+    assert sent == {
+        "model": "m",
+        "store": False,
+        "include": ["reasoning.encrypted_content"],
+        "instructions": "Be brief.",
+        "input": [
+            {"role": "user", "content": shown("see", "jpeg", JPEG_TEXT)},
+            {"role": "user", "content": "well?"},
+            *calls,
+            output | {"call_id": "a", "output": shown("{}", "png", PNG_TEXT)},
+            output | {"call_id": "b_c", "output": "no"},
+            {"role": "assistant", "content": "Hm."},
+            {"role": "user", "content": "go on"},
+        ],
+        "stream": True,
+    }
+
+
+def test_gemini() -> None:
+    request = Request("Be brief.", HISTORY, TOOLS[:2])
+    sent = from_json(Gemini("gemini-2.5-pro", UNKNOWN).body(request, stream=True))
+
+    def part(kind: str, data: str) -> dict[str, Any]:
+        return {"inlineData": {"mimeType": f"image/{kind}", "data": data}}
+
+    calls: list[dict[str, Any]] = [
+        {"functionCall": {"id": "a", "name": "look", "args": {}}},
+        {"functionCall": {"id": "b c", "name": "functions.x", "args": {"k": "ü"}}},
+    ]
+    answers: list[dict[str, Any]] = [
+        {"functionResponse": {"id": "a", "name": "look", "response": {"output": "{}"}}},
+        part("png", PNG_TEXT),
+        {"functionResponse": {"id": "b c", "name": "functions.x", "response": {"error": "no"}}},
+    ]
+    declared = [
+        {"name": t.name, "description": t.description, "parametersJsonSchema": t.schema}
+        for t in TOOLS[:2]
+    ]
+    assert sent == {
+        "systemInstruction": {"parts": [{"text": "Be brief."}]},
+        "tools": [{"functionDeclarations": declared}],
+        "contents": [
+            {"role": "user", "parts": [part("jpeg", JPEG_TEXT), {"text": "see"}]},
+            {"role": "user", "parts": [{"text": "well?"}]},
+            {"role": "model", "parts": calls},
+            {"role": "user", "parts": answers},
+            {"role": "model", "parts": [{"text": "Hm."}]},
+            {"role": "user", "parts": [{"text": "go on"}]},
+        ],
+    }
+
+
 def test_without_a_prompt_the_tools_carry_the_mark() -> None:
     request = Request("", HISTORY, TOOLS)
     sent = from_json(Anthropic("m", UNKNOWN).body(request, stream=False))
@@ -113,13 +185,27 @@ def test_without_a_prompt_the_tools_carry_the_mark() -> None:
     assert ["cache_control" in tool for tool in sent["tools"]] == [False] * 12 + [True]
 
 
-@pytest.mark.parametrize("wire", [OpenAIChat("m", UNKNOWN), Anthropic("m", UNKNOWN)])
-def test_a_longer_history_begins_like_the_shorter(wire: OpenAIChat | Anthropic) -> None:
+@pytest.mark.parametrize(
+    ("kind", "turns"),
+    [
+        (OpenAIChat, "messages"),
+        (OpenAIResponses, "input"),
+        (Anthropic, "messages"),
+        (Gemini, "contents"),
+    ],
+)
+def test_a_longer_history_begins_like_the_shorter(
+    kind: Callable[[str, Price], Wire], turns: str
+) -> None:
     """Providers cache by what a request begins with."""
+    wire = kind("m", UNKNOWN)
     ends = (4, 6, 8)  # where it is the model's turn
     bodies = [wire.body(Request("s", HISTORY[:end], TOOLS), stream=False) for end in (1, *ends)]
     texts = [b.replace(b',"cache_control":{"type":"ephemeral"}', b"") for b in bodies]
-    starts = [t[t.index(b'"messages"') :].partition(b',"tools"')[0].rstrip(b"]}") for t in texts]
+    starts = [
+        t[t.index(b'"%b"' % turns.encode()) :].partition(b',"tools"')[0].rstrip(b"]}")
+        for t in texts
+    ]
     for shorter, longer in pairwise(starts):
         assert longer.startswith(shorter)
 

@@ -1,0 +1,123 @@
+"""Which calls go ahead, which wait for a person, which are refused."""
+
+import asyncio
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from formup.agent.agent import Agent
+from formup.agent.loop import run
+from formup.agent.messages import Call, History, Reply, Result, User
+from formup.agent.models.doubles import ScriptedModel
+from formup.agent.outcomes import Answered, Outcome, Paused
+from formup.agent.policy import Policy
+from formup.tools.doors import TOOLS
+from formup.tools.errors import InputError
+from formup.tools.perception.image import picture_from_array
+from formup.tools.scene import Scene
+from formup.tools.tool import ToolResult, tool
+from formup.tools.workspace import Settings, Workspace
+
+START: History = (User(text="go"),)
+PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))
+
+
+def call(name: str, **arguments: Any) -> Reply:
+    return Reply(calls=(Call(id="c1", name=name, arguments=arguments),))
+
+
+@tool("read")
+def report(workspace: Workspace, number: int) -> ToolResult:
+    """Repeat a number.
+
+    Args:
+        number: any.
+    """
+    return ToolResult({"number": number})
+
+
+def go(model: ScriptedModel, *, messages: History = START, **more: Any) -> Outcome:
+    return asyncio.run(run(model, (report,), Workspace(Scene(PICTURE)), messages, **more))
+
+
+POLICIES: list[tuple[tuple[tuple[str, Any], ...], type[Outcome]]] = [
+    ((), Answered),
+    ((("*", "allow"),), Answered),
+    ((("report", "ask"),), Paused),
+    ((("re*", "ask"), ("*", "allow")), Paused),
+    ((("report", "allow"), ("*", "ask")), Answered),
+    ((("REPORT", "ask"),), Answered),
+]
+
+
+@pytest.mark.parametrize(("rules", "ends"), POLICIES)
+def test_the_first_rule_that_fits_decides(rules: Any, ends: type[Outcome]) -> None:
+    script = ScriptedModel([call("report", number=1), Reply(text="x")])
+    outcome = go(script, policy=Policy(rules))
+    assert isinstance(outcome, ends)
+
+
+def test_what_is_refused_goes_back_to_the_model() -> None:
+    script = ScriptedModel([call("report", number=1), Reply(text="x")])
+    outcome = go(script, policy=Policy((("report", "refuse"),)))
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert (result.error, "may not be called" in result.text) == ("refused", True)
+
+
+def test_no_rule_lets_a_question_or_a_real_robot_go_ahead() -> None:
+    work = Workspace(Scene(PICTURE))
+    real = replace(Settings(), fleet="mqtt")
+    work.settings = real
+    policy = Policy((("*", "allow"),))
+    kinds = {t.name: policy.decide(t, work) for t in TOOLS}
+    assert kinds["ask_user"] == kinds["deploy"] == "ask"
+    assert kinds["propose_formation"] == "allow"
+
+
+def test_a_decision_that_is_none_is_refused() -> None:
+    rules: Any = (("deploy", "maybe"),)
+    with pytest.raises(InputError, match="deploy=maybe"):
+        Policy(rules)
+
+
+def test_only_the_very_call_a_person_approved_goes_ahead() -> None:
+    policy = Policy((("report", "ask"),))
+    paused = go(ScriptedModel([call("report", number=1)]), policy=policy)
+    assert isinstance(paused, Paused)
+    other = paused.call.model_copy(update={"arguments": {"number": 2}})
+    for approved, ends in ((other, Paused), (paused.call, Answered)):
+        script = ScriptedModel([Reply(text="x")])
+        more: dict[str, Any] = {"policy": policy, "approved": approved}
+        outcome = go(script, messages=paused.messages, **more)
+        assert isinstance(outcome, ends)
+
+
+def test_a_malformed_call_does_not_trouble_the_person() -> None:
+    script = ScriptedModel([call("report", number="many"), Reply(text="x")])
+    outcome = go(script, policy=Policy((("*", "ask"),)))
+    assert isinstance(outcome, Answered)
+
+
+def test_an_agent_says_yes_no_and_why() -> None:
+    policy = Policy((("report", "ask"),))
+
+    def agent() -> Agent:
+        replies = [call("report", number=1), Reply(text="done")]
+        return Agent(ScriptedModel(replies), tools=(report,), policy=policy)
+
+    first = agent()
+    asked = first.run(PICTURE, "count")
+    assert asked.report.status == "needs_approval"
+    assert 'must approve report of {"number": 1}' in asked.report.message
+    with pytest.raises(InputError, match="yes or no"):
+        first.resume(asked, answer="sure")
+    yes = first.resume(asked, approve=True)
+    assert [m.text for m in yes.outcome.messages if isinstance(m, Result)] == ['{"number":1}']
+    second = agent()
+    no = second.resume(second.run(PICTURE, "count"), approve=False, answer="too many")
+    (result,) = [m for m in no.outcome.messages if isinstance(m, Result)]
+    assert (result.error, result.text) == ("refused", "A person said no: too many")
+    with pytest.raises(InputError, match="is over"):
+        second.resume(no)
