@@ -1,12 +1,20 @@
 """What the README and the docs show is run, so that it stays true."""
 
+import json
+import os
 import re
 import shlex
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -28,12 +36,55 @@ COMMANDS = [
 ]
 
 
+class Provider(BaseHTTPRequestHandler):
+    """A server in the provider's place that proposes, deploys and says so, and tries every tool
+    that is not formup's own first."""
+
+    def do_POST(self) -> None:
+        request = json.loads(self.rfile.read(int(self.headers["content-length"])))
+        results = [m["content"] for m in request["messages"] if m["role"] == "tool"]
+        names = [t["function"]["name"] for t in request["tools"]]
+        calls: list[tuple[str, dict[str, Any]]] = [(n, {}) for n in names if n == "wind"]
+        group = {"relation": "around", "targets": ["t1"], "robots": 6}
+        target = {"id": "t1", "box": [55, 35, 125, 95]}
+        calls.append(("propose_formation", {"contract": {"groups": [group]}, "targets": [target]}))
+        plans = re.findall("p-[0-9a-f]+", str(results))
+        calls += [("deploy", {"plan_id": plan}) for plan in plans[:1]]
+        message: dict[str, object] = {"role": "assistant", "content": "They stand there."}
+        if len(results) < len(calls):
+            name, arguments = calls[len(results)]
+            function = {"name": name, "arguments": json.dumps(arguments)}
+            message |= {"tool_calls": [{"id": "x", "type": "function", "function": function}]}
+        body = json.dumps({"choices": [{"message": message, "finish_reason": "stop"}]}).encode()
+        self.send_response(200)
+        self.send_header("content-length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing."""
+
+
+@pytest.fixture(scope="module")
+def provider() -> Iterator[str]:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Provider) as server:
+        threading.Thread(target=server.serve_forever, args=(0.01,)).start()
+        yield f"http://127.0.0.1:{server.server_address[1]}/v1"
+        server.shutdown()
+
+
 @pytest.mark.parametrize(("page", "code"), blocks("python"))
-def test_python_blocks_run(page: str, code: str, tmp_path: Path) -> None:
+def test_python_blocks_run(page: str, code: str, provider: str, tmp_path: Path) -> None:
     for folder in ("evals", "docs"):
         (tmp_path / folder).symlink_to(ROOT / folder)
+    pixels = np.full((140, 200, 3), 60, np.uint8)
+    pixels[40:90, 60:120] = (200, 40, 40)
+    Image.fromarray(pixels).save(tmp_path / "photo.jpg", quality=95)
     command = [sys.executable, "-W", "error", "-c", code]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    environment = os.environ | {"OPENAI_BASE_URL": provider}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert "deployed" in done.stdout
 

@@ -1,6 +1,7 @@
 """A model behind a server: a provider's language, an endpoint and the transport put together."""
 
 import asyncio
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,29 +24,37 @@ class _Provider:
     """Where a provider is asked.
 
     Attributes:
+        elsewhere: the environment variable that names another base URL, as in its own packages.
         variables: hold its key in the environment.
         billed_as: the name its prices are listed under.
     """
 
     wire: Callable[[str, Price], Wire]
     base_url: str
+    elsewhere: str
     variables: tuple[str, ...]
     billed_as: str
 
 
-_OPENAI, _OPENAI_KEYS = "https://api.openai.com/v1", ("OPENAI_API_KEY",)
-_GOOGLE, _GOOGLE_KEYS = (
-    "https://generativelanguage.googleapis.com",
-    ("GEMINI_API_KEY", "GOOGLE_API_KEY"),
-)
+_OPENAI = ("https://api.openai.com/v1", "OPENAI_BASE_URL", ("OPENAI_API_KEY",), "openai")
 _PROVIDERS = {
-    "openai": _Provider(OpenAIChat, _OPENAI, _OPENAI_KEYS, "openai"),
-    "openai-responses": _Provider(OpenAIResponses, _OPENAI, _OPENAI_KEYS, "openai"),
+    "openai": _Provider(OpenAIChat, *_OPENAI),
+    "openai-responses": _Provider(OpenAIResponses, *_OPENAI),
     "anthropic": _Provider(
-        Anthropic, "https://api.anthropic.com", ("ANTHROPIC_API_KEY",), "anthropic"
+        Anthropic,
+        "https://api.anthropic.com",
+        "ANTHROPIC_BASE_URL",
+        ("ANTHROPIC_API_KEY",),
+        "anthropic",
     ),
-    "gemini": _Provider(Gemini, _GOOGLE, _GOOGLE_KEYS, "gemini"),
-    "ollama": _Provider(OpenAIChat, "http://127.0.0.1:11434/v1", (), "ollama"),
+    "gemini": _Provider(
+        Gemini,
+        "https://generativelanguage.googleapis.com",
+        "GOOGLE_GEMINI_BASE_URL",
+        ("GEMINI_API_KEY", "GOOGLE_API_KEY"),
+        "gemini",
+    ),
+    "ollama": _Provider(OpenAIChat, "http://127.0.0.1:11434/v1", "OLLAMA_BASE_URL", (), "ollama"),
 }
 
 
@@ -116,7 +125,7 @@ def remote_model(
     Args:
         provider: openai, openai-responses, anthropic, gemini or ollama.
         model: as the server calls it.
-        base_url: None for the provider's own.
+        base_url: None for the one the environment names, else the provider's own.
         show: see `RemoteModel`.
         sleep: waits between tries.
 
@@ -124,6 +133,7 @@ def remote_model(
         InputError: no usable base URL, or no key for it.
     """
     known = _PROVIDERS[provider]
+    base_url = base_url or os.environ.get(known.elsewhere)
     # Who runs another server sets other prices.
     wire = known.wire(model, UNKNOWN if base_url else price_of(known.billed_as, model))
     at = endpoint(base_url or known.base_url, *known.variables)

@@ -226,3 +226,14 @@ def test_what_is_rendered_goes_with_its_message() -> None:
     assert once(other) is not once(message)
     del message, other
     assert not vars(once)["_known"]
+
+
+def test_the_environment_names_another_server(
+    server: Any, dialect: Any, http: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = {"anthropic": "ANTHROPIC_BASE_URL", "gemini": "GOOGLE_GEMINI_BASE_URL"}
+    monkeypatch.setenv(names.get(dialect.name, "OPENAI_BASE_URL"), server.url)
+    server.script = [http.response(dialect.body("hello"))]
+    run = Agent(f"{dialect.name}:m").run(PICTURE, "Surround it with 4 robots")
+    assert run.report.message == "hello"
+    assert run.report.usage.cost_usd == 0
