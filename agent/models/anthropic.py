@@ -1,5 +1,6 @@
 """Anthropic Messages, with its marks for prompt caching."""
 
+import io
 from functools import lru_cache
 from typing import Any
 
@@ -32,25 +33,6 @@ class _Message(BaseModel):
     content: list[_Block]
     stop_reason: str | None = None
     usage: Any = None
-
-
-class _Delta(BaseModel):
-    text: str = ""
-    partial_json: str = ""
-    stop_reason: str | None = None
-
-
-class _Start(BaseModel):
-    usage: dict[str, Any] | None = None
-
-
-class _Event(BaseModel):
-    type: str
-    index: int = 0
-    message: _Start = _Start()
-    content_block: _Block | None = None
-    delta: _Delta = _Delta()
-    usage: dict[str, Any] | None = None
 
 
 class Anthropic(Wire):
@@ -138,37 +120,46 @@ class _Assembly:
     def __init__(self) -> None:
         self.done = False
         self._blocks: dict[int, _Block] = {}
-        self._texts: dict[int, list[str]] = {}
-        self._inputs: dict[int, list[str]] = {}
+        self._texts: dict[int, io.StringIO] = {}
+        self._inputs: dict[int, io.StringIO] = {}
         self._stop: str | None = None
         self._usage: dict[str, Any] = {}
 
     def add(self, event: Any) -> str:
+        # Read by hand: there are hundreds of these a reply. What they make up is validated whole.
         try:
-            given = _Event.model_validate(event)
-        except ValidationError:
+            return self._take(event)
+        except (AttributeError, KeyError, TypeError, ValueError):  # ValidationErrors are these
             raise foreign("a stream of something else than messages") from None
-        for usage in (given.message.usage, given.usage):
-            self._usage |= {k: v for k, v in (usage or {}).items() if v is not None}
-        if given.content_block:
-            self._blocks[given.index] = given.content_block
-        delta = given.delta
-        if delta.text:
-            self._texts.setdefault(given.index, []).append(delta.text)
-        if delta.partial_json:
-            self._inputs.setdefault(given.index, []).append(delta.partial_json)
-        self._stop = delta.stop_reason or self._stop
-        self.done = self.done or self._stop is not None or given.type == "message_stop"
-        return delta.text
 
     def whole(self) -> Any:
         content: list[dict[str, Any]] = []
         for index, block in sorted(self._blocks.items()):
-            text = (block.text or "") + "".join(self._texts.get(index, ()))
+            streamed, given = self._texts.get(index), self._inputs.get(index)
+            text = (block.text or "") + (streamed.getvalue() if streamed else "")
             # What was streamed as text stays text: only a complete reply is read.
-            written = "".join(self._inputs[index]) if index in self._inputs else block.input
+            written = block.input if given is None else given.getvalue()
             content.append(block.model_dump() | {"text": text, "input": written})
         return {"content": content, "stop_reason": self._stop, "usage": self._usage}
+
+    def _take(self, event: dict[str, Any]) -> str:
+        kind, index = str.__str__(event["type"]), int(event.get("index") or 0)
+        delta: dict[str, Any] = event.get("delta") or {}
+        if kind == "content_block_delta":
+            text, written = delta.get("text") or "", delta.get("partial_json") or ""
+            self._texts.setdefault(index, io.StringIO()).write(text)
+            if written:
+                self._inputs.setdefault(index, io.StringIO()).write(written)
+            return text
+        if kind == "content_block_start":
+            self._blocks[index] = _Block.model_validate(event["content_block"])
+        message: dict[str, Any] = event.get("message") or {}
+        for owner in (message, event):
+            usage: dict[str, Any] = owner.get("usage") or {}
+            self._usage |= {k: v for k, v in usage.items() if v is not None}
+        self._stop = delta.get("stop_reason") or self._stop
+        self.done = self.done or self._stop is not None or kind == "message_stop"
+        return ""
 
 
 def _usage(usage: Any, price: Price) -> Usage:

@@ -3,6 +3,7 @@
 Only fields that every such server knows are sent, and never a null: some refuse either.
 """
 
+import io
 import re
 from functools import lru_cache
 from typing import Annotated, Any, cast
@@ -37,23 +38,18 @@ class _Function(BaseModel):
 
 
 class _Call(BaseModel):
-    index: int | None = None
     id: str | int | None = None
     function: _Function = _Function()
 
 
 class _Message(BaseModel):
-    """A message, or in a stream the fragment of one."""
-
     content: str | list[dict[str, Any]] | None = None
     refusal: str | None = None
     tool_calls: list[_Call] | None = None
 
     @property
     def text(self) -> str:
-        if isinstance(self.content, list):  # some servers answer in parts, as one may ask
-            return "".join(str(part.get("text") or "") for part in self.content)
-        return self.content or ""
+        return _said(self.content or "")
 
 
 class _Choice(BaseModel):
@@ -63,17 +59,6 @@ class _Choice(BaseModel):
 
 class _Completion(BaseModel):
     choices: Annotated[list[_Choice], MinLen(1)]
-    usage: Any = None
-
-
-class _Fragment(BaseModel):
-    index: int | None = None
-    delta: _Message | None = None
-    finish_reason: str | None = None
-
-
-class _Chunk(BaseModel):
-    choices: list[_Fragment] | None = None
     usage: Any = None
 
 
@@ -154,58 +139,66 @@ class _Reading:
 class _Assembly:
     def __init__(self) -> None:
         self.done = False
-        self._text: list[str] = []
-        self._refusal: list[str] = []
+        self._text, self._refusal = io.StringIO(), io.StringIO()
         self._calls: list[dict[str, Any]] = []
         self._at: dict[int | None, dict[str, Any]] = {}
         self._finish: str | None = None
         self._usage: Any = None
 
     def add(self, event: Any) -> str:
+        # Read by hand: there are hundreds of these a reply. What they make up is validated whole.
         try:
-            chunk = _Chunk.model_validate(event)
-        except ValidationError:
+            self._usage = event.get("usage") or self._usage
+            choices = event.get("choices") or ()
+            return "".join([self._choice(c) for c in choices if not c.get("index")])
+        except (AttributeError, TypeError):
             raise foreign("a stream of something else than chat completions") from None
-        self._usage = chunk.usage or self._usage
-        shown = ""
-        for choice in chunk.choices or ():
-            if choice.index:
-                continue  # one answer was asked for
-            if choice.finish_reason:
-                self._finish, self.done = choice.finish_reason, True
-            if choice.delta:
-                shown += self._take(choice.delta)
-        return shown
 
     def whole(self) -> Any:
         calls = [
             {"id": c["id"], "function": {"name": c["name"], "arguments": "".join(c["arguments"])}}
             for c in self._calls
         ]
-        content, refusal = "".join(self._text), "".join(self._refusal)
+        content, refusal = self._text.getvalue(), self._refusal.getvalue()
         message = {"content": content, "refusal": refusal, "tool_calls": calls}
         return {
             "choices": [{"message": message, "finish_reason": self._finish}],
             "usage": self._usage,
         }
 
-    def _take(self, delta: _Message) -> str:
-        self._text.append(delta.text)
-        self._refusal.append(delta.refusal or "")
-        for part in delta.tool_calls or ():
-            call = self._at.get(part.index)
-            # Some servers leave the index out, or give every parallel call the same one.
-            if call is None or (part.id and call["id"] and part.id != call["id"]):
-                call = self._at[part.index] = {"id": None, "name": None, "arguments": []}
-                self._calls.append(call)
-            call["id"] = call["id"] or part.id
-            call["name"] = call["name"] or part.function.name
-            given = part.function.arguments
-            if given is not None:
-                call["arguments"].append(
-                    given if isinstance(given, str) else dumped(given).decode()
-                )
-        return delta.text
+    def _choice(self, choice: dict[str, Any]) -> str:
+        """Take the fragment of an answer in; the text it brings."""
+        if choice.get("finish_reason"):
+            self._finish, self.done = choice["finish_reason"], True
+        delta: dict[str, Any] = choice.get("delta") or {}
+        for part in delta.get("tool_calls") or ():
+            self._call(part)
+        if delta.get("refusal"):
+            self._refusal.write(_said(delta["refusal"]))
+        text = _said(delta.get("content") or "")
+        self._text.write(text)
+        return text
+
+    def _call(self, part: dict[str, Any]) -> None:
+        """Take the fragment of a call in."""
+        call, id = self._at.get(part.get("index")), part.get("id")
+        # Some servers leave the index out, or give every parallel call the same one.
+        if call is None or (id and call["id"] and id != call["id"]):
+            call = self._at[part.get("index")] = {"id": None, "name": None, "arguments": []}
+            self._calls.append(call)
+        function: dict[str, Any] = part.get("function") or {}
+        call["id"] = call["id"] or id
+        call["name"] = call["name"] or function.get("name")
+        given = function.get("arguments")
+        if given is not None:
+            call["arguments"].append(given if isinstance(given, str) else dumped(given).decode())
+
+
+def _said(content: str | list[dict[str, Any]]) -> str:
+    """Text; some servers answer in parts, as one may ask."""
+    if isinstance(content, str):
+        return content
+    return "".join([str(part.get("text") or "") for part in content])
 
 
 def call_in_text(text: str, tools: tuple[Tool, ...]) -> tuple[str, dict[str, Any]] | None:
@@ -244,7 +237,10 @@ def _check_end(reason: str | None) -> None:
 def _usage(usage: Any, price: Price) -> Usage:
     given, written = count(usage, "prompt_tokens"), count(usage, "completion_tokens")
     cached = min(given, count(usage, "prompt_tokens_details", "cached_tokens"))
-    cost = price.cost(fresh=given - cached, cached=cached, output=written)
+    stored = count(usage, "prompt_tokens_details", "cache_write_tokens") if price.written else 0
+    stored = min(given - cached, stored)
+    fresh = given - cached - stored
+    cost = price.cost(fresh=fresh, cached=cached, written=stored, output=written)
     return Usage(input_tokens=given, cached_tokens=cached, output_tokens=written, cost_usd=cost)
 
 

@@ -10,6 +10,7 @@ from asyncio import AbstractEventLoop
 from collections.abc import AsyncIterator, Awaitable, Callable
 from functools import cache
 from typing import Any
+from urllib.request import getproxies, proxy_bypass
 from weakref import WeakKeyDictionary
 
 import httpx
@@ -53,9 +54,11 @@ class Transport:
         common = {"content-type": "application/json", "user-agent": "formup"}
         self._endpoint, self._url, self._sleep = endpoint, httpx.URL(url), sleep
         self._headers = httpx.Headers(common | headers)
-        self._clients: WeakKeyDictionary[AbstractEventLoop, httpx.AsyncClient]
+        timeout = httpx.Timeout(SILENCE_S, connect=CONNECT_S, pool=None)
+        self._extensions = {"timeout": timeout.as_dict()}
+        self._pools: WeakKeyDictionary[AbstractEventLoop, httpx.AsyncHTTPTransport]
         # Connections belong to an event loop, and every Agent.run has its own.
-        self._clients = WeakKeyDictionary()
+        self._pools = WeakKeyDictionary()
 
     async def ask(self, body: bytes, reading: Reading, show: Show | None = None) -> Reply:
         """Send a request until it is answered.
@@ -79,9 +82,9 @@ class Transport:
 
     async def aclose(self) -> None:
         """Close the connections of the running event loop; a later request makes new ones."""
-        client = self._clients.pop(asyncio.get_running_loop(), None)
-        if client is not None:
-            await client.aclose()
+        pool = self._pools.pop(asyncio.get_running_loop(), None)
+        if pool is not None:
+            await pool.aclose()
 
     def _sentence(self, failure: AskError, tries: int) -> str:
         counted = f" (tried {tries} times)" if tries > 1 else ""
@@ -89,21 +92,22 @@ class Transport:
         text = f"The model at {self._endpoint.base_url} {failure.what}{counted}: {failure.advice}"
         return self._endpoint.without_key(text + end)
 
-    def _client(self) -> httpx.AsyncClient:
+    def _pool(self) -> httpx.AsyncHTTPTransport:
+        """Connections. A client on top would look for cookies, redirects and logins every turn."""
         loop = asyncio.get_running_loop()
-        client = self._clients.get(loop)
-        if client is None:
-            timeout = httpx.Timeout(SILENCE_S, connect=CONNECT_S, pool=None)
-            proxied = not self._endpoint.is_loopback
-            client = httpx.AsyncClient(timeout=timeout, trust_env=proxied, verify=_tls())
-            self._clients[loop] = client
-        return client
+        pool = self._pools.get(loop)
+        if pool is None:
+            proxy = None if self._endpoint.is_loopback else _proxy(self._url)
+            pool = httpx.AsyncHTTPTransport(verify=_tls(), proxy=proxy)
+            self._pools[loop] = pool
+        return pool
 
     async def _once(self, body: bytes, reading: Reading, show: Show | None) -> Reply:
-        # Built here, not by the client: that would merge headers and URLs anew for every turn.
-        request = httpx.Request("POST", self._url, headers=self._headers, content=body)
+        request = httpx.Request(
+            "POST", self._url, headers=self._headers, content=body, extensions=self._extensions
+        )
         try:
-            response = await self._client().send(request, stream=True)
+            response = await self._pool().handle_async_request(request)
             try:
                 return await self._read(response, reading, show)
             finally:
@@ -129,9 +133,10 @@ class Transport:
     async def _assembled(
         self, response: httpx.Response, assembly: Assembly, show: Show | None
     ) -> Any:
-        events = Events()
+        events, size = Events(), 0
         try:
             async for chunk in _chunks(response):
+                size = _within(size + len(chunk))
                 for event in events.feed(chunk):
                     if event == b"[DONE]":
                         assembly.done = True
@@ -159,11 +164,14 @@ class Events:
 
     def feed(self, chunk: bytes) -> list[bytes]:
         """Data of the events that are complete with this chunk."""
+        fresh = not (self._rest or self._data)
+        if fresh and chunk[:5] == b"data:" and chunk.find(b"\n") == len(chunk) - 2:
+            return [chunk[5:].strip()]  # nearly always: one event, whole
         self._rest.append(chunk)
         if b"\n" not in chunk:
             return []
         *lines, rest = b"".join(self._rest).split(b"\n")
-        self._rest = [rest]
+        self._rest = [rest] if rest else []
         events: list[bytes] = []
         for line in lines:
             content = line.rstrip(b"\r")
@@ -175,24 +183,47 @@ class Events:
         return events
 
 
+def _proxy(url: httpx.URL) -> str | None:
+    """The proxy that the environment names for an address: HTTPS_PROXY, NO_PROXY and the like."""
+    if proxy_bypass(url.host):
+        return None
+    known = getproxies()
+    return known.get(url.scheme) or known.get("all")
+
+
 @cache
 def _tls() -> ssl.SSLContext:
     """Reading the certificates takes longer than most of a turn; clients share them."""
     return httpx.create_ssl_context()
 
 
-async def _chunks(response: httpx.Response) -> AsyncIterator[bytes]:
-    size = 0
-    async for chunk in response.aiter_bytes():
-        size += len(chunk)
-        if size > MAX_BYTES:
-            advice = "is the base URL right?"
-            raise AskError(f"answered with more than {MAX_BYTES // 2**20} MiB", advice)
-        yield chunk
+def _chunks(response: httpx.Response) -> AsyncIterator[bytes]:
+    """The body as it comes, without the layers that only a compressed one needs."""
+    if "content-encoding" in response.headers:
+        return response.aiter_bytes()
+    assert isinstance(response.stream, httpx.AsyncByteStream)
+    return aiter(response.stream)
 
 
 async def _all(response: httpx.Response) -> bytes:
-    return b"".join([chunk async for chunk in _chunks(response)])
+    chunks: list[bytes] = []
+    size = 0
+    async for chunk in _chunks(response):
+        size = _within(size + len(chunk))
+        chunks.append(chunk)
+    return b"".join(chunks)
+
+
+def _within(size: int) -> int:
+    """A size that is still no sign of something else than a model.
+
+    Raises:
+        AskError: it is.
+    """
+    if size > MAX_BYTES:
+        advice = "is the base URL right?"
+        raise AskError(f"answered with more than {MAX_BYTES // 2**20} MiB", advice)
+    return size
 
 
 def _parsed(body: bytes) -> Any:

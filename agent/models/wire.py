@@ -103,9 +103,12 @@ class Once(Generic[T]):
         return known[1]
 
 
+_ENCODER = json.JSONEncoder(separators=(",", ":"))
+
+
 def dumped(value: object) -> bytes:
     """Compact JSON; ASCII, so that no text whatever fails."""
-    return json.dumps(value, separators=(",", ":")).encode()
+    return _ENCODER.encode(value).encode()
 
 
 def media_type(image: bytes) -> str:

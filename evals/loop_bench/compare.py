@@ -1,0 +1,171 @@
+"""Processor time per turn of agent loops, side by side: bare httpx, formup, and other frameworks.
+
+    python compare.py ROUNDS FOLDER      environments of the others lie in FOLDER/NAME
+
+All do the same exchanges with the same scripted server. Every round measures each once, in an order
+that alternates, and only ratios within a round are told: medians, and quartiles in brackets.
+"""
+
+import json
+import statistics
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+OURS = ("floor", "formup")
+PEERS = ("pydantic_ai", "openai_agents", "langgraph", "smolagents")
+MUCH_LESS = 4.0
+"""Times less processor time than every other framework."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is measured: conversations of so many turns, and what formup must keep to."""
+
+    title: str
+    turns: int
+    runs: int
+    most: float
+    stream: bool = False
+    at_once: bool = False
+    peers: bool = False
+
+
+CASES = (
+    Case("8 turns", 8, 6, most=1.1, peers=True),
+    Case("101 turns", 101, 1, most=1.0),
+    Case("8 turns, streamed", 8, 4, most=1.1, stream=True, peers=True),
+    Case("64 conversations of 8 turns at once", 8, 64, most=1.1, at_once=True),
+)
+
+
+class Worker:
+    """A process that runs one framework."""
+
+    def __init__(self, name: str, python: Path, port: int) -> None:
+        self._base = f"http://127.0.0.1:{port}"
+        self._final = "f" if name == "smolagents" else ""
+        self.process = subprocess.Popen(
+            [python, "worker.py", f"run_{name}"],
+            cwd=HERE,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self._read()
+
+    def cpu(self, case: Case, runs: int | None = None) -> float:
+        """Seconds of processor time per turn."""
+        count = runs or case.runs
+        command = {
+            "url": f"{self._base}/t{case.turns - 1}{self._final}/v1",
+            "runs": count,
+            "stream": case.stream,
+            "at_once": case.at_once,
+        }
+        assert self.process.stdin is not None
+        self.process.stdin.write(json.dumps(command) + "\n")
+        self.process.stdin.flush()
+        answer = self._read()
+        if "error" in answer:
+            raise SystemExit(f"{self.process.args}: {answer['error']}")
+        return float(answer["cpu"]) / count / case.turns
+
+    def _read(self) -> Any:
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        if not line:
+            raise SystemExit(f"{self.process.args} ended; its last words are above.")
+        return json.loads(line)
+
+
+@contextmanager
+def started(python: Path, *arguments: str) -> Iterator[int]:
+    """The scripted server; its port."""
+    command = [python, *arguments]
+    with subprocess.Popen(command, cwd=HERE, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            yield int(server.stdout.readline())
+        finally:
+            server.kill()
+
+
+def check(worker: Worker, name: str, port: int) -> None:
+    """Refuse to compare what does not do the same exchanges."""
+    for case in [case for case in CASES if case.peers or name in OURS]:
+        before = _counts(port)
+        worker.cpu(case, runs=1)
+        after = _counts(port)
+        asked = after["requests"] - before["requests"]
+        if asked != case.turns or after["bad"]:
+            raise SystemExit(f"{name}, {case.title}: {asked} requests, {after['bad']} of them bad.")
+
+
+def compare(case: Case, workers: dict[str, Worker], rounds: int) -> None:
+    """Measure a case and print its table."""
+    names = [name for name in workers if case.peers or name in OURS]
+    spent: dict[str, list[float]] = {name: [] for name in names}
+    for name in names:
+        workers[name].cpu(case)  # warm
+    for number in range(rounds):
+        for name in names if number % 2 else reversed(names):
+            spent[name].append(workers[name].cpu(case, 1 if name in PEERS else None))
+    print(f"\n{case.title} ({rounds} rounds)")  # noqa: T201
+    for name in names:
+        against_floor = _ratio(spent[name], spent["floor"])
+        line = f"  {name:14} {1e3 * statistics.median(spent[name]):7.2f} ms a turn"
+        line += f"  {_shown(against_floor)} x floor"
+        if name == "formup":
+            line += _verdict(against_floor[1] <= case.most, f"at most {case.most:.1f}")
+        if name in PEERS:
+            against_us = _ratio(spent[name], spent["formup"])
+            line += f"  {_shown(against_us)} x formup"
+            line += _verdict(against_us[1] >= MUCH_LESS, f"at least {MUCH_LESS:.0f}")
+        print(line, flush=True)  # noqa: T201
+
+
+def _counts(port: int) -> dict[str, int]:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/counts") as response:
+        return json.load(response)
+
+
+def _ratio(ours: list[float], theirs: list[float]) -> tuple[float, float, float]:
+    """Quartiles of the ratio, round by round."""
+    ratios = [a / b for a, b in zip(ours, theirs, strict=True)]
+    low, middle, high = statistics.quantiles(ratios, n=4)
+    return low, middle, high
+
+
+def _shown(quartiles: tuple[float, float, float]) -> str:
+    low, middle, high = quartiles
+    return f"{middle:6.2f} [{low:.2f}-{high:.2f}]"
+
+
+def _verdict(met: bool, target: str) -> str:
+    return f"  ({target}: {'met' if met else 'MISSED'})"
+
+
+def main() -> None:
+    """Compare all there is."""
+    rounds, folder = int(sys.argv[1]), Path(sys.argv[2]).absolute()
+    here = Path(sys.executable)
+    pythons = dict.fromkeys(OURS, here) | {p: folder / p / "bin/python" for p in PEERS}
+    with started(here, "server.py") as port, ExitStack() as stack:
+        workers: dict[str, Worker] = {}
+        for name, python in pythons.items():
+            workers[name] = Worker(name, python, port)
+            stack.callback(workers[name].process.kill)
+            check(workers[name], name, port)
+        for case in CASES:
+            compare(case, workers, max(2, rounds // 4) if case.at_once else rounds)
+
+
+if __name__ == "__main__":
+    main()

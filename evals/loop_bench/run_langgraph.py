@@ -1,0 +1,60 @@
+"""langgraph: langchain's create_agent with one tool over Chat Completions, its tracing off."""
+
+import os
+from functools import cache
+from typing import Any
+
+from langchain.agents import create_agent
+from langchain_core.tools import tool
+from langchain_openai import ChatOpenAI
+from pydantic import BaseModel
+from task import SYSTEM, USER, compute
+
+os.environ["LANGSMITH_TRACING"] = "false"
+DEEP = {"recursion_limit": 5000}
+
+
+class Point(BaseModel):
+    """One of them."""
+
+    label: str
+    x: float
+    y: float
+
+
+@tool
+async def check_points(points: list[Point]) -> str:
+    """Count the points that lie inside the unit circle."""
+    return compute((p.x, p.y) for p in points)
+
+
+@cache
+def _agent(base_url: str, streams: bool) -> Any:
+    model = ChatOpenAI(
+        model="bench-model",
+        base_url=base_url,
+        api_key="k",
+        use_responses_api=False,
+        streaming=streams,
+        stream_usage=streams,
+    )
+    return create_agent(model, tools=[check_points], system_prompt=SYSTEM)
+
+
+def _asked() -> dict[str, Any]:
+    return {"messages": [{"role": "user", "content": USER}]}
+
+
+async def run(base_url: str) -> str:
+    """A conversation."""
+    result = await _agent(base_url, False).ainvoke(_asked(), DEEP)
+    return result["messages"][-1].content
+
+
+async def run_stream(base_url: str) -> str:
+    """A conversation, streamed; the text is that of the last message's fragments."""
+    texts: dict[str, str] = {}
+    stream = _agent(base_url, True).astream(_asked(), DEEP, stream_mode="messages")
+    async for message, _ in stream:
+        texts[message.id] = texts.get(message.id, "") + message.text
+    return list(texts.values())[-1]

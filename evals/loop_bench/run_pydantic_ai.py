@@ -1,0 +1,42 @@
+"""pydantic-ai: an Agent with one typed tool over Chat Completions."""
+
+from functools import cache
+
+from pydantic import BaseModel
+from pydantic_ai import Agent
+from pydantic_ai.models.openai import OpenAIChatModel
+from pydantic_ai.providers.openai import OpenAIProvider
+from pydantic_ai.usage import UsageLimits
+from task import SYSTEM, USER, compute
+
+UNLIMITED = UsageLimits(request_limit=None)
+
+
+class Point(BaseModel):
+    """One of them."""
+
+    label: str
+    x: float
+    y: float
+
+
+async def check_points(points: list[Point]) -> str:
+    """Count the points that lie inside the unit circle."""
+    return compute((p.x, p.y) for p in points)
+
+
+@cache
+def _agent(base_url: str) -> Agent:
+    model = OpenAIChatModel("bench-model", provider=OpenAIProvider(base_url=base_url, api_key="k"))
+    return Agent(model, instructions=SYSTEM, tools=[check_points])
+
+
+async def run(base_url: str) -> str:
+    """A conversation."""
+    return (await _agent(base_url).run(USER, usage_limits=UNLIMITED)).output
+
+
+async def run_stream(base_url: str) -> str:
+    """A conversation, streamed."""
+    async with _agent(base_url).run_stream(USER, usage_limits=UNLIMITED) as result:
+        return await result.get_output()

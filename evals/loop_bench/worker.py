@@ -1,0 +1,54 @@
+"""Runs one framework in its own environment, at the word of `compare.py`: JSON lines in and out."""
+
+import asyncio
+import importlib
+import json
+import os
+import sys
+import time
+import traceback
+from typing import Any
+
+from task import FINAL
+
+
+def cpu() -> float:
+    """Seconds of processor time this process has used, in the kernel too."""
+    return time.process_time()
+
+
+async def measured(module: Any, command: dict[str, Any]) -> dict[str, Any]:
+    """Processor time of `runs` conversations, one after the other or all at once."""
+    run = module.run_stream if command["stream"] else module.run
+
+    async def one() -> None:
+        answer = await run(command["url"])
+        assert answer == FINAL, repr(answer)
+
+    before = cpu()
+    if command["at_once"]:
+        await asyncio.gather(*(one() for _ in range(command["runs"])))
+    else:
+        for _ in range(command["runs"]):
+            await one()
+    return {"cpu": cpu() - before}
+
+
+async def main(name: str, out: Any) -> None:
+    """Obey until the end of the input."""
+    module = importlib.import_module(name)
+    out.write('"ready"\n')
+    loop = asyncio.get_running_loop()
+    while line := await loop.run_in_executor(None, sys.stdin.readline):
+        try:
+            answer = await measured(module, json.loads(line))
+        except Exception as error:
+            traceback.print_exc()
+            answer = {"error": f"{type(error).__name__}: {error}"[:400]}
+        out.write(json.dumps(answer) + "\n")
+
+
+if __name__ == "__main__":
+    answers = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)  # a framework that prints must not spoil the answers
+    asyncio.run(main(sys.argv[1], answers))
