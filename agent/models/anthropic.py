@@ -143,7 +143,9 @@ class _Assembly:
         return {"content": content, "stop_reason": self._stop, "usage": self._usage}
 
     def _take(self, event: dict[str, Any]) -> str:
-        kind, index = str.__str__(event["type"]), int(event.get("index") or 0)
+        kind, index = event["type"], int(event.get("index") or 0)
+        if not isinstance(kind, str):
+            raise TypeError
         delta: dict[str, Any] = event.get("delta") or {}
         if kind == "content_block_delta":
             text, written = delta.get("text") or "", delta.get("partial_json") or ""

@@ -164,8 +164,8 @@ class Events:
 
     def feed(self, chunk: bytes) -> list[bytes]:
         """Data of the events that are complete with this chunk."""
-        fresh = not (self._rest or self._data)
-        if fresh and chunk[:5] == b"data:" and chunk.find(b"\n") == len(chunk) - 2:
+        one = chunk[:5] == b"data:" and chunk.find(b"\n\n") == chunk.find(b"\n") == len(chunk) - 2
+        if one and not (self._rest or self._data):
             return [chunk[5:].strip()]  # nearly always: one event, whole
         self._rest.append(chunk)
         if b"\n" not in chunk:

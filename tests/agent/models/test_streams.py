@@ -15,7 +15,7 @@ from formup.agent.models.openai_responses import OpenAIResponses
 from formup.agent.models.prices import UNKNOWN
 from formup.agent.models.transport import Events
 from formup.tools.doors import TOOLS
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 WIRES = [OpenAIChat, OpenAIResponses, Anthropic, Gemini]
@@ -64,9 +64,10 @@ def test_any_body_is_a_reply_or_an_ask_error(wire: Any, body: Any) -> None:
         wire("m", UNKNOWN).reading(REQUEST).reply(body)
 
 
+@settings(max_examples=500)
 @given(
     events=st.lists(st.binary(min_size=1).filter(lambda b: b"\n" not in b and b"\r" not in b)),
-    cuts=st.lists(st.integers(0, 400)),
+    cuts=st.lists(st.integers(0, 60)),
     ends=st.sampled_from([b"\n", b"\r\n"]),
 )
 def test_events_are_the_same_however_they_are_cut(
