@@ -3,8 +3,10 @@ PYTHON ?= python3
 BIN := .venv/bin
 PHOTOS := evals/photos/images
 OUT := formup-runs/demo
+PEERS := pydantic_ai openai_agents langgraph smolagents
+ROUNDS ?= 80
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check bench bench-loop clean
 
 demo: .venv/.ready
 	@$(BIN)/formup run $(PHOTOS)/cars_two.jpg "Surround the red car at the corners" -n 4 \
@@ -29,25 +31,33 @@ check: .venv/.ready-dev
 bench: .venv/.ready-dev
 	$(BIN)/python -m formup.evals.bench
 
+# Loops of other agent frameworks beside ours, each in an environment of its own.
+bench-loop: .venv/.ready-dev $(PEERS:%=.venv/bench/%/.ready)
+	$(BIN)/python evals/loop_bench/compare.py $(ROUNDS) .venv/bench
+
+.venv/bench/%/.ready: evals/loop_bench/peers/%.txt
+	@$(call environment,$(@D),-r $<)
+	@touch $@
+
 clean:
 	rm -rf .venv build dist *.egg-info formup-runs
 
 # uv where it is there, else venv and pip. constraints.txt pins what was tested together.
 .venv/.ready: pyproject.toml constraints.txt
-	@$(call install,-e .)
+	@$(call environment,.venv,-c constraints.txt -e .)
 	@touch $@
 
 .venv/.ready-dev: .venv/.ready
-	@$(call install,-e '.[dev]')
+	@$(call environment,.venv,-c constraints.txt -e '.[dev]')
 	@mkdir -p .venv/src && ln -sfn ../.. .venv/src/formup
 	@touch $@
 
-define install
+define environment
 	if command -v uv >/dev/null; then \
-	  uv venv --quiet --allow-existing --python '>=3.11' .venv && \
-	  uv pip install --quiet --python $(BIN)/python -c constraints.txt $(1); \
+	  uv venv --quiet --allow-existing --python '>=3.11' $(1) && \
+	  uv pip install --quiet --python $(1)/bin/python $(2); \
 	else \
-	  test -x $(BIN)/pip || $(PYTHON) -m venv .venv && \
-	  $(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt $(1); \
+	  test -x $(1)/bin/pip || $(PYTHON) -m venv $(1) && \
+	  $(1)/bin/pip install --quiet --disable-pip-version-check $(2); \
 	fi
 endef

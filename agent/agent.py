@@ -2,11 +2,11 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from ..prompts import Prompt, PromptError, list_prompts, load_prompt
 from ..tools.doors import TOOLS
@@ -14,7 +14,7 @@ from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
 from ..tools.perception.image import Picture
 from ..tools.perception.prompts import TargetPrompt
-from ..tools.scene import Scene
+from ..tools.scene import Scene, Target
 from ..tools.tool import Tool
 from ..tools.workspace import Settings, Workspace
 from .limits import DEFAULT_LIMITS, Limits
@@ -27,9 +27,11 @@ from .policy import Policy
 from .report import Report, make_report
 from .runs import Run, check_text, going_on
 from .task import task_text
+from .telemetry import traced_model, traced_run, traced_tool
 from .trace import TraceWriter, settings_facts
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from opentelemetry.trace import Tracer
 
 
 class Agent:
@@ -46,6 +48,7 @@ class Agent:
         system: a text in place of a prompt; the offline planner reads neither.
         limits: bounds of each run.
         policy: which calls go ahead, wait for a person, or are refused.
+        tracer: of OpenTelemetry; it is given spans of runs, replies and tools, and no texts.
 
     Raises:
         InputError: an unknown model or prompt, or a model that cannot be asked.
@@ -61,6 +64,7 @@ class Agent:
         system: str = "",
         limits: Limits = DEFAULT_LIMITS,
         policy: Policy = ANYTHING,
+        tracer: "Tracer | None" = None,
     ) -> None:
         if base_url is not None and not isinstance(model, str):
             raise InputError("A base URL goes with a model's name; this model is an object.")
@@ -69,6 +73,10 @@ class Agent:
         self.prompt = _prompt(prompt, own)
         self.system = self.prompt.text if self.prompt else system
         self.base_url, self.tools, self.limits, self.policy = base_url, tools, limits, policy
+        self._tracer = tracer
+        if tracer is not None:
+            self.model = traced_model(self.model, tracer)
+            self.tools = tuple(traced_tool(tool, tracer) for tool in tools)
 
     def run(
         self,
@@ -76,6 +84,7 @@ class Agent:
         instruction: str,
         *,
         pointed: Sequence[TargetPrompt] = (),
+        targets: Sequence[Target] = (),
         settings: Settings | None = None,
         trace: Path | None = None,
         show: Show | None = None,
@@ -86,9 +95,15 @@ class Agent:
             InputError: something given cannot be used.
         """
         made = self.arun(
-            picture, instruction, pointed=pointed, settings=settings, trace=trace, show=show
+            picture,
+            instruction,
+            pointed=pointed,
+            targets=targets,
+            settings=settings,
+            trace=trace,
+            show=show,
         )
-        return asyncio.run(self._closing(made))
+        return self._sync(made)
 
     async def arun(
         self,
@@ -96,6 +111,7 @@ class Agent:
         instruction: str,
         *,
         pointed: Sequence[TargetPrompt] = (),
+        targets: Sequence[Target] = (),
         settings: Settings | None = None,
         trace: Path | None = None,
         show: Show | None = None,
@@ -106,6 +122,7 @@ class Agent:
             picture: where.
             instruction: what, in the person's words.
             pointed: the things meant, if the person points.
+            targets: the things meant, where they are measured already.
             settings: what the person fixed.
             trace: a file to write the run to as it goes: it can be resumed and replayed from it.
             show: is given every message as it comes.
@@ -115,7 +132,7 @@ class Agent:
         """
         fixed = settings or Settings()
         _check(instruction, fixed.robots)
-        workspace = Workspace(Scene(picture), fixed, tuple(pointed))
+        workspace = Workspace(Scene(picture, tuple(targets)), fixed, tuple(pointed))
         _check_candidates(workspace)
         writer = None if trace is None else TraceWriter(trace)
         if writer is not None:
@@ -139,7 +156,7 @@ class Agent:
             InputError: the run is over, or waits for something else.
         """
         made = self.aresume(paused, answer=answer, approve=approve, show=show)
-        return asyncio.run(self._closing(made))
+        return self._sync(made)
 
     async def aresume(
         self,
@@ -188,7 +205,8 @@ class Agent:
         approved: Call | None = None,
     ) -> Run:
         began = time.perf_counter()
-        with writer or nullcontext():
+        traced = traced_run(self._tracer, self.model.name, messages)
+        with writer or nullcontext(), traced as told:
             outcome = await run(
                 self.model,
                 self.tools,
@@ -205,6 +223,7 @@ class Agent:
             report = report.model_copy(update={"prompt": _prompt_facts(self.prompt)})
             if writer is not None:
                 writer.end(_end(outcome, report))
+            told(outcome, report)
         return Run(report, outcome, workspace, writer and writer.path)
 
     def _facts(self, instruction: str, settings: Settings) -> dict[str, Any]:
@@ -225,12 +244,21 @@ class Agent:
         if close is not None:
             await close()
 
-    async def _closing(self, run: Awaitable[T]) -> T:
+    def _sync(self, run: Coroutine[Any, Any, Run]) -> Run:
         """A run with an event loop of its own: connections cannot outlive it."""
+
+        async def closing() -> Run:
+            try:
+                return await run
+            finally:
+                await self.aclose()
+
         try:
-            return await run
-        finally:
-            await self.aclose()
+            asyncio.get_running_loop()
+        except RuntimeError:
+            return asyncio.run(closing())
+        run.close()
+        raise InputError("An event loop runs here already: await agent.arun(...) or aresume(...).")
 
 
 def _prompt(name: str | None, own: str | None) -> Prompt | None:

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..tools.errors import ArgumentsError, FleetError, ModelError
 from ..tools.tool import Tool
@@ -23,7 +23,7 @@ class Conversation:
     """The messages so far, there whatever happens to the loop that adds to them."""
 
     messages: History
-    show: Show = field(default=lambda message: None)
+    show: Show
 
     def add(self, message: Reply | Result) -> None:
         """Append, and show it for display and traces."""

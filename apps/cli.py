@@ -1,6 +1,9 @@
 """The command line: `formup run`, `resume`, `deploy`, `trace`, `tools`, `eval`."""
 
 import sys
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -9,13 +12,18 @@ from ..agent.limits import Limits
 from ..agent.outcomes import Paused
 from ..agent.policy import Policy
 from ..agent.runs import load_run
+from ..agent.telemetry import environment_tracer
 from ..agent.trace import NAME, prompt_name, read_trace
+from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
 from ..tools.workspace import Settings
 from . import evaluate, inputs, plans, tools, traces
 from . import options as o
 from .carry import Desk
 from .output import Folder
+
+if TYPE_CHECKING:
+    from opentelemetry.trace import Tracer
 
 app = typer.Typer(
     name="formup",
@@ -70,12 +78,12 @@ def run(
         may_deploy=not plan_only,
     )
     pointed = inputs.pointed(point or [], box or [], outline or [], target or [])
-    agent = _agent(model, base_url, prompt, inputs.limits(limit), inputs.policy(policy))
-    picture, keep = load_picture(image), inputs.recording(record)
-    with Folder(out) as folder:
-        trace = folder.path / NAME
-        made = agent.run(picture, instruction, pointed=pointed, settings=settings, trace=trace)
-        raise typer.Exit(Desk(agent, folder, as_json, keep).serve(made))
+    with _agent(model, base_url, prompt, inputs.limits(limit), inputs.policy(policy)) as agent:
+        picture, keep = load_picture(image), inputs.recording(record)
+        with Folder(out) as folder:
+            trace = folder.path / NAME
+            made = agent.run(picture, instruction, pointed=pointed, settings=settings, trace=trace)
+            raise typer.Exit(Desk(agent, folder, as_json, keep).serve(made))
 
 
 @app.command()
@@ -92,14 +100,15 @@ def resume(
     """Go on with a run that waits for a person, was stopped, interrupted or killed."""
     trace, left = read_trace(folder), load_run(folder)
     start = trace.start
-    agent = Agent(
-        model or start["model"],
-        base_url=base_url or (None if model else start["base_url"]),
-        prompt=prompt_name(start["prompt"]),
-        limits=inputs.limits(limit, start["limits"]),
-        policy=inputs.policy(policy, start["policy"]),
-    )
-    with Folder(trace.path.parent, resumed=True) as home:
+    with _tracer() as tracer, Folder(trace.path.parent, resumed=True) as home:
+        agent = Agent(
+            model or start["model"],
+            base_url=base_url or (None if model else start["base_url"]),
+            prompt=prompt_name(start["prompt"]),
+            limits=inputs.limits(limit, start["limits"]),
+            policy=inputs.policy(policy, start["policy"]),
+            tracer=tracer,
+        )
         desk = Desk(agent, home, as_json)
         if not (desk.can_ask and isinstance(left.outcome, Paused) and answer is approve is None):
             left = agent.resume(left, answer=answer, approve=approve)
@@ -110,15 +119,31 @@ app.command(name="deploy")(plans.deploy)
 app.command(name="trace")(traces.show_trace)
 
 
+@contextmanager
 def _agent(
     model: str, base_url: str | None, prompt: str | None, limits: Limits, policy: Policy
-) -> Agent:
-    agent = Agent(model, base_url=base_url, prompt=prompt, limits=limits, policy=policy)
-    if model != "offline" or agent.prompt is None:
-        return agent
-    print(  # noqa: T201
-        "formup: the offline planner is rules and reads no prompt; "
-        f"{agent.prompt.name} is not used.",
-        file=sys.stderr,
-    )
-    return Agent(model, limits=limits, policy=policy)
+) -> Generator[Agent, None, None]:
+    with _tracer() as tracer:
+        agent = Agent(
+            model, base_url=base_url, prompt=prompt, limits=limits, policy=policy, tracer=tracer
+        )
+        if model == "offline" and agent.prompt is not None:
+            print(  # noqa: T201
+                "formup: the offline planner is rules and reads no prompt; "
+                f"{agent.prompt.name} is not used.",
+                file=sys.stderr,
+            )
+            agent = Agent(model, limits=limits, policy=policy, tracer=tracer)
+        yield agent
+
+
+@contextmanager
+def _tracer() -> "Generator[Tracer | None, None, None]":
+    """For spans, if the environment asks for them; a run does not fail for the want of one."""
+    with ExitStack() as stack:
+        tracer = None
+        try:
+            tracer = stack.enter_context(environment_tracer())
+        except InputError as error:
+            print(f"formup: no spans are sent: {error}", file=sys.stderr)  # noqa: T201
+        yield tracer

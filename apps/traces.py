@@ -31,7 +31,7 @@ def show_trace(file: o.TraceFile) -> None:
 
 def _steps(trace: Trace) -> Table:
     """A row for each message, with the time since the one before and what it cost, if anything."""
-    counts = any(line.get("usage", {}).get("input_tokens") for line in trace.lines)
+    counts = any(any(_spent(line)) for line in trace.lines)
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="cyan")
     for title in ("at", "took", "tokens", "USD") if counts else ("at", "took"):
         table.add_column(title, justify="right", no_wrap=True)

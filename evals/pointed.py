@@ -5,7 +5,6 @@ box. outline: at most 12 vertices, each coordinate moved by up to 4 % of the siz
 the area). point: one point well inside. words: nothing is pointed at.
 """
 
-import asyncio
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
@@ -19,14 +18,12 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from ..agent.agent import Agent, Run
-from ..agent.messages import User
-from ..agent.task import task_text
 from ..tools.errors import InputError
 from ..tools.geometry.outline import FloatArray
 from ..tools.perception.image import Picture, load_picture
 from ..tools.perception.prompts import TargetPrompt
-from ..tools.scene import Scene, Target
-from ..tools.workspace import Settings, Workspace
+from ..tools.scene import Target
+from ..tools.workspace import Settings
 from .grade import grade
 from .suite import Task, Thing
 
@@ -163,9 +160,7 @@ def _run(task: Task, mode: Mode, seed: int) -> Run:
             Target(f"t{i}", thing.name, thing.outline.bounds, 1.0, thing.outline, "truth")
             for i, thing in enumerate(things, start=1)
         )
-        workspace = Workspace(Scene(picture, targets), settings)
-        first = User(text=task_text(task.instruction, workspace))
-        return asyncio.run(agent.resume(workspace, (first,), task.instruction))
+        return agent.run(picture, task.instruction, targets=targets, settings=settings)
     pointed = () if mode == "words" else (_prompt(task, mode, seed),)
     return agent.run(picture, task.instruction, pointed=pointed, settings=settings)
 

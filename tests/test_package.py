@@ -68,7 +68,8 @@ def test_wheel_holds_every_package_and_data_file_and_no_tests(tmp_path: Path) ->
     kept = [n for n in listed if (ROOT / n).is_file() and (n.startswith(rooms) or "/" not in n)]
     wanted = [n for n in kept if n.endswith((".py", ".yaml", ".md", ".json", ".jpg", ".png"))]
     missing = [n for n in wanted if f"formup/{n}" not in inside and n.startswith(rooms)]
-    assert not missing
+    # Scripts that are run from a checkout, in environments of their own.
+    assert not [n for n in missing if not n.startswith("evals/loop_bench/")]
     assert {"formup/py.typed", "formup/__init__.py", "formup/__main__.py"} <= inside
     assert not [n for n in inside if "test" in n.split("/")[1]]
 

@@ -11,7 +11,7 @@ import statistics
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,7 +86,7 @@ class Worker:
 
 
 @contextmanager
-def started(python: Path, *arguments: str) -> Iterator[int]:
+def started(python: Path, *arguments: str) -> Generator[int]:
     """The scripted server; its port."""
     command = [python, *arguments]
     with subprocess.Popen(command, cwd=HERE, stdout=subprocess.PIPE, text=True) as server:

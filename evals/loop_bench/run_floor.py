@@ -64,8 +64,8 @@ async def _turn(url: str, body: dict[str, Any]) -> tuple[str, list[dict[str, Any
         async for line in response.aiter_lines():
             if not line.startswith("data: ") or line == "data: [DONE]":
                 continue
-            choices = json.loads(line[6:])["choices"]
-            delta = choices[0]["delta"] if choices else {}
+            choices: list[Any] = json.loads(line[6:])["choices"]
+            delta: dict[str, Any] = choices[0]["delta"] if choices else {}
             text += delta.get("content") or ""
             for part in delta.get("tool_calls") or ():
                 call = calls.get(part["index"])

@@ -1,8 +1,8 @@
 """A scripted Chat Completions server on loopback, its answers made beforehand.
 
-POST /tN[f]/v1/chat/completions asks for N tool turns, then gives the final text (with f as a call of
-final_answer, which smolagents wants). The turn is the number of tool results in the request. Streams
-have an event for every four characters of arguments, each in a chunk of its own.
+POST /tN[f]/v1/chat/completions asks for N tool turns, then gives the final text (with f, as a call
+of final_answer, which smolagents wants). The turn is the number of tool results in the request.
+Streams have an event for every four characters of arguments, each in a chunk of its own.
 """
 
 import asyncio
@@ -15,7 +15,7 @@ from task import FINAL
 
 POINTS = [(round(0.17 * i - 0.6, 3), round(0.9 - 0.21 * i, 3)) for i in range(8)]
 USAGE = {"prompt_tokens": 321, "completion_tokens": 120, "total_tokens": 441}
-HEAD = {"id": "chatcmpl-bench", "created": 1_760_000_000, "model": "bench-model"}
+HEAD: dict[str, Any] = {"id": "chatcmpl-bench", "created": 1_760_000_000, "model": "bench-model"}
 RESULT = re.compile(
     rb'"role": ?"tool"|": ?"Observation:\\n'
 )  # smolagents tells results as users do
@@ -68,11 +68,14 @@ def streamed(turn: int, kind: str) -> bytes:
         ]
         deltas += [{"tool_calls": [piece]} for piece in [first, *pieces]]
     finish = "stop" if kind == "text" else "tool_calls"
-    choices = [[{"index": 0, "delta": d, "logprobs": None, "finish_reason": None}] for d in deltas]
-    choices += [[{"index": 0, "delta": {}, "logprobs": None, "finish_reason": finish}]]
+    common: dict[str, Any] = {"index": 0, "logprobs": None}
+    choices = [common | {"delta": delta, "finish_reason": None} for delta in deltas]
+    last: dict[str, Any] = {"delta": {}, "finish_reason": finish}
+    choices.append(common | last)
     chunk = HEAD | {"object": "chat.completion.chunk"}
-    events = [dumps(chunk | {"choices": c, "usage": None}) for c in choices]
-    events += [dumps(chunk | {"choices": [], "usage": USAGE}), "[DONE]"]
+    events = [dumps(chunk | {"choices": [choice], "usage": None}) for choice in choices]
+    end: dict[str, Any] = {"choices": [], "usage": USAGE}
+    events += [dumps(chunk | end), "[DONE]"]
     head = (
         b"HTTP/1.1 200 OK\r\ncontent-type: text/event-stream\r\ntransfer-encoding: chunked\r\n\r\n"
     )

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from formup.agent.agent import Agent
 from formup.agent.limits import Limits
 from formup.agent.loop import run
 from formup.agent.messages import HISTORY, Call, History, Reply, Result, User, unanswered
@@ -14,7 +15,7 @@ from formup.agent.models.doubles import FunctionModel, ScriptedModel
 from formup.agent.outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from formup.agent.policy import Policy
 from formup.tools.doors import TOOLS
-from formup.tools.errors import ModelError
+from formup.tools.errors import InputError, ModelError
 from formup.tools.perception.image import picture_from_array
 from formup.tools.scene import Scene
 from formup.tools.workspace import Settings, Workspace
@@ -228,3 +229,13 @@ def test_unused_script_fails() -> None:
 def test_a_script_that_runs_out_is_a_model_error() -> None:
     with pytest.raises(ModelError):
         asyncio.run(ScriptedModel([]).reply(Request("", START, ())))
+
+
+def test_in_an_event_loop_the_synchronous_door_says_so() -> None:
+    picture = workspace().scene.picture
+
+    async def notebook() -> None:
+        Agent(ScriptedModel([])).run(picture, "Surround it")
+
+    with pytest.raises(InputError, match="await agent.arun"):
+        asyncio.run(notebook())
