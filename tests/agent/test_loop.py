@@ -237,5 +237,5 @@ def test_in_an_event_loop_the_synchronous_door_says_so() -> None:
     async def notebook() -> None:
         Agent(ScriptedModel([])).run(picture, "Surround it")
 
-    with pytest.raises(InputError, match="await agent.arun"):
+    with pytest.raises(InputError, match="await agent"):
         asyncio.run(notebook())
