@@ -5,8 +5,9 @@ PHOTOS := evals/photos/images
 OUT := formup-runs/demo
 PEERS := pydantic_ai openai_agents langgraph smolagents
 ROUNDS ?= 80
+SERVERS := transformers litellm
 
-.PHONY: demo test check bench bench-loop clean
+.PHONY: demo test test-servers check bench bench-loop clean
 
 demo: .venv/.ready
 	@$(BIN)/formup run $(PHOTOS)/cars_two.jpg "Surround the red car at the corners" -n 4 \
@@ -21,6 +22,14 @@ demo: .venv/.ready
 
 test: .venv/.ready-dev
 	$(BIN)/pytest -q -n auto
+
+# Models are asked at servers that others wrote, each in an environment of its own.
+test-servers: .venv/.ready-dev $(SERVERS:%=.venv/servers/%/.ready)
+	FORMUP_TEST_SERVERS=.venv/servers $(BIN)/pytest -q tests/servers
+
+.venv/servers/%/.ready: tests/servers/%.txt
+	@$(call environment,$(@D),-r $<)
+	@touch $@
 
 check: .venv/.ready-dev
 	$(BIN)/ruff check .

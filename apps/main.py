@@ -8,6 +8,8 @@ import threading
 from contextlib import suppress
 
 INTERRUPTED = 130
+WINDING_UP = 0.2
+"""Seconds for the thread of a tool that is done to end."""
 
 
 def main() -> None:
@@ -30,7 +32,10 @@ def _leave(code: int) -> None:
     """Exit; native code of a tool that was given up must not be torn down while it runs."""
     from ..tools.tool import THREAD
 
-    if not any(thread.name == THREAD for thread in threading.enumerate()):
+    tools = [thread for thread in threading.enumerate() if thread.name == THREAD]
+    for thread in tools:
+        thread.join(WINDING_UP)
+    if not any(thread.is_alive() for thread in tools):
         sys.exit(code)
     with suppress(OSError, ValueError):
         sys.stdout.flush()
