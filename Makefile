@@ -21,7 +21,7 @@ demo: .venv/.ready
 	@$(BIN)/formup run docs/images/lot.jpg "Surround the incorrectly parked car" -n 6 --out $(OUT)/lot
 
 test: .venv/.ready-dev
-	$(BIN)/pytest -q -n auto
+	$(BIN)/pytest -q -n auto --ignore tests/servers
 
 # Models are asked at servers that others wrote, each in an environment of its own.
 test-servers: .venv/.ready-dev $(SERVERS:%=.venv/servers/%/.ready)
