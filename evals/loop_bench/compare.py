@@ -164,7 +164,7 @@ def main() -> None:
             stack.callback(workers[name].process.kill)
             check(workers[name], name, port)
         for case in CASES:
-            compare(case, workers, max(2, rounds // 4) if case.at_once else rounds)
+            compare(case, workers, rounds)
 
 
 if __name__ == "__main__":
