@@ -16,7 +16,7 @@ from pydantic_core import from_json, to_json
 
 from ..tools.errors import InputError
 from ..tools.fleet.deploy import Arrival
-from ..tools.store import Stored, store, write_whole
+from ..tools.store import Stored, checked, store, write_whole
 from ..tools.workspace import Settings, Workspace
 from .messages import HISTORY, History, Reply, Result, User
 
@@ -151,7 +151,7 @@ class Trace:
         """The workspace as it was last, and the arrivals by plan id.
 
         Raises:
-            InputError: there is none, or it is damaged.
+            InputError: there is none, or it is damaged or altered.
         """
         states = self.of_type("state")
         if not states:
@@ -159,9 +159,9 @@ class Trace:
         last = states[-1]
         try:
             arrivals = {k: Arrival.model_validate(v) for k, v in last["arrivals"].items()}
-            return Stored.model_validate(last["workspace"]), arrivals
-        except ValidationError:
-            raise InputError(f"{self.path} is damaged: its state cannot be read.") from None
+        except (ValidationError, AttributeError):
+            raise InputError(f"{self.path} is damaged: its arrivals cannot be read.") from None
+        return checked(last["workspace"], self.path), arrivals
 
     def _image(self, image: dict[str, Any]) -> bytes:
         path = self.path.parent / str(image["path"])

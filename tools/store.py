@@ -8,7 +8,7 @@ import json
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -104,11 +104,23 @@ def read_stored(path: Path) -> Stored:
         InputError: missing, no JSON, of another format, or altered.
     """
     try:
-        data = json.loads(read_text(path))
+        data: Any = json.loads(read_text(path))
     except (ValueError, RecursionError):
         raise InputError(f"{path} is not JSON; a file written by formup is needed.") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError(f"{path} is no formup file of format {FORMAT!r}.")
+    return checked(cast(object, data), path)
+
+
+def checked(data: object, path: Path) -> Stored:
+    """What was stored, if it is as it was written.
+
+    Args:
+        path: of the file it comes from, for messages.
+
+    Raises:
+        InputError: damaged or altered.
+    """
     try:
         stored = Stored.model_validate(data)
         sealed = stored.sealed()

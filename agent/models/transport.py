@@ -98,7 +98,10 @@ class Transport:
         pool = self._pools.get(loop)
         if pool is None:
             proxy = None if self._endpoint.is_loopback else _proxy(self._url)
-            pool = httpx.AsyncHTTPTransport(verify=_tls(), proxy=proxy)
+            try:
+                pool = httpx.AsyncHTTPTransport(verify=_tls(), proxy=proxy)
+            except (ValueError, ImportError, httpx.InvalidURL):
+                raise _no_proxy() from None
             self._pools[loop] = pool
         return pool
 
@@ -188,7 +191,8 @@ def _proxy(url: httpx.URL) -> str | None:
     if proxy_bypass(url.host):
         return None
     known = getproxies()
-    return known.get(url.scheme) or known.get("all")
+    proxy = known.get(url.scheme) or known.get("all")
+    return f"http://{proxy}" if proxy and "://" not in proxy else proxy
 
 
 @cache
@@ -235,6 +239,12 @@ def _parsed(body: bytes) -> Any:
 
 def _dropped() -> AskError:
     return AskError("dropped the connection before its reply was complete", "try again", "later")
+
+
+def _no_proxy() -> AskError:
+    """What the environment names is no proxy; it is not repeated: it may hold a password."""
+    advice = "name one such as http://127.0.0.1:3128 (SOCKS needs the package socksio)"
+    return AskError("cannot be asked through the proxy that the environment names", advice)
 
 
 def _of_network(error: httpx.HTTPError) -> AskError:

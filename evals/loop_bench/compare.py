@@ -2,8 +2,8 @@
 
     python compare.py ROUNDS FOLDER      environments of the others lie in FOLDER/NAME
 
-All do the same exchanges with the same scripted server. Every round measures each once, in an order
-that alternates, and only ratios within a round are told: medians, and quartiles in brackets.
+All do the same exchanges with the same scripted server. A round measures each once, in an order
+that alternates, and only ratios within a round count: medians, and quartiles in brackets.
 """
 
 import json
@@ -21,27 +21,39 @@ HERE = Path(__file__).parent
 OURS = ("floor", "formup")
 PEERS = ("pydantic_ai", "openai_agents", "langgraph", "smolagents")
 MUCH_LESS = 4.0
-"""Times less processor time than every other framework."""
+"""Times less processor time than every other framework, one conversation after the other."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is measured: conversations of so many turns, and what formup must keep to."""
+    """What is measured: conversations of so many turns, and what formup must keep to.
+
+    Attributes:
+        most: times the processor time of the floor.
+        every: the others, which are slow, take part in one round of so many; odd, so that the
+            order alternates for them as well.
+    """
 
     title: str
     turns: int
     runs: int
     most: float
+    every: int
     stream: bool = False
     at_once: bool = False
-    peers: bool = False
+
+    @property
+    def few(self) -> int:
+        """Conversations that will do where they are slow, or only counted."""
+        return self.runs if self.at_once else 1
 
 
 CASES = (
-    Case("8 turns", 8, 6, most=1.1, peers=True),
-    Case("101 turns", 101, 1, most=1.0),
-    Case("8 turns, streamed", 8, 4, most=1.1, stream=True, peers=True),
-    Case("64 conversations of 8 turns at once", 8, 64, most=1.1, at_once=True),
+    Case("8 turns", 8, 6, most=1.1, every=1),
+    Case("101 turns", 101, 1, most=1.0, every=9),
+    Case("8 turns, streamed", 8, 4, most=1.1, every=1, stream=True),
+    Case("101 turns, streamed", 101, 1, most=1.1, every=9, stream=True),
+    Case("64 conversations of 8 turns at once", 8, 64, most=1.1, every=9, at_once=True),
 )
 
 
@@ -60,12 +72,11 @@ class Worker:
         )
         self._read()
 
-    def cpu(self, case: Case, runs: int | None = None) -> float:
+    def cpu(self, case: Case, runs: int) -> float:
         """Seconds of processor time per turn."""
-        count = runs or case.runs
         command = {
             "url": f"{self._base}/t{case.turns - 1}{self._final}/v1",
-            "runs": count,
+            "runs": runs,
             "stream": case.stream,
             "at_once": case.at_once,
         }
@@ -75,7 +86,7 @@ class Worker:
         answer = self._read()
         if "error" in answer:
             raise SystemExit(f"{self.process.args}: {answer['error']}")
-        return float(answer["cpu"]) / count / case.turns
+        return float(answer["cpu"]) / runs / case.turns
 
     def _read(self) -> Any:
         assert self.process.stdout is not None
@@ -99,36 +110,46 @@ def started(python: Path, *arguments: str) -> Generator[int]:
 
 def check(worker: Worker, name: str, port: int) -> None:
     """Refuse to compare what does not do the same exchanges."""
-    for case in [case for case in CASES if case.peers or name in OURS]:
+    for case in CASES:
         before = _counts(port)
-        worker.cpu(case, runs=1)
+        worker.cpu(case, case.few)
         after = _counts(port)
         asked = after["requests"] - before["requests"]
-        if asked != case.turns or after["bad"]:
+        if asked != case.turns * case.few or after["bad"]:
             raise SystemExit(f"{name}, {case.title}: {asked} requests, {after['bad']} of them bad.")
 
 
 def compare(case: Case, workers: dict[str, Worker], rounds: int) -> None:
     """Measure a case and print its table."""
-    names = [name for name in workers if case.peers or name in OURS]
-    spent: dict[str, list[float]] = {name: [] for name in names}
-    for name in names:
-        workers[name].cpu(case)  # warm
+    every = min(case.every, rounds - 1)
+    spent: dict[str, dict[int, float]] = {name: {} for name in workers}
+    for name in OURS:
+        workers[name].cpu(case, case.runs)  # warm
     for number in range(rounds):
+        names = [name for name in workers if name in OURS or number % every == 0]
         for name in names if number % 2 else reversed(names):
-            spent[name].append(workers[name].cpu(case, 1 if name in PEERS else None))
+            runs = case.few if name in PEERS else case.runs
+            spent[name][number] = workers[name].cpu(case, runs)
     print(f"\n{case.title} ({rounds} rounds)")  # noqa: T201
-    for name in names:
-        against_floor = _ratio(spent[name], spent["floor"])
-        line = f"  {name:14} {1e3 * statistics.median(spent[name]):7.2f} ms a turn"
-        line += f"  {_shown(against_floor)} x floor"
-        if name == "formup":
-            line += _verdict(against_floor[1] <= case.most, f"at most {case.most:.1f}")
-        if name in PEERS:
-            against_us = _ratio(spent[name], spent["formup"])
-            line += f"  {_shown(against_us)} x formup"
+    for name, times in spent.items():
+        print(_line(name, times, spent, case), flush=True)  # noqa: T201
+
+
+def _line(
+    name: str, times: dict[int, float], spent: dict[str, dict[int, float]], case: Case
+) -> str:
+    against_floor = _ratio(times, spent["floor"])
+    line = f"  {name:14} {1e3 * statistics.median(times.values()):7.2f} ms a turn"
+    line += f"  {_shown(against_floor)} x floor"
+    if name == "formup":
+        line += _verdict(against_floor[1] <= case.most, f"at most {case.most:.1f}")
+    if name in PEERS:
+        against_us = _ratio(times, spent["formup"])
+        line += f"  {_shown(against_us)} x formup"
+        if not case.at_once:
             line += _verdict(against_us[1] >= MUCH_LESS, f"at least {MUCH_LESS:.0f}")
-        print(line, flush=True)  # noqa: T201
+        line += f"  in {len(times)} rounds" if case.every > 1 else ""
+    return line
 
 
 def _counts(port: int) -> dict[str, int]:
@@ -136,9 +157,9 @@ def _counts(port: int) -> dict[str, int]:
         return json.load(response)
 
 
-def _ratio(ours: list[float], theirs: list[float]) -> tuple[float, float, float]:
+def _ratio(ours: dict[int, float], theirs: dict[int, float]) -> tuple[float, float, float]:
     """Quartiles of the ratio, round by round."""
-    ratios = [a / b for a, b in zip(ours, theirs, strict=True)]
+    ratios = [seconds / theirs[number] for number, seconds in ours.items()]
     low, middle, high = statistics.quantiles(ratios, n=4)
     return low, middle, high
 
@@ -155,6 +176,8 @@ def _verdict(met: bool, target: str) -> str:
 def main() -> None:
     """Compare all there is."""
     rounds, folder = int(sys.argv[1]), Path(sys.argv[2]).absolute()
+    if rounds < 2:
+        raise SystemExit(f"{rounds} rounds have no quartiles: ROUNDS must be 2 or more.")
     here = Path(sys.executable)
     pythons = dict.fromkeys(OURS, here) | {p: folder / p / "bin/python" for p in PEERS}
     with started(here, "server.py") as port, ExitStack() as stack:

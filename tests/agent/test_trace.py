@@ -277,3 +277,15 @@ def test_a_trace_that_cannot_be_written_is_refused_first(coins: Picture, tmp_pat
     with pytest.raises(InputError, match="cannot be written"):
         Agent(script).run(coins, "Go", trace=tmp_path / "no folder" / "t.jsonl")
     assert not script.requests
+
+
+def test_an_altered_plan_is_not_gone_on_with(coins: Picture, tmp_path: Path) -> None:
+    path = tmp_path / "trace.jsonl"
+    run(path, coins, policy=Policy((("deploy", "ask"),)))
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    for line in lines:
+        for plan in line.get("workspace", {}).get("plans", {}).values():
+            plan["formation"]["positions"][0][0] += 1
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    with pytest.raises(InputError, match="altered"):
+        load_run(path)
