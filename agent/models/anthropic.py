@@ -129,7 +129,7 @@ class _Assembly:
         # Read by hand: there are hundreds of these a reply. What they make up is validated whole.
         try:
             return self._take(event)
-        except (AttributeError, KeyError, TypeError, ValueError):  # ValidationErrors are these
+        except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
             raise foreign("a stream of something else than messages") from None
 
     def whole(self) -> Any:

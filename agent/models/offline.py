@@ -35,6 +35,8 @@ class OfflinePlanner:
             return _after_proposal(task, last, request.messages)
         if isinstance(last, Result) and last.name == "deploy":
             return Reply(text=_after_deploy(task, last, request.messages))
+        if isinstance(last, Result) and last.error:
+            return Reply(text=_left_off(last, request.messages))
         return _begin(task, request.messages)
 
 
@@ -63,6 +65,14 @@ def _begin(task: Task, history: History) -> Reply:
     group = _group(reading, robots, ids[:things])
     arguments = {"contract": {"groups": [group]}, "targets": prompts}
     return _call(history, "propose_formation", arguments)
+
+
+def _left_off(result: Result, history: History) -> str:
+    """What there is to say when a call was refused or took too long: what it was about, and why."""
+    calls = [c for m in history if isinstance(m, Reply) for c in m.calls]
+    meant = next(c.arguments for c in calls if c.id == result.call_id)
+    said = meant.get("question") or meant.get("reason") or "The thing meant was not looked for."
+    return f"{said} {result.text}"
 
 
 def _spoken_answers(history: History) -> list[str]:

@@ -101,7 +101,7 @@ class Transport:
             try:
                 pool = httpx.AsyncHTTPTransport(verify=_tls(), proxy=proxy)
             except (ValueError, ImportError, httpx.InvalidURL):
-                raise _no_proxy() from None
+                raise _bad_proxy() from None
             self._pools[loop] = pool
         return pool
 
@@ -241,7 +241,7 @@ def _dropped() -> AskError:
     return AskError("dropped the connection before its reply was complete", "try again", "later")
 
 
-def _no_proxy() -> AskError:
+def _bad_proxy() -> AskError:
     """What the environment names is no proxy; it is not repeated: it may hold a password."""
     advice = "name one such as http://127.0.0.1:3128 (SOCKS needs the package socksio)"
     return AskError("cannot be asked through the proxy that the environment names", advice)

@@ -16,6 +16,8 @@ T = TypeVar("T")
 UNREADABLE = "this is not a JSON object"
 """The argument under which a model gets back what it wrote in place of its arguments. No tool has
 such a parameter, so the call fails and says so, and what is sent on to servers is valid JSON."""
+MOST_TOKENS = 10**12
+"""No request counts so many; a server that says so does not know."""
 _JPEG = b"\xff\xd8"
 
 
@@ -163,4 +165,4 @@ def count(usage: object, *path: str) -> int:
     value = usage
     for name in path:
         value = cast("dict[str, Any]", value).get(name) if isinstance(value, dict) else None
-    return value if isinstance(value, int) and value > 0 else 0
+    return value if isinstance(value, int) and 0 < value < MOST_TOKENS else 0

@@ -121,3 +121,28 @@ def test_an_agent_says_yes_no_and_why() -> None:
     assert (result.error, result.text) == ("refused", "A person said no: too many")
     with pytest.raises(InputError, match="is over"):
         second.resume(no)
+
+
+@pytest.mark.parametrize(
+    ("refused", "words", "status"),
+    [
+        ("locate_object", "not looked for", "impossible"),
+        ("propose_formation", "propose_formation may not be called", "impossible"),
+        ("deploy", "deploy may not be called", "planned"),
+        ("*", "not looked for", "impossible"),
+    ],
+)
+def test_the_rules_do_without_what_is_refused(refused: str, words: str, status: str) -> None:
+    pixels = np.full((140, 200, 3), 60, np.uint8)
+    pixels[40:90, 60:120] = (200, 40, 40)
+    agent = Agent(policy=Policy(((refused, "refuse"),)))
+    done = agent.run(picture_from_array(pixels), "Surround the red thing with 6 robots")
+    assert done.report.status == status
+    assert words in done.report.message
+
+
+def test_the_rules_take_no_refusal_for_an_answer() -> None:
+    done = Agent(policy=Policy((("ask_user", "refuse"),))).run(PICTURE, "Surround it")
+    assert isinstance(done.outcome, Answered)
+    assert "How many robots?" in done.report.message
+    assert "ask_user may not be called" in done.report.message

@@ -1,8 +1,10 @@
 """Streams of anything: fragments are read by hand, so whatever comes must end as an AskError."""
 
+from collections.abc import Iterator
 from contextlib import suppress
 from itertools import pairwise
-from typing import Any
+from math import inf, nan
+from typing import Any, cast
 
 import pytest
 from formup.agent.messages import User
@@ -55,6 +57,37 @@ def test_any_stream_is_a_reply_or_an_ask_error(wire: Any, events: list[Any]) -> 
         for event in events:
             assert isinstance(assembly.add(event), str)
         reading.reply(assembly.whole())
+
+
+ODD = [None, True, 0, -1, 2.5, inf, -inf, nan, 10**400, "", "x", [], [1], [None], {}, {"x": 1}]
+SPOKEN = dict(zip(("openai", "openai-responses", "anthropic", "gemini"), WIRES, strict=True))
+
+
+def places(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Everywhere within a value: what holds something, and under which key."""
+    if isinstance(value, dict | list):
+        held = cast("dict[Any, Any] | list[Any]", value)
+        for key in held if isinstance(held, dict) else range(len(held)):
+            yield held, key
+            yield from places(held[key])
+
+
+@pytest.mark.parametrize("odd", ODD, ids=lambda odd: repr(odd)[:9])
+def test_one_odd_value_anywhere_is_a_reply_or_an_ask_error(dialect: Any, odd: Any) -> None:
+    said = ("Look.", [("c1", "view", {"x": 1})], "calls")
+    events: list[Any] = [e for e in dialect.events(*said) if isinstance(e, dict)]
+    body: Any = dialect.body(*said)
+    for holder, key in [*places(events), *places(body)]:
+        kept, holder[key] = holder[key], odd
+        reading = SPOKEN[dialect.name]("m", UNKNOWN).reading(REQUEST)
+        assembly = reading.assembly()
+        with suppress(AskError):
+            reading.reply(body)
+        with suppress(AskError):
+            for event in events:
+                assembly.add(event)
+            reading.reply(assembly.whole())
+        holder[key] = kept
 
 
 @pytest.mark.parametrize("wire", WIRES)
