@@ -112,7 +112,9 @@ async def _in_thread(work: Callable[[], Any]) -> Any:
         try:
             value = work()
         except BaseException as raised:
-            error = raised
+            # No future takes a StopIteration, and a tool's sys.exit() is not the program's.
+            plain = isinstance(raised, Exception) and not isinstance(raised, StopIteration)
+            error = raised if plain else RuntimeError(repr(raised))
         with suppress(RuntimeError):  # the loop has been closed: nobody waits any more
             loop.call_soon_threadsafe(settle, value, error)
 

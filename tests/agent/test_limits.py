@@ -321,3 +321,16 @@ def test_data_alone_is_an_answer() -> None:
     outcome = go(ScriptedModel([call("wind"), Reply(text="x")]), wind)
     assert isinstance(outcome.messages[2], Result)
     assert outcome.messages[2].text == '{"wind":3}'
+
+
+@pytest.mark.parametrize("raised", [StopIteration("x"), SystemExit(3), KeyboardInterrupt()])
+def test_what_a_tool_raises_ends_the_run_and_not_the_program(raised: BaseException) -> None:
+    @tool("read")
+    def leave(workspace: Workspace) -> ToolResult:
+        """Raise what no tool should."""
+        raise raised
+
+    outcome = go(ScriptedModel([call("leave")]), leave)
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "tool"
+    assert repr(raised) in outcome.reason
