@@ -71,7 +71,8 @@ def of_error_body(data: object, key_advice: str) -> AskError | None:
     if not isinstance(data, dict) or not cast("dict[str, Any]", data).get("error"):
         return None
     message, code = _said(cast("dict[str, Any]", data))
-    status = int(code) if code.isascii() and code.isdecimal() else _STATUS_OF.get(code, 500)
+    is_status = len(code) == 3 and code.isascii() and code.isdecimal()
+    status = int(code) if is_status else _STATUS_OF.get(code, 500)
     return _failure("answered with an error", status, message, code, key_advice, None)
 
 

@@ -148,6 +148,8 @@ def test_an_error_under_status_200(server: Any, dialect: Any, http: Any) -> None
     failed(go(server.model(dialect.name)), "error (full)", "tried 4 times")
     server.script = [http.response({"error": {"message": "upstream", "code": 502}})] * 2
     failed(go(server.model(dialect.name)), "error (upstream)", "tried 2 times")
+    server.script = [http.response({"error": {"message": "odd", "code": "9" * 5_000}})] * 2
+    failed(go(server.model(dialect.name)), "error (odd)", "tried 2 times")
 
 
 def test_an_error_within_a_stream(server: Any, dialect: Any, http: Any) -> None:
