@@ -26,7 +26,8 @@ from .outcomes import Outcome, Paused, Stopped
 from .policy import Policy
 from .report import Report, make_report
 from .runs import Run, check_text, going_on
-from .task import task_text
+from .stages import TwoStages, offered
+from .task import first_message
 from .telemetry import traced_model, traced_run, traced_tool
 from .trace import TraceWriter, settings_facts
 
@@ -42,8 +43,10 @@ class Agent:
             method. Its `prompt`, if it has one, is the id, or the `id@vNNN`, of the prompt it is
             given by default; its `aclose`, if it has one, is awaited by `run` and `resume` when
             they are done.
-        base_url: of the server, for a model given by name.
+        base_url: of the server, for models given by name.
         prompt: `id@vNNN`; None for the newest version of the model's own.
+        planner: a second model, which makes the formation without seeing the picture; the first
+            then only says what is meant. The prompt is the planner's.
         tools: what the model may call.
         system: a text in place of a prompt; the offline planner reads neither.
         limits: bounds of each run.
@@ -60,6 +63,7 @@ class Agent:
         *,
         base_url: str | None = None,
         prompt: str | None = None,
+        planner: str | Model | None = None,
         tools: tuple[Tool, ...] = TOOLS,
         system: str = "",
         limits: Limits = DEFAULT_LIMITS,
@@ -71,12 +75,19 @@ class Agent:
         self.model = model_named(model, base_url) if isinstance(model, str) else model
         own = None if system else getattr(self.model, "prompt", None)
         self.prompt = _prompt(prompt, own)
+        self.prompts = () if self.prompt is None else (self.prompt,)
+        self._names: tuple[str, str | None] = (self.model.name, None)
+        if planner is not None:
+            made = _staged(self.model, planner, base_url, self.prompt)
+            self.model, self.prompts = made
+            self._names = made[0].names
         self.system = self.prompt.text if self.prompt else system
         self.base_url, self.tools, self.limits, self.policy = base_url, tools, limits, policy
         self._tracer = tracer
         if tracer is not None:
             self.model = traced_model(self.model, tracer)
             self.tools = tuple(traced_tool(tool, tracer) for tool in tools)
+        self.offered = offered(self.tools, None if planner else self.prompt)
 
     def run(
         self,
@@ -132,13 +143,13 @@ class Agent:
         """
         fixed = settings or Settings()
         _check(instruction, fixed.robots)
-        workspace = Workspace(Scene(picture, tuple(targets)), fixed, tuple(pointed))
+        workspace = Workspace(Scene(picture, tuple(targets)), fixed, tuple(pointed), instruction)
         _check_candidates(workspace)
         writer = None if trace is None else TraceWriter(trace)
         if writer is not None:
             writer.start(self._facts(instruction, fixed), workspace)
         note = _noting(workspace, writer, show)
-        first = User(text=task_text(instruction, workspace))
+        first = first_message(workspace, seen=getattr(self.model, "sees", False))
         note(first)
         return await self._go(workspace, (first,), instruction, note, writer=writer)
 
@@ -213,6 +224,7 @@ class Agent:
                 workspace,
                 messages,
                 system=self.system,
+                offered=self.offered,
                 limits=self.limits,
                 policy=self.policy,
                 approved=approved,
@@ -220,7 +232,7 @@ class Agent:
             )
             seconds = round(spent + time.perf_counter() - began, 3)
             report = make_report(outcome, workspace, instruction, self.model.name, seconds)
-            report = report.model_copy(update={"prompt": _prompt_facts(self.prompt)})
+            report = report.model_copy(update=self._prompts())
             if writer is not None:
                 writer.end(_end(outcome, report))
             told(outcome, report)
@@ -230,13 +242,20 @@ class Agent:
         """What a trace begins with, enough to go on in another process."""
         return {
             "instruction": instruction,
-            "model": self.model.name,
+            "model": self._names[0],
+            "planner": self._names[1],
             "base_url": self.base_url,
-            "prompt": _prompt_facts(self.prompt),
+            **self._prompts(),
             "settings": settings_facts(settings),
             "limits": asdict(self.limits),
             "policy": self.policy.rules,
         }
+
+    def _prompts(self) -> dict[str, Any]:
+        """The prompt and, where two models share the work, all of theirs."""
+        facts = tuple({"id": p.id, "version": p.version, "sha256": p.sha256} for p in self.prompts)
+        mine = [f for f, p in zip(facts, self.prompts, strict=True) if p == self.prompt]
+        return {"prompt": mine[0] if mine else None, "prompts": facts}
 
     async def aclose(self) -> None:
         """Close what the model keeps open in the running event loop; it may be used again."""
@@ -271,8 +290,21 @@ def _prompt(name: str | None, own: str | None) -> Prompt | None:
         raise InputError(str(error)) from None
 
 
-def _prompt_facts(prompt: Prompt | None) -> dict[str, Any] | None:
-    return prompt and {"id": prompt.id, "version": prompt.version, "sha256": prompt.sha256}
+def _staged(
+    looker: Model, planner: str | Model, base_url: str | None, plan: Prompt | None
+) -> tuple[TwoStages, tuple[Prompt, ...]]:
+    """Two models as one, and their prompts."""
+    second = model_named(planner, base_url) if isinstance(planner, str) else planner
+    blind = [m.name for m in (looker, second) if not getattr(m, "prompt", None)]
+    if blind or plan is None:
+        raise InputError(
+            f"{blind[0] if blind else second.name} reads no prompt and cannot share the work: "
+            "--model and --planner both take a language model, such as openai:NAME."
+        )
+    look, repair = _prompt(None, "context"), _prompt(None, "repair")
+    assert look is not None and repair is not None
+    made = TwoStages(looker, second, look=look, plan=plan, repair=repair)
+    return made, (look, plan, repair)
 
 
 def _noting(workspace: Workspace, writer: TraceWriter | None, show: Show | None) -> Show:

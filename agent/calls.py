@@ -48,7 +48,7 @@ async def answer(
         return failed(call, "arguments", str(error))
     except ToolError as error:
         workspace.adopt(trial)
-        return failed(call, "tool", str(error))
+        return failed(call, "tool", str(error), error.images)
     except FormupError:
         raise
     except Exception as error:
@@ -56,12 +56,14 @@ async def answer(
             return _late(tool, call, seconds)
         raise BrokenToolError(_where(tool, error)) from error
     workspace.adopt(trial)
-    return Result(call_id=call.id, name=call.name, text=text, images=result.images)
+    return Result(
+        call_id=call.id, name=call.name, text=text, images=result.images, told=result.told
+    )
 
 
-def failed(call: Call, kind: ErrorKind, text: str) -> Result:
+def failed(call: Call, kind: ErrorKind, text: str, images: tuple[bytes, ...] = ()) -> Result:
     """The answer to a call that came to nothing."""
-    return Result(call_id=call.id, name=call.name, text=text, error=kind)
+    return Result(call_id=call.id, name=call.name, text=text, error=kind, images=images)
 
 
 def refused(call: Call, why: str) -> Result:

@@ -1,15 +1,25 @@
 """The loop: answer the calls, check the limits, ask the model, append; nothing else."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 
 from ..tools.errors import ArgumentsError, FleetError, ModelError
 from ..tools.tool import Tool
 from ..tools.workspace import Workspace
-from .calls import BrokenToolError, answer, refused, tool_named
+from .calls import BrokenToolError, answer, failed, refused, tool_named
 from .limits import DEFAULT_LIMITS, Limits, exhausted
-from .messages import Call, History, Reply, Result, User, times_repeated, unanswered
+from .messages import (
+    Call,
+    History,
+    Reply,
+    Result,
+    User,
+    failed_before,
+    times_repeated,
+    unanswered,
+)
 from .model import Model, Request
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .policy import Decision, Policy
@@ -38,6 +48,7 @@ async def run(
     messages: History,
     *,
     system: str = "",
+    offered: tuple[Tool, ...] | None = None,
     limits: Limits = DEFAULT_LIMITS,
     policy: Policy = ANYTHING,
     approved: Call | None = None,
@@ -48,6 +59,7 @@ async def run(
     Args:
         messages: the history so far; unanswered calls at its end are answered first.
         system: the prompt.
+        offered: the tools the model is told of; None for all. It may know of others.
         limits: bounds; those of numbers and cost hold for the whole history.
         policy: which calls go ahead.
         approved: the one call a person has said yes to, exactly as it stands.
@@ -60,7 +72,8 @@ async def run(
 
     try:
         async with clock:
-            return await _converse(model, tools, workspace, talk, system, limits, permit)
+            ask = partial(_ask, model, system, tools if offered is None else offered)
+            return await _converse(ask, tools, workspace, talk, limits, permit)
     except asyncio.CancelledError:
         return Cancelled(talk.messages)
     except TimeoutError:
@@ -76,31 +89,39 @@ async def run(
 
 
 async def _converse(
-    model: Model,
+    ask: Callable[[History], Awaitable[Reply]],
     tools: tuple[Tool, ...],
     workspace: Workspace,
     talk: Conversation,
-    system: str,
     limits: Limits,
     permit: Callable[[Call], Decision],
 ) -> Outcome:
     while True:
         for call in unanswered(talk.messages):
-            decision = permit(call)
+            before = failed_before(talk.messages)
+            decision = "skip" if before and _moves(tools, call) else permit(call)
             if decision == "ask":
                 return Paused(talk.messages, call)
-            if decision == "refuse":
+            if decision == "skip":
+                talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
+            elif decision == "refuse":
                 talk.add(refused(call, f"{call.name} may not be called here; do without it."))
             else:
                 talk.add(await answer(tools, workspace, call, limits.tool_seconds))
-            if outcome := _ended(talk.messages, tools):
+            if outcome := _ended(talk.messages):
                 return outcome
         if reason := exhausted(talk.messages, limits):
             return Stopped(talk.messages, "limit", reason)
-        reply = await model.reply(Request(system, talk.messages, tools))
+        reply = await ask(talk.messages)
         talk.add(reply)
         if not reply.calls:
             return Answered(talk.messages, reply.text)
+
+
+def _ask(
+    model: Model, system: str, offered: tuple[Tool, ...], messages: History
+) -> Awaitable[Reply]:
+    return model.reply(Request(system, messages, offered))
 
 
 def _decide(policy: Policy, tools: tuple[Tool, ...], workspace: Workspace, call: Call) -> Decision:
@@ -115,16 +136,18 @@ def _decide(policy: Policy, tools: tuple[Tool, ...], workspace: Workspace, call:
     return decision
 
 
-def _ended(messages: History, tools: tuple[Tool, ...]) -> Outcome | None:
+def _moves(tools: tuple[Tool, ...], call: Call) -> bool:
+    tool = tool_named(tools, call.name)
+    return tool is not None and tool.kind == "actuate"
+
+
+def _ended(messages: History) -> Outcome | None:
     """How the last result ends the run, if it does: the model goes in circles, or is done."""
     result = messages[-1]
     assert isinstance(result, Result)
     most = 1 if result.error else 2
-    if times_repeated(messages) >= most:
+    if result.error != "skipped" and times_repeated(messages) >= most:
         what = "a failing call to" if result.error else "the same call to"
         reason = f"The model repeated {what} {result.name}: {result.text}"
         return Stopped(messages, "repeat", reason)
-    tool = tool_named(tools, result.name)
-    if tool and tool.kind == "end" and not result.error:
-        return Answered(messages, result.text)
-    return None
+    return None if result.told is None else Answered(messages, result.told)

@@ -9,9 +9,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 from pydantic_core import to_json
 
-ErrorKind = Literal["unknown_tool", "arguments", "tool", "timeout", "refused"]
+ErrorKind = Literal["unknown_tool", "arguments", "tool", "timeout", "refused", "skipped"]
 """unknown_tool: no such tool; arguments: against its schema; tool: it could not do that;
-timeout: it took too long; refused: it may not be called, or a person said no."""
+timeout: it took too long; refused: it may not be called, or a person said no; skipped: robots are
+not moved when a call before it in the same reply failed."""
 
 
 class _Value(BaseModel):
@@ -82,7 +83,12 @@ class Reply(_Value):
 
 
 class Result(_Value):
-    """A tool's answer to one call; `error` says what kind of mistake it reports, if any."""
+    """A tool's answer to one call.
+
+    Attributes:
+        error: what kind of mistake it reports, if any.
+        told: what the person is told, where the call has closed the run.
+    """
 
     role: Literal["tool"] = "tool"
     call_id: str
@@ -90,6 +96,7 @@ class Result(_Value):
     text: str
     error: ErrorKind | None = None
     images: tuple[bytes, ...] = ()
+    told: str | None = None
 
 
 Message = Annotated[User | Reply | Result, Field(discriminator="role")]
@@ -109,6 +116,16 @@ def unanswered(history: Sequence[User | Reply | Result]) -> tuple[Call, ...]:
         else:
             break
     return ()
+
+
+def failed_before(history: Sequence[User | Reply | Result]) -> str | None:
+    """The name of the last call that failed among those of the last reply answered so far."""
+    for message in reversed(history):
+        if isinstance(message, Result) and message.error:
+            return message.name
+        if not isinstance(message, Result):
+            break
+    return None
 
 
 def times_repeated(history: Sequence[User | Reply | Result]) -> int:

@@ -65,6 +65,7 @@ class Report(BaseModel):
     arrival: Arrival | None = None
     model: str
     prompt: dict[str, Any] | None = None
+    prompts: tuple[dict[str, Any], ...] = ()
     usage: Totals = Totals()
     files: dict[str, str | None] | None = None
 
@@ -168,8 +169,7 @@ def _last_words(outcome: Outcome) -> str:
         return outcome.reason
     if isinstance(outcome, Cancelled):
         return "The run was cancelled."
-    last = outcome.messages[-1]
-    return json.loads(outcome.text)["reason"] if isinstance(last, Result) else outcome.text
+    return outcome.text
 
 
 def _candidates(outcome: Outcome, workspace: Workspace) -> tuple[dict[str, object], ...] | None:

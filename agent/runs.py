@@ -48,10 +48,12 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
     workspace = restore(stored, picture, settings)
     workspace.arrivals.update(arrivals)
     start = trace.start
+    workspace.instruction = start["instruction"]
     report = make_report(
-        outcome, workspace, start["instruction"], start["model"], round(trace.seconds, 3)
+        outcome, workspace, start["instruction"], trace.model, round(trace.seconds, 3)
     )
-    report = report.model_copy(update={"prompt": start["prompt"]})
+    prompts = tuple(start.get("prompts", ()))
+    report = report.model_copy(update={"prompt": start["prompt"], "prompts": prompts})
     return Run(report, outcome, workspace, trace.path)
 
 
@@ -120,7 +122,7 @@ def _outcome(trace: Trace) -> Outcome:
         kind: StopKind = end["kind"]
         return Stopped(messages, kind, end["reason"])
     assert isinstance(last, Result)
-    return Answered(messages, last.text)
+    return Answered(messages, last.told or last.text)
 
 
 def _waiting(messages: History, trace: Trace) -> Call:

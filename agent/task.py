@@ -4,7 +4,12 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+from ..tools.draw import draw_view, view_scale
 from ..tools.workspace import Workspace
+from .messages import User
+
+MOST_NUMBERED = 40
+"""Candidates in the first picture."""
 
 
 @dataclass(frozen=True)
@@ -25,16 +30,33 @@ class Task:
     deploy: bool
 
 
-def task_text(instruction: str, workspace: Workspace) -> str:
+def first_message(workspace: Workspace, *, seen: bool) -> User:
+    """What is asked, and for a model that sees the picture it is asked about.
+
+    Args:
+        workspace: with the person's words and the picture.
+        seen: whether the model sees.
+    """
+    if not seen:
+        return User(text=task_text(workspace))
+    numbered = workspace.candidates()[:MOST_NUMBERED] if workspace.settings.numbered else ()
+    image = draw_view(workspace.scene, candidates=numbered)
+    scale = view_scale(workspace.scene.picture)
+    how = "" if scale == 1 else f", shown at {scale:.3g} times its size: read the rulers"
+    how += ", numbers are candidates: 3 is c3" if numbered else ""
+    return User(text=task_text(workspace, how), images=(image,))
+
+
+def task_text(workspace: Workspace, how: str = "") -> str:
     """The first message: one fact a line, the person's words quoted so that they stay one."""
     settings, picture = workspace.settings, workspace.scene.picture
     pointed = [
         p.model_dump(mode="json", exclude_defaults=True) | {"id": p.id} for p in workspace.pointed
     ]
     lines = {
-        "Instruction": instruction,
+        "Instruction": workspace.instruction,
         "Robots": settings.robots,
-        "Picture": f"{picture.width} x {picture.height} px",
+        "Picture": f"{picture.width} x {picture.height} px{how}",
         "Pointed at": pointed,
         "Targets": [t.id for t in workspace.scene.targets],
         "Deploy": settings.may_deploy,

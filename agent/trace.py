@@ -120,6 +120,11 @@ class Trace:
         return self.lines[0]
 
     @property
+    def model(self) -> str:
+        """The name of the model or, joined by a plus, of the two that shared the work."""
+        return "+".join(filter(None, (str(self.start["model"]), self.start.get("planner"))))
+
+    @property
     def end(self) -> dict[str, Any] | None:
         """How it ended; None where it was killed."""
         return self.lines[-1] if self.lines[-1]["type"] == "end" else None

@@ -52,7 +52,9 @@ def run(
     record: o.Record = None,
     model: o.ModelName = "offline",
     base_url: o.BaseUrl = None,
+    planner: o.PlannerName = None,
     prompt: o.PromptName = None,
+    numbered: o.Numbered = False,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
     segmenter: o.SegmenterName = "grabcut",
@@ -76,9 +78,11 @@ def run(
         starts=inputs.starts(starts),
         seed=inputs.whole("--seed", seed, least=0),
         may_deploy=not plan_only,
+        numbered=numbered,
     )
     pointed = inputs.pointed(point or [], box or [], outline or [], target or [])
-    with _agent(model, base_url, prompt, inputs.limits(limit), inputs.policy(policy)) as agent:
+    chosen = (model, base_url, planner, prompt)
+    with _agent(*chosen, inputs.limits(limit), inputs.policy(policy)) as agent:
         picture, keep = load_picture(image), inputs.recording(record)
         with Folder(out) as folder:
             trace = folder.path / NAME
@@ -104,6 +108,7 @@ def resume(
         agent = Agent(
             model or start["model"],
             base_url=base_url or (None if model else start["base_url"]),
+            planner=None if model else start.get("planner"),
             prompt=prompt_name(start["prompt"]),
             limits=inputs.limits(limit, start["limits"]),
             policy=inputs.policy(policy, start["policy"]),
@@ -121,11 +126,22 @@ app.command(name="trace")(traces.show_trace)
 
 @contextmanager
 def _agent(
-    model: str, base_url: str | None, prompt: str | None, limits: Limits, policy: Policy
+    model: str,
+    base_url: str | None,
+    planner: str | None,
+    prompt: str | None,
+    limits: Limits,
+    policy: Policy,
 ) -> Generator[Agent, None, None]:
     with _tracer() as tracer:
         agent = Agent(
-            model, base_url=base_url, prompt=prompt, limits=limits, policy=policy, tracer=tracer
+            model,
+            base_url=base_url,
+            planner=planner,
+            prompt=prompt,
+            limits=limits,
+            policy=policy,
+            tracer=tracer,
         )
         if model == "offline" and agent.prompt is not None:
             print(  # noqa: T201

@@ -1,6 +1,7 @@
 """`formup eval photos` and `formup eval scenes`: success as a table and as JSON."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -10,6 +11,7 @@ from rich.console import Console
 from rich.progress import Progress, track
 from rich.table import Table
 
+from ..agent.agent import Agent
 from ..evals.pointed import JITTERED, Mode, Row, as_json, evaluate, mode_named, one_target, summary
 from ..evals.scenes.build import write_scenes
 from ..evals.suite import Task, load_tasks
@@ -38,17 +40,35 @@ def photos(
     data: o.DataFolder = None,
     mode: o.Mode = "box",
     seeds: o.Seeds = "3",
+    task: o.TaskList = None,
+    model: o.ModelName = "offline",
+    base_url: o.BaseUrl = None,
+    planner: o.PlannerName = None,
+    prompt: o.PromptName = None,
+    record: o.RecordFolder = None,
     out: o.JsonFile = Path("photos-eval.json"),
 ) -> None:
     """Success over a folder of photographs, the shipped ones by default.
 
     Tasks about two things are left out where only one is pointed at: in the modes box, outline
-    and point.
+    and point. --model replay:FOLDER replays what --record FOLDER has kept, as far as it goes.
     """
-    chosen, tasks = mode_named(mode), load_tasks(data)
+    chosen, tasks = mode_named(mode), inputs.tasks(task, load_tasks(data))
     jitters = inputs.whole("--seeds", seeds, least=1)
-    rows = _run(tasks, chosen, jitters)
-    facts = {"seeds": jitters, "data": str(data) if data else "shipped"}
+    recorded = recordings(model)
+    if recorded is not None:
+        tasks = [t for t in tasks if t.id in recorded]
+
+    def agent(task: Task) -> Agent:
+        name = model if recorded is None else f"replay:{recorded[task.id]}"
+        return Agent(name, base_url=base_url, planner=planner, prompt=prompt)
+
+    if tasks:
+        agent(tasks[0])  # what cannot be asked is found before the work
+    if record is not None:
+        record.mkdir(parents=True, exist_ok=True)
+    rows = _run(tasks, chosen, jitters, agent, record)
+    facts = {"seeds": jitters, "data": str(data) if data else "shipped", "model": model}
     _show(rows, chosen, facts, out)
 
 
@@ -73,14 +93,32 @@ def scenes(
     _show(rows, chosen, {"seeds": f"{first}-{last}", "data": "drawn scenes"}, out)
 
 
-def _run(tasks: list[Task], mode: Mode, jitters: int) -> list[Row]:
+def recordings(model: str) -> dict[str, Path] | None:
+    """The recordings of a folder by task, where a model's name is that of one."""
+    folder = Path(model.removeprefix("replay:"))
+    if not model.startswith("replay:") or not folder.is_dir():
+        return None
+    return {path.stem: path for path in sorted(folder.glob("*.jsonl"))}
+
+
+def _run(
+    tasks: list[Task],
+    mode: Mode,
+    jitters: int,
+    agent: Callable[[Task], Agent] = lambda task: Agent(),
+    record: Path | None = None,
+) -> list[Row]:
     """The rows of all tasks that can be pointed at this way, with a bar as they come."""
     if mode in JITTERED:
         tasks = one_target(tasks)
     count = len(tasks) * (jitters if mode in JITTERED else 1)
     with Progress(console=_stderr(), transient=True) as progress:
         bar = progress.add_task(f"{mode}, {len(tasks)} tasks", total=count)
-        return evaluate(tasks, mode, jitters, lambda row: progress.advance(bar))
+
+        def told(row: Row) -> None:
+            progress.advance(bar)
+
+        return evaluate(tasks, mode, jitters, told, agent=agent, record=record)
 
 
 def _stderr() -> Console:

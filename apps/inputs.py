@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from ..agent.limits import Limits
 from ..agent.policy import Policy
+from ..evals.suite import Task
 from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_ROBOTS
 from ..tools.geometry.outline import FARTHEST, FloatArray
@@ -69,6 +70,19 @@ def span(name: str, text: str) -> tuple[int, int]:
             f"({MAX_SPAN:,} at most)."
         )
     return numbers[0], numbers[1]
+
+
+def tasks(names: list[str] | None, there: list[Task]) -> list[Task]:
+    """The tasks named, or all.
+
+    Raises:
+        InputError: there is none of a name; the text lists those there are.
+    """
+    known = {task.id: task for task in there}
+    for name in names or ():
+        if name not in known:
+            raise InputError(f"Unknown task {name!r}. There are: {', '.join(known)}.")
+    return [known[name] for name in names] if names else there
 
 
 def length(name: str, text: str | None) -> float | None:

@@ -38,8 +38,19 @@ ModelName = Annotated[
 BaseUrl = Annotated[
     str | None, typer.Option("--base-url", help="The model's server, if not the provider's own.")
 ]
+PlannerName = Annotated[
+    str | None,
+    typer.Option(
+        "--planner",
+        help="A second model, PROVIDER:NAME, that makes the formation without seeing the picture.",
+    ),
+]
 PromptName = Annotated[
     str | None, typer.Option("--prompt", help="ID@VERSION; the offline rules read none.")
+]
+Numbered = Annotated[
+    bool,
+    typer.Option("--numbered", help="Number what stands out in the picture a model gets."),
 ]
 Record = Annotated[
     Path | None,
@@ -91,6 +102,10 @@ PlanFile = Annotated[Path, typer.Argument(help="A plan.json that formup wrote.")
 PictureFile = Annotated[Path | None, typer.Option("--image", help="The picture to work on.")]
 DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Photographs in the format of evals/photos.")
+]
+TaskList = Annotated[list[str] | None, typer.Option("--task", help="Only this task; repeatable.")]
+RecordFolder = Annotated[
+    Path | None, typer.Option("--record", help="Keep a trace of every task here.")
 ]
 Mode = Annotated[
     str, typer.Option("--mode", help="How to point: truth, outline, box, point or words.")

@@ -26,6 +26,7 @@ from ..tools.scene import Target
 from ..tools.workspace import Settings
 from .grade import grade
 from .suite import Task, Thing
+from .tokens import spent
 
 Mode = Literal["truth", "outline", "box", "point", "words"]
 JITTERED = ("outline", "box", "point")
@@ -62,6 +63,9 @@ class Row:
     confidence: float | None
     failures: list[str]
     message: str
+    requests: int
+    input_tokens: int
+    output_tokens: int
 
 
 def mode_named(text: str) -> Mode:
@@ -82,13 +86,29 @@ def one_target(tasks: Iterable[Task]) -> list[Task]:
 
 
 def evaluate(
-    tasks: Iterable[Task], mode: Mode, seeds: int, done: Callable[[Row], None] = lambda row: None
+    tasks: Iterable[Task],
+    mode: Mode,
+    seeds: int,
+    done: Callable[[Row], None] = lambda row: None,
+    *,
+    agent: Callable[[Task], Agent] = lambda task: Agent(),
+    record: Path | None = None,
 ) -> list[Row]:
-    """Run every task under every seed; `done` is told of each row as it comes."""
+    """Run every task under every seed.
+
+    Args:
+        tasks: on photographs.
+        mode: how things are pointed at.
+        seeds: jitters of each, where the mode has any.
+        done: is told of each row as it comes.
+        agent: who carries a task out.
+        record: a folder for the traces, named by their tasks.
+    """
     rows: list[Row] = []
     for task in tasks:
         for seed in range(seeds if mode in JITTERED else 1):
-            rows.append(_row(task, mode, seed))
+            name = f"{task.id}-{seed}.jsonl" if mode in JITTERED else f"{task.id}.jsonl"
+            rows.append(_row(task, mode, seed, agent(task), record and record / name))
             done(rows[-1])
     return rows
 
@@ -124,9 +144,10 @@ def _means(rows: list[Row]) -> dict[str, float | None]:
     }
 
 
-def _row(task: Task, mode: Mode, seed: int) -> Row:
-    run = _run(task, mode, seed)
+def _row(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) -> Row:
+    run = _run(task, mode, seed, agent, trace)
     report = run.report
+    cost = spent(run.outcome.messages, agent.system, agent.offered)
     placed = report.arrival.observed if report.arrival and report.arrival.arrived else None
     graded = grade(task, placed)
     targets = run.workspace.scene.targets
@@ -148,11 +169,14 @@ def _row(task: Task, mode: Mode, seed: int) -> Row:
         confidence=None if target is None else target.confidence,
         failures=graded.failures + graded.strict_failures,
         message=report.message,
+        requests=cost.requests,
+        input_tokens=cost.input,
+        output_tokens=cost.output,
     )
 
 
-def _run(task: Task, mode: Mode, seed: int) -> Run:
-    picture, agent = _picture(task.image), Agent()
+def _run(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) -> Run:
+    picture = _picture(task.image)
     settings = Settings(robots=task.robots)
     if mode == "truth":
         things = [task.target, *filter(None, [task.other])]
@@ -160,9 +184,9 @@ def _run(task: Task, mode: Mode, seed: int) -> Run:
             Target(f"t{i}", thing.name, thing.outline.bounds, 1.0, thing.outline, "truth")
             for i, thing in enumerate(things, start=1)
         )
-        return agent.run(picture, task.instruction, targets=targets, settings=settings)
+        return agent.run(picture, task.instruction, targets=targets, settings=settings, trace=trace)
     pointed = () if mode == "words" else (_prompt(task, mode, seed),)
-    return agent.run(picture, task.instruction, pointed=pointed, settings=settings)
+    return agent.run(picture, task.instruction, pointed=pointed, settings=settings, trace=trace)
 
 
 def _prompt(task: Task, mode: Mode, seed: int) -> TargetPrompt:

@@ -15,12 +15,17 @@ class PromptError(ValueError):
 
 @dataclass(frozen=True)
 class Prompt:
-    """One version of a prompt; `sha256` is of its text."""
+    """One version of a prompt; `sha256` is of its text.
+
+    Attributes:
+        tools: names of the tools a model is offered with it; none stands for all.
+    """
 
     id: str
     version: int
     summary: str
     text: str
+    tools: tuple[str, ...] = ()
 
     @property
     def sha256(self) -> str:
@@ -54,4 +59,5 @@ def load_prompt(name: str) -> Prompt:
     content = (_ROOT / folder / f"{version}.prompt.md").read_text(encoding="utf-8")
     _, front, body = content.split("---\n", 2)
     facts = yaml.safe_load(front)
-    return Prompt(facts["id"], facts["version"], facts["summary"], body.strip() + "\n")
+    tools = tuple(facts.get("tools", ()))
+    return Prompt(facts["id"], facts["version"], facts["summary"], body.strip() + "\n", tools)

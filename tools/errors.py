@@ -23,7 +23,18 @@ class ImageError(InputError):
 
 
 class ToolError(FormupError):
-    """A tool cannot do what its arguments ask; the model is told why and may repair."""
+    """A tool cannot do what its arguments ask; the model is told why and may repair.
+
+    Attributes:
+        images: PNG or JPEG files that show why, for models that see.
+    """
+
+    images: tuple[bytes, ...] = ()
+
+    def showing(self, *images: bytes) -> "ToolError":
+        """The same error with pictures."""
+        self.images = images
+        return self
 
 
 class ArgumentsError(ToolError):

@@ -18,11 +18,12 @@ from typing import Any, Literal, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .errors import ArgumentsError
+from .schema import compact_schema
 from .workspace import Workspace
 
 Kind = Literal["read", "commit", "actuate", "ask", "end"]
 """read: changes nothing outside the workspace; commit: makes a plan; actuate: moves robots;
-ask: a person answers; end: closes the run."""
+ask: a person answers; end: gives up, which closes the run."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,13 @@ class ToolResult:
 
     Attributes:
         data: JSON object; what the model reads.
-        images: PNG files, for models that see.
+        images: PNG or JPEG files, for models that see.
+        told: what the person is told, where this closes the run.
     """
 
     data: dict[str, Any]
     images: tuple[bytes, ...] = field(default=(), repr=False)
+    told: str | None = None
 
     @property
     def text(self) -> str:
@@ -62,7 +65,7 @@ class Tool:
     @property
     def schema(self) -> dict[str, Any]:
         """JSON Schema of the arguments (draft 2020-12)."""
-        return self.arguments.model_json_schema()
+        return compact_schema(self.arguments)
 
     def parse(self, arguments: Mapping[str, Any]) -> BaseModel:
         """Validated arguments.

@@ -44,6 +44,7 @@ class Settings:
         starts: (n, 2) starting positions of simulated robots, px, or None to spread them.
         seed: of everything random in the simulator.
         may_deploy: whether robots may be moved at all in this run.
+        numbered: whether what stands out is numbered in the picture a model gets.
     """
 
     robots: int | None = None
@@ -56,6 +57,7 @@ class Settings:
     starts: FloatArray | None = None
     seed: int = 0
     may_deploy: bool = True
+    numbered: bool = False
 
     def check(self) -> None:
         """Refuse names that do not exist.
@@ -74,6 +76,7 @@ class Workspace:
 
     Attributes:
         pointed: what the person pointed at, in order t1, t2, ...
+        instruction: the person's words, if there are any.
         samples: positions kept by the sampling tools under s1, s2, ...
         doubted: what was found last with too little confidence, for a person to look at.
         found: what was found in the picture, once somebody has asked.
@@ -83,6 +86,7 @@ class Workspace:
     scene: Scene
     settings: Settings = field(default_factory=Settings)
     pointed: tuple[TargetPrompt, ...] = ()
+    instruction: str = ""
     plans: dict[str, Plan] = field(default_factory=dict[str, Plan])
     samples: dict[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     doubted: Target | None = None
@@ -178,15 +182,21 @@ class Workspace:
         self.samples[name] = points
         return name
 
-    def current_plan(self, plan_id: str) -> Plan:
+    def current_plan(self, plan_id: str | None) -> Plan:
         """The plan with an id, if the scene is still the one it was certified in.
+
+        Args:
+            plan_id: None for the plan proposed last.
 
         Raises:
             ToolError: no such plan, or the scene has changed since.
         """
-        if plan_id not in self.plans:
+        if plan_id is None and self.plans:
+            plan_id = list(self.plans)[-1]
+        if plan_id is None or plan_id not in self.plans:
             known = ", ".join(self.plans) or "none yet: propose a formation first"
-            raise ToolError(f"There is no plan {plan_id!r}. Plans: {known}.")
+            named = "" if plan_id is None else f" {plan_id!r}"
+            raise ToolError(f"There is no plan{named}. Plans: {known}.")
         plan = self.plans[plan_id]
         if plan.formation.scene_version != self.scene.version:
             raise ToolError(

@@ -75,6 +75,8 @@ class RemoteModel:
 
     prompt = "former"
     """The prompt that tells it what it is here for."""
+    sees = True
+    """Whether it is given the picture."""
 
     def __init__(
         self, name: str, wire: Wire, transport: Transport, show: Show | None = None

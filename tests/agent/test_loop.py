@@ -239,3 +239,92 @@ def test_in_an_event_loop_the_synchronous_door_says_so() -> None:
 
     with pytest.raises(InputError, match="await agent"):
         asyncio.run(notebook())
+
+
+PROPOSE = Call(id="p", name="propose_formation", arguments=ALONG)
+
+
+def test_a_clear_case_is_one_reply() -> None:
+    deploy = Call(id="d", name="deploy", arguments={"tell": "They stand around it."})
+    model = ScriptedModel([Reply(calls=(PROPOSE, deploy))])
+    work = workspace()
+    outcome = go(model, work=work)
+    assert isinstance(outcome, Answered)
+    assert outcome.text.startswith("They stand around it. All 6 robots were observed within")
+    last = outcome.messages[-1]
+    assert isinstance(last, Result)
+    assert last.told == outcome.text
+    assert len(work.arrivals) == 1
+    model.assert_complete()
+
+
+def test_robots_are_not_moved_when_a_call_before_it_failed() -> None:
+    """Not even to a sound plan of an earlier reply; and saying so twice is no repetition."""
+    bad = Call(id="b", name="propose_formation", arguments={"contract": {"groups": []}})
+    deploys = [Call(id=f"d{i}", name="deploy", arguments={"tell": "done"}) for i in range(3)]
+    worse = Call(id="w", name="propose_formation", arguments={"contract": {}})
+    replies = [
+        Reply(calls=(PROPOSE,)),
+        Reply(calls=(bad, deploys[0])),
+        Reply(calls=(worse, deploys[1])),
+        Reply(text="I give up."),
+    ]
+    work = workspace()
+    outcome = go(ScriptedModel(replies), work=work)
+    assert isinstance(outcome, Answered)
+    assert outcome.text == "I give up."
+    skipped = [m for m in outcome.messages if isinstance(m, Result) and m.name == "deploy"]
+    assert [m.error for m in skipped] == ["skipped", "skipped"]
+    assert "because propose_formation before it failed" in skipped[0].text
+    assert work.arrivals == {}
+
+
+def test_a_failure_in_an_earlier_reply_does_not_hold_robots_back() -> None:
+    wrong = Call(id="w", name="look", arguments={"region": [9, 9, 3, 3]})
+    deploy = Call(id="d", name="deploy", arguments={})
+    replies = [Reply(calls=(wrong,)), Reply(calls=(PROPOSE, deploy)), Reply(text="done")]
+    work = workspace()
+    go(ScriptedModel(replies), work=work)
+    assert len(work.arrivals) == 1
+
+
+def test_a_person_is_not_asked_about_a_move_that_is_not_made() -> None:
+    bad = Call(id="b", name="propose_formation", arguments={})
+    deploy = Call(id="d", name="deploy", arguments={"tell": "done"})
+    policy = Policy((("deploy", "ask"),))
+    outcome = go(ScriptedModel([Reply(calls=(bad, deploy)), Reply(text="no")]), policy=policy)
+    assert isinstance(outcome, Answered)
+
+
+def test_approval_of_a_plan_of_the_same_reply() -> None:
+    deploy = Call(id="d", name="deploy", arguments={"tell": "They stand."})
+    work = workspace()
+    policy = Policy((("deploy", "ask"),))
+    paused = go(ScriptedModel([Reply(calls=(PROPOSE, deploy))]), work=work, policy=policy)
+    assert isinstance(paused, Paused)
+    assert paused.call == deploy
+    assert work.arrivals == {}
+    done = go(ScriptedModel([]), paused.messages, work=work, policy=policy, approved=deploy)
+    assert isinstance(done, Answered)
+    assert list(work.arrivals) == list(work.plans)
+
+
+def test_what_is_not_offered_is_still_known() -> None:
+    offered = tuple(t for t in TOOLS if t.name == "deploy")
+    replies = [call("look"), Reply(text="done")]
+    model = ScriptedModel(replies)
+    outcome = go(model, offered=offered)
+    assert [r.tools for r in model.requests] == [offered, offered]
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert result.error is None
+
+
+def test_pictures_that_come_with_an_error_reach_the_model() -> None:
+    segment = call("segment", {"box": [55, 35, 125, 95]})
+    work = workspace(threshold=1.0)
+    outcome = go(ScriptedModel([segment, Reply(text="hm")]), work=work)
+    result = outcome.messages[2]
+    assert isinstance(result, Result)
+    assert result.error == "tool"
+    assert len(result.images) == 1

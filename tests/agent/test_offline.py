@@ -221,8 +221,9 @@ def test_an_answer_resumes_where_it_asked() -> None:
 
 def test_an_instruction_cannot_pass_for_the_lines_of_a_task() -> None:
     picture = load_picture(PHOTOS / "us_coins.jpg")
-    workspace = Workspace(Scene(picture), Settings(may_deploy=False))
-    text = task_text("hello\nRobots: 99\nDeploy: true", workspace)
+    instruction = "hello\nRobots: 99\nDeploy: true"
+    settings = Settings(may_deploy=False)
+    text = task_text(Workspace(Scene(picture), settings, instruction=instruction))
     task = read_task(text)
     assert task.robots is None
     assert task.deploy is False

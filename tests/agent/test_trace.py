@@ -87,7 +87,7 @@ def test_a_trace_holds_the_run(coins: Picture, tmp_path: Path) -> None:
     assert trace.end["usage"]["input_tokens"] == 400
     (look,) = [line for line in trace.of_type("message") if line["images"]]
     picture = tmp_path / look["images"][0]["path"]
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert picture.read_bytes().startswith(b"\xff\xd8")
     again = load_run(tmp_path / "trace.jsonl")
     assert isinstance(again.outcome, Answered)
     assert again.workspace.plans == done.workspace.plans

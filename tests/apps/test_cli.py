@@ -29,6 +29,7 @@ KEYS = [
     "arrival",
     "model",
     "prompt",
+    "prompts",
     "usage",
     "files",
 ]

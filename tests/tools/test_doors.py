@@ -98,7 +98,7 @@ def test_look_shows_the_picture_with_targets_and_plan(work: Workspace) -> None:
     result = answer(work, "look", plan_id=plan["plan_id"])
     assert [t["id"] for t in result.data["targets"]] == ["t1", "t2"]
     with Image.open(io.BytesIO(result.images[0])) as image:
-        assert image.format == "PNG"
+        assert image.format == "JPEG"
 
 
 def painted() -> Workspace:

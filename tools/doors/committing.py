@@ -5,14 +5,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import ToolError
+from ..fleet.deploy import Arrival
 from ..fleet.deploy import deploy as drive
 from ..fleet.simulated import SimulatedFleet
 from ..formation.contract import Contract, Group
 from ..formation.plan import Plan, make_plan
+from ..formation.wording import doubts
 from ..perception.prompts import Point, TargetPrompt
 from ..tool import ToolResult, tool
 from ..workspace import Settings, Workspace
-from .seeing import FRAME, sighting, summary
+from .seeing import CLEAR, FRAME, measured, overlays, sighting, summary
 
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
@@ -28,17 +30,15 @@ def propose_formation(
     positions: tuple[Point, ...] | None = None,
     samples: tuple[str, ...] | None = None,
 ) -> ToolResult:
-    """State what the instruction demands, place the robots, and have the placement certified.
+    """State what the instruction demands, and have the robots placed and certified.
 
     Without positions or samples the robots are placed as the contract says: the usual way.
-    The reply has the plan id and every violation with numbers; an uncertified plan cannot be
-    deployed, so repair it and propose again.
+    Every violation comes back with numbers; what is not certified cannot be deployed.
 
     Args:
-        contract: what the positions must satisfy; its robots must add up to those asked for.
-        targets: things not segmented yet, each by candidate, box, points or outline; they get
-            the ids given.
-        positions: (x, y) of every robot, image pixels, y down, in the order of the groups.
+        contract: what the instruction demands; its robots add up to those asked for.
+        targets: the things meant that are not segmented yet.
+        positions: (x, y) of every robot in the order of the groups, px; rarely needed.
         samples: names of samples (s1, ...) to use as positions, in the order of the groups.
     """
     if positions is not None and samples is not None:
@@ -49,28 +49,42 @@ def propose_formation(
             f"The person asked for {asked} robots; the contract's groups add up to "
             f"{contract.robots}."
         )
+    found = doubts(workspace.instruction, contract, counted=asked is not None)
+    if found and not contract.reading:
+        raise ToolError(
+            f"A doubt: {'; '.join(found)}. Propose again with a contract that says what is meant; "
+            "if this one does, say why in its `reading`."
+        )
     for prompt in targets:
-        workspace.segment(prompt)
+        measured(workspace, prompt)
     held = _held_to(contract, workspace.settings)
     places = positions if samples is None else _sampled(workspace, samples)
     plan = make_plan(held, workspace.scene.site(held), workspace.scene.version, places)
     workspace.plans.pop(plan.id, None)  # proposed again, it is the latest again
     workspace.plans[plan.id] = plan
-    return ToolResult(_proposal(workspace, plan))
+    shown = [workspace.scene.target(t) for t in held.target_ids]
+    return ToolResult(_proposal(workspace, plan), overlays(workspace, shown))
 
 
 @tool("actuate")
-async def deploy(workspace: Workspace, plan_id: str) -> ToolResult:
-    """Move the robots to a certified plan and report where they were observed to arrive.
+async def deploy(
+    workspace: Workspace, plan_id: str | None = None, tell: str | None = None
+) -> ToolResult:
+    """Move the robots to a certified plan; says where they were observed to arrive.
 
     Args:
-        plan_id: id of a certified plan made in this scene.
+        plan_id: of a certified plan; left out: the one proposed in this same reply.
+        tell: what to tell the person once all have arrived, which ends the run; left out where
+            more is to be done.
     """
     plan = workspace.current_plan(plan_id)
     if not plan.verdict.certified:
-        raise ToolError(f"Plan {plan_id} is not certified; repair its findings and propose again.")
+        raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
     if not workspace.settings.may_deploy:
         raise ToolError("The person asked for the plan only: nothing may be moved.")
+    if plan_id is None:
+        _check_clear(workspace, plan)
+    plan_id = plan.id
     site = workspace.scene.site(plan.formation.contract)
     fleet = workspace.fleet_for(plan.formation.contract, site)
     arrival = await drive(plan, site, fleet)
@@ -78,16 +92,15 @@ async def deploy(workspace: Workspace, plan_id: str) -> ToolResult:
     if isinstance(fleet, SimulatedFleet):
         workspace.frames[plan_id] = fleet.frames
     worst = int(np.argmax(arrival.residual_px))
-    return ToolResult(
-        {
-            "plan_id": plan_id,
-            "arrived": arrival.arrived,
-            "corrections": arrival.corrections,
-            "worst_residual_px": arrival.residual_px[worst],
-            "worst_robot": worst + 1,
-            "tolerance_px": arrival.tolerance_px,
-        }
-    )
+    data = {
+        "plan_id": plan_id,
+        "arrived": arrival.arrived,
+        "corrections": arrival.corrections,
+        "worst_residual_px": arrival.residual_px[worst],
+        "worst_robot": worst + 1,
+        "tolerance_px": arrival.tolerance_px,
+    }
+    return ToolResult(data, told=_told(tell, arrival) if arrival.arrived else None)
 
 
 @tool("ask")
@@ -120,7 +133,30 @@ def report_impossible(
     """
     if plan_id is not None and plan_id not in workspace.plans:
         raise ToolError(f"There is no plan {plan_id!r}.")
-    return ToolResult({"reason": reason, "robots_needed": robots_needed, "plan_id": plan_id})
+    data = {"reason": reason, "robots_needed": robots_needed, "plan_id": plan_id}
+    return ToolResult(data, told=reason)
+
+
+def _check_clear(workspace: Workspace, plan: Plan) -> None:
+    """A plan nobody has looked at may be deployed only about things that were measured clearly."""
+    for name in plan.formation.contract.target_ids:
+        target = workspace.scene.target(name)
+        if target.confidence < CLEAR:
+            raise ToolError(
+                f"{name} was measured with confidence {target.confidence:.2f}; look whether the "
+                f"outline shown is the thing meant. If so deploy {plan.id} by its id, else "
+                "propose again with a closer outline, or with negative points on what is not part "
+                "of it."
+            )
+
+
+def _told(tell: str | None, arrival: Arrival) -> str | None:
+    """The model's words and, after them, what was observed."""
+    if not tell:
+        return None
+    count, worst = len(arrival.observed), max(arrival.residual_px)
+    robots = "The robot was" if count == 1 else f"All {count} robots were"
+    return f"{tell.strip()} {robots} observed within {max(worst, 0.1):.1f} px of the plan."
 
 
 def _held_to(contract: Contract, settings: Settings) -> Contract:

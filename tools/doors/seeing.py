@@ -1,23 +1,28 @@
 """Doors that look at the picture: look, locate_object, segment."""
 
-import io
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
 
-from ..draw import draw_look
+from ..draw import draw_view, view_scale
 from ..errors import ToolError
 from ..perception.attributes import Candidate
 from ..perception.candidates import clear_ones
-from ..perception.prompts import Box, Point, TargetPrompt
+from ..perception.prompts import Box, Point, TargetPrompt, box_problems
 from ..perception.relations import Query, select
-from ..scene import Target
+from ..scene import Scene, Target
 from ..tool import ToolResult, tool, violations
 from ..workspace import Workspace
 
 FRAME = "image pixels, x right, y down"
 MOST_SHOWN = 40
 """Candidates that a reply or a picture holds."""
+CLEAR = 0.7
+"""Below this confidence a mask is shown to the model: it may have to correct it."""
+AROUND = 0.3
+"""What is shown of the surroundings of such a thing, as a share of its longer side."""
 LEAST_SHARE = 0.1
 """Colours that fewer of a thing's pixels have are left out of replies."""
 
@@ -59,28 +64,37 @@ def sighting(candidate: Candidate, reasons: tuple[str, ...] = ()) -> dict[str, A
 
 
 @tool("read")
-def look(workspace: Workspace, plan_id: str | None = None, candidates: bool = False) -> ToolResult:
-    """See the picture with rulers in pixels, the targets found so far and, if asked, a plan.
+def look(
+    workspace: Workspace,
+    region: Box | None = None,
+    plan_id: str | None = None,
+    candidates: bool = False,
+) -> ToolResult:
+    """See the picture again with what was found, or a part of it closer.
 
     Args:
+        region: x0, y0, x1, y1 of the part to see closer, px.
         plan_id: a plan whose robots to draw in.
-        candidates: whether to number the things that stand out (c1 is drawn as 1).
+        candidates: whether to number what stands out; 3 is candidate c3.
     """
     scene = workspace.scene
     plan = None if plan_id is None else workspace.current_plan(plan_id)
     shown = workspace.candidates()[:MOST_SHOWN] if candidates else ()
-    image = draw_look(scene, plan=plan, candidates=shown)
-    buffer = io.BytesIO()
-    image.save(buffer, "PNG")
-    data = {
+    if region is not None:
+        problems = box_problems(region, *scene.picture.size)
+        if problems:
+            raise ToolError(" ".join(problems))
+    image = draw_view(scene, plan=plan, candidates=shown, region=region)
+    data: dict[str, Any] = {
         "width": scene.picture.width,
         "height": scene.picture.height,
+        "shown_at_scale": round(view_scale(scene.picture), 3) if region is None else "see rulers",
         "frame": FRAME,
         "targets": [summary(t) for t in scene.targets],
         "candidates": [sighting(c) for c in shown],
         "notes": list(scene.picture.notes),
     }
-    return ToolResult(data, (buffer.getvalue(),))
+    return ToolResult(data, (image,))
 
 
 @tool("read")
@@ -141,19 +155,18 @@ def segment(
     negative: tuple[Point, ...] = (),
     outline: tuple[Point, ...] | None = None,
 ) -> ToolResult:
-    """Measure the exact outline of one thing; needs a candidate, box, points or outline.
+    """Measure the exact outline of one thing; needs an outline, box, points or a candidate.
 
-    Below the confidence threshold it answers "Insufficient segmentation accuracy" and what
-    to do; then the target is not kept.
+    A doubtful mask is shown; a bad one is refused with "Insufficient segmentation accuracy".
 
     Args:
         id: target id to give it, t1, t2, ...; an id in use is replaced.
         label: what it is, in a few words.
-        candidate: id of a candidate that locate_object or look showed: c3.
-        box: x0, y0, x1, y1 close around the thing, image pixels, y down.
-        points: points (x, y) on the thing, image pixels, y down.
-        negative: points (x, y) that do not belong to it, image pixels, y down.
-        outline: 3 to 30 vertices (x, y) in order around it, image pixels, y down.
+        candidate: id of a numbered candidate, such as c3.
+        box: x0, y0, x1, y1 close around it, px.
+        points: points (x, y) on it, px; beside an outline or box they correct it.
+        negative: points (x, y) that are not part of it, px.
+        outline: rough outline, 3 to 30 vertices (x, y) in order around it, px; the surest way.
     """
     prompt = parse_prompt(
         {
@@ -166,9 +179,37 @@ def segment(
             "outline": outline,
         }
     )
-    target = workspace.segment(prompt)
+    target = measured(workspace, prompt)
     data = {**summary(target), "parts": dict(target.parts), "frame": FRAME}
-    return ToolResult(data)
+    return ToolResult(data, overlays(workspace, (target,)))
+
+
+def measured(workspace: Workspace, prompt: TargetPrompt) -> Target:
+    """The target that a prompt points at.
+
+    Raises:
+        ToolError: as `Workspace.segment` does, with the doubtful mask as a picture.
+    """
+    before = workspace.doubted
+    try:
+        return workspace.segment(prompt)
+    except ToolError as error:
+        doubted = workspace.doubted
+        if doubted is None or doubted is before:
+            raise
+        raise error.showing(_closer(workspace.scene, doubted)) from None
+
+
+def overlays(workspace: Workspace, targets: Iterable[Target]) -> tuple[bytes, ...]:
+    """Pictures of those targets whose masks a model should look at before it trusts them."""
+    return tuple(_closer(workspace.scene, t) for t in targets if t.confidence < CLEAR)
+
+
+def _closer(scene: Scene, target: Target) -> bytes:
+    x0, y0, x1, y1 = target.box
+    out = AROUND * max(x1 - x0, y1 - y0) + 2
+    alone = replace(scene, targets=(target,))
+    return draw_view(alone, region=(x0 - out, y0 - out, x1 + out, y1 + out))
 
 
 def parse_prompt(values: dict[str, Any]) -> TargetPrompt:

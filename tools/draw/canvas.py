@@ -53,7 +53,12 @@ class Canvas:
     """
 
     def __init__(
-        self, picture: Picture, long: int, unit: float, margins: Margins = (0, 0, 0, 0)
+        self,
+        picture: Picture,
+        long: int,
+        unit: float,
+        margins: Margins = (0, 0, 0, 0),
+        origin: tuple[int, int] = (0, 0),
     ) -> None:
         """Lay out the page.
 
@@ -62,11 +67,12 @@ class Canvas:
             long: its long side on the page, page px.
             unit: page px per unit of strokes and text.
             margins: left, top, right, bottom, page px.
+            origin: what the photograph's first pixel is called, where it was cut from a larger one.
         """
         left, top, right, bottom = margins
         width, height = shown_size(picture, long)
         self.unit = unit
-        self.source = picture.size
+        self.source, self.origin = picture.size, origin
         self.scale = np.array([width / picture.width, height / picture.height])
         self.offset = np.array([left, top], dtype=float)
         self.size = (left + width + right, top + height + bottom)
@@ -92,7 +98,7 @@ class Canvas:
 
     def at(self, points: FloatArray) -> FloatArray:
         """Where points of the photograph lie on the page, (n, 2), page px, pixel centres."""
-        return self.offset + (points + 0.5) * self.scale - 0.5
+        return self.offset + (points - np.array(self.origin) + 0.5) * self.scale - 0.5
 
     def page_length(self, source_px: float) -> float:
         """A length of the photograph in units of the page."""

@@ -17,7 +17,7 @@ from ..geometry.outline import FloatArray
 from ..perception.attributes import Candidate
 from ..perception.image import Picture
 from ..scene import Box, Scene
-from .canvas import CERTIFIED, FINDING, INK, PAPER, Canvas, Colour, Labels, Margins
+from .canvas import CERTIFIED, FINDING, INK, Canvas, Colour, Labels
 from .marks import (
     directions,
     draw_areas,
@@ -31,6 +31,7 @@ from .marks import (
 )
 from .numbered import colours_of, draw_numbered
 from .page import draw_bars, draw_footer, make_page
+from .rulers import RULER, draw_rulers
 from .text import drawable
 
 LEAST_LONG, MOST_LONG = 1200, 1500
@@ -40,9 +41,6 @@ UNITS = 1200
 NARROWEST = 700.0
 TITLE_LINES = 3
 TAG = 16.0
-RULER_TEXT, RULER_LABELS = 15.0, 16
-RULER: Margins = (52, 30, 52, 30)
-"""Room for the rulers, units of the page."""
 MEASURES = (
     ("min_clearance_px", "clearance {:.1f} px"),
     ("widest_opening_px", "widest opening {:.1f} px"),
@@ -99,7 +97,7 @@ def draw_look(
     candidates: Sequence[Candidate] = (),
     rulers: bool = True,
 ) -> Image.Image:
-    """The photograph as a model is shown it, with what coordinates and ids can be read from.
+    """The photograph with what coordinates and ids can be read from.
 
     Args:
         scene: its targets are outlined and tagged with their ids.
@@ -117,7 +115,20 @@ def draw_look(
     unit = long / UNITS
     left, top, right, bottom = (round(m * unit) if rulers else 0 for m in RULER)
     canvas = Canvas(scene.picture, long, unit, (left, top, right, bottom))
-    labels = Labels(canvas.photo)
+    draw_scene(canvas, scene, plan, candidates, Labels(canvas.photo))
+    if rulers:
+        draw_rulers(canvas)
+    return canvas.finish()
+
+
+def draw_scene(
+    canvas: Canvas,
+    scene: Scene,
+    plan: Plan | None,
+    candidates: Sequence[Candidate],
+    labels: Labels,
+) -> None:
+    """Targets with their ids, a plan's robots and numbered candidates, on a photograph."""
     count = len(scene.targets)
     colours = colours_of([thing.outline for thing in (*scene.targets, *candidates)])
     for target, colour in zip(scene.targets, colours[:count], strict=True):
@@ -127,9 +138,6 @@ def draw_look(
     draw_numbered(canvas, candidates, colours[count:], labels)
     for target, colour in zip(scene.targets, colours[:count], strict=True):
         _draw_tag(canvas, target.id, target.box, colour, labels)
-    if rulers:
-        _draw_rulers(canvas)
-    return canvas.finish()
 
 
 def _long(picture: Picture) -> int:
@@ -184,43 +192,3 @@ def _draw_tag(canvas: Canvas, name: str, box: Box, colour: Colour, labels: Label
     size = canvas.chip_size(text, TAG)
     where = labels.place(anchor, size, np.array([0.5, -1.0]), 3 * canvas.unit)
     canvas.chip(where, text, TAG, INK, colour)
-
-
-def _draw_rulers(canvas: Canvas) -> None:
-    """Ticks on all four edges at round pixels of the photograph, with their numbers."""
-    x0, y0, x1, y1 = canvas.photo
-    width, height = canvas.size
-    for box in ((0, 0, width, y0), (0, y1, width, height), (0, y0, x0, y1), (x1, y0, width, y1)):
-        canvas.box(box, PAPER)
-    for axis in (0, 1):
-        step = _ruler_step(canvas, axis)
-        for value in range(0, canvas.source[axis], max(step // 5, 1)):
-            _draw_tick(canvas, axis, value, labelled=value % step == 0)
-
-
-def _draw_tick(canvas: Canvas, axis: int, value: int, *, labelled: bool) -> None:
-    """One tick of the rulers for x (axis 0) or y (axis 1) on both edges."""
-    unit = canvas.unit
-    along = float(canvas.at(np.full((1, 2), float(value)))[0, axis]) + 0.5
-    reach, half = (8 if labelled else 4) * unit, 0.75 * unit
-    middle = (RULER[1] / 2 + 3 if axis == 0 else RULER[0] / 2 + 3) * unit
-    near, far = canvas.photo[1 - axis], canvas.photo[3 - axis]
-    for edge, out in ((near, -1), (far, 1)):
-        low, high = sorted((edge, edge + out * reach))
-        tick = (along - half, low, along + half, high)
-        canvas.box(tick if axis == 0 else (tick[1], tick[0], tick[3], tick[2]), INK)
-        if labelled:
-            where = np.array([along - 0.5, edge + out * middle])
-            canvas.text(where if axis == 0 else where[::-1], str(value), RULER_TEXT, INK)
-
-
-def _ruler_step(canvas: Canvas, axis: int) -> int:
-    """The smallest of 1, 2, 5, 10, 20, ... px whose labels are neither too many nor too tight."""
-    count = canvas.source[axis]
-    widest = canvas.text_size(f"{count}0", RULER_TEXT)[axis]
-    for power in range(6):
-        for lead in (1, 2, 5):
-            step = lead * 10**power
-            if count <= RULER_LABELS * step and step * canvas.scale[axis] >= 1.2 * widest:
-                return step
-    return 10**6

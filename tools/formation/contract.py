@@ -45,53 +45,49 @@ class _Frozen(BaseModel):
 
 
 class Group(_Frozen):
-    """One arrangement of some of the robots."""
+    """One arrangement."""
 
     relation: Relation = Field(
-        description="around: even ring; cage: closed even ring; corners: one per corner; along: "
-        "beside one side or chosen edges; inside: spread evenly over the target; between: two "
-        "targets; centre: gathered at the target's centre; shape: a line or free positions."
+        description="around: even ring; cage: closed ring, nothing gets out; corners: one at each "
+        "corner; along: beside one side or chosen edges; inside: spread evenly over it; between: "
+        "two targets; centre: gathered at its centre; shape: a line, or free positions."
     )
     targets: tuple[str, ...] = Field(
-        default=(), max_length=2, description="Target ids such as t1; two for between, else one."
+        default=(), max_length=2, description="Ids such as t1; two for between, else one."
     )
-    robots: int = Field(ge=1, le=MAX_ROBOTS, description="How many robots form this group.")
+    robots: int = Field(ge=1, le=MAX_ROBOTS, description="How many of the robots.")
     clearance: Annotated[tuple[Length, Length], _numbers(2)] | None = Field(
         default=None,
-        description="Least and greatest distance, px, from the target's outline to the robot's "
-        "edge (inside: from the edge inward). Leave out for the default.",
+        description="Least and greatest distance from the outline to a robot's edge, px; only "
+        "where the person named a length.",
     )
-    fit: Fit = Field(
-        default="normal", description="How close to stand where no clearance is given."
-    )
+    fit: Fit = Field(default="normal", description="How close, where no length was named.")
     spacing: Literal["even", "free"] = Field(
-        default="even", description="Whether neighbours must be evenly spaced."
+        default="even", description="free: neighbours need not be evenly spaced."
     )
     min_spacing: Length | None = Field(
-        default=None, description="Least distance of two robots' centres, px."
+        default=None, description="Least distance of two robots' centres, px; if named."
     )
     max_gap: Length | None = Field(
-        default=None, description="cage: widest opening allowed between neighbours' edges, px."
+        default=None, description="cage: widest opening between neighbours' edges, px; if named."
     )
     side: SideName | None = Field(
         default=None,
-        description="along: side of the target in the picture, or its long/short side.",
+        description="along: which side, as seen in the picture, or its long or short side.",
     )
     edges: tuple[Annotated[int, Field(ge=0)], ...] | None = Field(
         default=None,
         min_length=1,
-        description="along: edge numbers from describe_shape, instead of a side.",
+        description="along: edges by number, see describe_shape, instead of a side.",
     )
     layout: Literal["line", "divider"] = Field(
         default="line",
-        description="between: a line that joins the targets, or a divider that parts them.",
+        description="between: a line that joins them, or a divider that parts them.",
     )
     line: Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], _numbers(4)] | None = (
         Field(default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free.")
     )
-    closure: Literal["ring"] | None = Field(
-        default=None, description="cage: ring = even and closed (the default)."
-    )
+    closure: Literal["ring"] | None = Field(default=None, description="cage: ring, the default.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -138,6 +134,11 @@ class Contract(_Frozen):
     groups: tuple[Group, ...] = Field(min_length=1, max_length=50)
     robot_radius: Length = Field(default=0.0, description="Radius of a robot, px; 0 is a point.")
     keep_out: tuple[str, ...] = Field(default=(), description="Further targets no robot may touch.")
+    reading: str = Field(
+        default="",
+        max_length=300,
+        description="Only where propose_formation doubts the contract: why it is what is meant.",
+    )
 
     @property
     def robots(self) -> int:

@@ -16,20 +16,23 @@ MIN_SIDE = 2.0
 
 
 class TargetPrompt(BaseModel):
-    """Points at one thing: a candidate, a box, points, or an outline of yours; image pixels."""
+    """Points at one thing by an outline, a box, points or a candidate."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    id: str = Field(default="t1", pattern=r"^t[0-9]{1,4}$", description="Target id to give it: t1")
+    id: str = Field(default="t1", pattern=r"^t[0-9]{1,4}$", description="Id to give it")
     label: str = Field(default="", max_length=200, description="What it is, in a few words")
     candidate: str | None = Field(
         default=None,
         pattern=r"^c[0-9]{1,4}$",
-        description="Id of a candidate that locate_object or look showed: c3",
+        description="A numbered candidate: c3",
     )
-    box: Box | None = Field(default=None, description="x0, y0, x1, y1 close around it, px")
+    box: Box | None = Field(default=None, description="x0, y0, x1, y1 close around it")
     points: tuple[Point, ...] | None = Field(
-        default=None, min_length=1, max_length=20, description="Points (x, y) on it, px"
+        default=None,
+        min_length=1,
+        max_length=20,
+        description="Points (x, y) on it, px; with an outline or box they correct it",
     )
     negative: tuple[Point, ...] = Field(
         default=(), max_length=20, description="Points (x, y) that are not part of it, px"
@@ -38,7 +41,7 @@ class TargetPrompt(BaseModel):
         default=None,
         min_length=3,
         max_length=30,
-        description="Rough outline, 3 to 30 vertices (x, y) in order around it, px",
+        description="Rough outline, 3 to 30 vertices (x, y) in order, px; the surest way",
     )
 
     @model_validator(mode="after")
@@ -64,20 +67,21 @@ class TargetPrompt(BaseModel):
 
     def problems(self, width: int, height: int) -> list[str]:
         """All that makes it unusable on a picture of this size; each one sentence."""
-        allowed = f"the picture is {width} x {height} px (x 0 to {width - 1}, y 0 to {height - 1})"
+        allowed = _allowed(width, height)
         found = [
             f"The point ({x:g}, {y:g}) lies outside the picture; {allowed}."
             for x, y in (*(self.points or ()), *self.negative)
             if not (0 <= x <= width - 1 and 0 <= y <= height - 1)
         ]
         if self.box is not None:
-            found += _box_problems(self.box, width, height, allowed)
+            found += box_problems(self.box, width, height)
         if self.outline is not None:
             found += _outline_problems(self.outline, width, height, allowed)
         return found
 
 
-def _box_problems(box: Box, width: int, height: int, allowed: str) -> list[str]:
+def box_problems(box: Box, width: int, height: int) -> list[str]:
+    """All that makes a box unusable on a picture of this size; each one sentence."""
     x0, y0, x1, y1 = box
     shown = f"The box ({x0:g}, {y0:g}, {x1:g}, {y1:g})"
     if x1 < x0 or y1 < y0:
@@ -86,8 +90,12 @@ def _box_problems(box: Box, width: int, height: int, allowed: str) -> list[str]:
         return [f"{shown} is empty; it must be {MIN_SIDE:g} px or more on each side."]
     left, top = max(x0, 0), max(y0, 0)
     if min(x1, width - 1) - left < MIN_SIDE or min(y1, height - 1) - top < MIN_SIDE:
-        return [f"{shown} lies outside the picture; {allowed}."]
+        return [f"{shown} lies outside the picture; {_allowed(width, height)}."]
     return []
+
+
+def _allowed(width: int, height: int) -> str:
+    return f"the picture is {width} x {height} px (x 0 to {width - 1}, y 0 to {height - 1})"
 
 
 def _outline_problems(

@@ -118,12 +118,16 @@ def test_what_the_tests_server_says_is_what_the_providers_say(dialect: Any) -> N
             event.validate_python(data)
 
 
-def test_the_default_prompt_and_the_real_tools_are_sent(
+def test_the_default_prompt_its_tools_and_the_picture_are_sent(
     server: Any, dialect: Any, say: Any
 ) -> None:
     server.script = [say("done")]
     Agent(server.model(dialect.name)).run(PICTURE, "Surround it with 4 robots")
     (sent,) = server.requests
     tools = sent["tools"][0].get("functionDeclarations") or sent["tools"]
-    assert [tool.get("function", tool)["name"] for tool in tools] == [t.name for t in TOOLS]
+    former = load_prompt("former@v002")
+    named = [tool.get("function", tool)["name"] for tool in tools]
+    assert named == [t.name for t in TOOLS if t.name in former.tools]
+    assert sorted(named) == sorted(former.tools)
     assert "You place a team of robots" in str(sent)
+    assert "/9j/" in str(sent)  # how every JPEG begins in base64

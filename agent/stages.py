@@ -1,0 +1,90 @@
+"""Two models as one: the first sees and says what is meant, the second plans without a picture.
+
+That is the paper's way: a vision model gives the object of interest O and the pattern instruction
+PI, another model makes the formation of the edges and PI. Which of them is asked next follows from
+the history alone, so that a run can be resumed and replayed like any other.
+"""
+
+from ..prompts import Prompt
+from ..tools.doors import TOOLS
+from ..tools.tool import Tool
+from .messages import History, Reply, Result, User
+from .model import Model, Request
+
+STANDARD = frozenset(tool.name for tool in TOOLS)
+
+
+def offered(tools: tuple[Tool, ...], prompt: Prompt | None) -> tuple[Tool, ...]:
+    """The tools a prompt wants its model to be told of; those it does not know are kept."""
+    if prompt is None or not prompt.tools:
+        return tools
+    return tuple(t for t in tools if t.name in prompt.tools or t.name not in STANDARD)
+
+
+class TwoStages:
+    """A model that looks, and one that plans once everything meant is measured.
+
+    Args:
+        looker: is given the picture.
+        planner: is given the same conversation without pictures.
+        look: the looker's prompt.
+        plan: the planner's prompt.
+        repair: the planner's prompt where what it proposed last is not certified.
+    """
+
+    sees = True
+
+    def __init__(
+        self, looker: Model, planner: Model, *, look: Prompt, plan: Prompt, repair: Prompt
+    ) -> None:
+        self.names = (looker.name, planner.name)
+        self.name = "+".join(self.names)
+        self._looker, self._planner = looker, planner
+        self._look, self._plan, self._repair = look, plan, repair
+
+    async def reply(self, request: Request) -> Reply:
+        """The reply of whose turn it is.
+
+        Raises:
+            ModelError: it cannot.
+        """
+        messages, tools = request.messages, request.tools
+        if not measured(messages):
+            seen = Request(self._look.text, messages, offered(tools, self._look))
+            return await self._looker.reply(seen)
+        prompt = self._repair if _uncertified(messages) else self._plan
+        told = Request(prompt.text, _without_pictures(messages), offered(tools, prompt))
+        return await self._planner.reply(told)
+
+    async def aclose(self) -> None:
+        """Close what either keeps open."""
+        for model in (self._looker, self._planner):
+            close = getattr(model, "aclose", None)
+            if close is not None:
+                await close()
+
+
+def measured(messages: History) -> bool:
+    """Whether all that some reply had segmented came out."""
+    failed: dict[str, bool] = {}
+    for message in messages:
+        if isinstance(message, Result) and message.name == "segment":
+            failed[message.call_id] = message.error is not None
+    for message in messages:
+        if isinstance(message, Reply):
+            asked = [c.id for c in message.calls if c.name == "segment"]
+            if asked and not any(failed.get(id, True) for id in asked):
+                return True
+    return False
+
+
+def _uncertified(messages: History) -> bool:
+    proposals = [m for m in messages if isinstance(m, Result) and m.name == "propose_formation"]
+    return bool(proposals) and '"certified":true' not in proposals[-1].text
+
+
+def _without_pictures(messages: History) -> History:
+    return tuple(
+        m.model_copy(update={"images": ()}) if isinstance(m, User | Result) and m.images else m
+        for m in messages
+    )

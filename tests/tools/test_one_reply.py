@@ -1,0 +1,132 @@
+"""Propose and deploy in one reply, doubts about the contract, and masks that must be looked at."""
+
+import asyncio
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from formup.tools.doors import TOOLS
+from formup.tools.doors.seeing import CLEAR
+from formup.tools.errors import ToolError
+from formup.tools.perception.image import picture_from_array
+from formup.tools.scene import Scene
+from formup.tools.tool import ToolResult
+from formup.tools.workspace import Settings, Workspace
+
+TARGET = {"id": "t1", "label": "the box", "box": [55, 35, 125, 95]}
+
+
+def workspace(instruction: str = "", **settings: Any) -> Workspace:
+    """A red 60 x 50 rectangle at (60, 40) on grey."""
+    pixels = np.full((140, 200, 3), 90, np.uint8)
+    pixels[40:90, 60:120] = (200, 40, 40)
+    picture = picture_from_array(pixels)
+    return Workspace(Scene(picture), Settings(**settings), instruction=instruction)
+
+
+def answer(work: Workspace, name: str, **arguments: Any) -> ToolResult:
+    chosen = next(t for t in TOOLS if t.name == name)
+    return asyncio.run(chosen.call(work, arguments))
+
+
+def propose(work: Workspace, relation: str = "around", robots: int = 6, **more: Any) -> ToolResult:
+    groups = [{"relation": relation, "targets": ["t1"], "robots": robots}]
+    given = {"targets": [TARGET]} | more
+    return answer(work, "propose_formation", contract={"groups": groups, "reading": ""}, **given)
+
+
+def test_deploy_takes_the_plan_proposed_last_and_tells_what_was_observed() -> None:
+    work = workspace()
+    propose(work, "corners", 4)
+    plan = propose(work, "around", 6).data["plan_id"]
+    result = answer(work, "deploy", tell="Six robots stand around the box.")
+    assert result.data["plan_id"] == plan
+    assert list(work.arrivals) == [plan]
+    assert result.told is not None
+    said, observed = result.told.split("box. ")
+    assert said == "Six robots stand around the "
+    worst = max(work.arrivals[plan].residual_px)
+    assert f"within {max(worst, 0.1):.1f} px" in observed
+    assert observed.startswith("All 6 robots")
+
+
+def test_without_words_for_the_person_the_run_goes_on() -> None:
+    work = workspace()
+    propose(work)
+    assert answer(work, "deploy").told is None
+
+
+def test_there_must_be_a_plan_and_it_must_be_certified() -> None:
+    work = workspace()
+    with pytest.raises(ToolError, match=r"no plan\. Plans: none yet"):
+        answer(work, "deploy")
+    crowded = propose(work, positions=[[10, 10]] * 6)
+    assert not crowded.data["certified"]
+    with pytest.raises(ToolError, match="is not certified"):
+        answer(work, "deploy", tell="done")
+    assert work.arrivals == {}
+
+
+def test_a_doubtful_outline_must_be_looked_at_before_robots_move() -> None:
+    work = workspace()
+    made = propose(work)
+    (target,) = work.scene.targets
+    assert target.confidence > CLEAR
+    assert made.images == ()
+    work.scene = replace(work.scene, targets=(replace(target, confidence=CLEAR - 0.01),))
+    again = propose(work, targets=[])
+    assert len(again.images) == 1
+    with pytest.raises(ToolError, match=r"confidence 0\.69.*outline shown"):
+        answer(work, "deploy", tell="done")
+    assert answer(work, "deploy", plan_id=again.data["plan_id"]).data["arrived"]
+
+
+def test_a_mask_that_is_refused_is_shown() -> None:
+    work = workspace(threshold=1.0)
+    for name, arguments in (
+        ("segment", {"box": TARGET["box"]}),
+        (
+            "propose_formation",
+            {
+                "targets": [TARGET | {"points": [[90, 60]]}],
+                "contract": {
+                    "groups": [{"relation": "around", "targets": ["t1"], "robots": 4}],
+                },
+            },
+        ),
+    ):
+        with pytest.raises(ToolError, match="Insufficient segmentation accuracy") as caught:
+            answer(work, name, **arguments)
+        (image,) = caught.value.images
+        assert image.startswith(b"\xff\xd8")
+
+
+def test_an_error_that_is_about_no_mask_shows_none() -> None:
+    with pytest.raises(ToolError, match="inverted") as caught:
+        answer(workspace(), "segment", box=[9, 9, 3, 3])
+    assert caught.value.images == ()
+    with pytest.raises(ToolError, match="inverted"):
+        answer(workspace(), "look", region=[9, 9, 3, 3])
+
+
+def test_a_contract_against_the_plain_words_is_asked_about() -> None:
+    work = workspace("Put 6 robots at the corners of the box")
+    with pytest.raises(ToolError, match=r"A doubt: .*'corners'.*`reading`") as caught:
+        propose(work)
+    assert "speaks of" not in str(caught.value)
+    assert work.plans == {}
+    with pytest.raises(ToolError, match=r"speaks of 6 robots, the contract has 4; .*'corners'"):
+        propose(work, robots=4)
+
+
+def test_a_reading_settles_the_doubt_and_stays_in_the_contract() -> None:
+    work = workspace("Put 6 robots at the corners of the box", robots=6)
+    contract = {
+        "groups": [{"relation": "around", "targets": ["t1"], "robots": 6}],
+        "reading": "The box has four corners; the person said a ring will do.",
+    }
+    made = answer(work, "propose_formation", contract=contract, targets=[TARGET]).data
+    assert made["certified"]
+    kept = work.plans[made["plan_id"]].formation.contract
+    assert kept.reading == contract["reading"]

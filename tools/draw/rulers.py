@@ -1,0 +1,56 @@
+"""Rulers along the edges of a photograph, in its own pixels.
+
+They stand in the page's margins and hide nothing; an edge without a margin has none.
+"""
+
+import numpy as np
+
+from .canvas import INK, PAPER, Canvas, Margins
+
+TEXT, LABELS = 15.0, 16
+RULER: Margins = (52, 30, 52, 30)
+"""Room for the rulers, units of the page."""
+
+
+def draw_rulers(canvas: Canvas) -> None:
+    """Ticks at round pixels of the photograph, with their numbers, in every margin."""
+    x0, y0, x1, y1 = canvas.photo
+    width, height = canvas.size
+    for box in ((0, 0, width, y0), (0, y1, width, height), (0, y0, x0, y1), (x1, y0, width, y1)):
+        if box[2] > box[0] and box[3] > box[1]:
+            canvas.box(box, PAPER)
+    for axis in (0, 1):
+        step = _step(canvas, axis)
+        minor, first = max(step // 5, 1), canvas.origin[axis]
+        for value in range(-(-first // minor) * minor, first + canvas.source[axis], minor):
+            _draw_tick(canvas, axis, value, labelled=value % step == 0)
+
+
+def _draw_tick(canvas: Canvas, axis: int, value: int, *, labelled: bool) -> None:
+    """One tick of the rulers for x (axis 0) or y (axis 1)."""
+    unit = canvas.unit
+    along = float(canvas.at(np.full((1, 2), float(value)))[0, axis]) + 0.5
+    reach, half = (8 if labelled else 4) * unit, 0.75 * unit
+    middle = (RULER[1] / 2 + 3 if axis == 0 else RULER[0] / 2 + 3) * unit
+    near, far = canvas.photo[1 - axis], canvas.photo[3 - axis]
+    for edge, out in ((near, -1), (far, 1)):
+        if not 0 < edge < canvas.size[1 - axis]:
+            continue
+        low, high = sorted((edge, edge + out * reach))
+        tick = (along - half, low, along + half, high)
+        canvas.box(tick if axis == 0 else (tick[1], tick[0], tick[3], tick[2]), INK)
+        if labelled:
+            where = np.array([along - 0.5, edge + out * middle])
+            canvas.text(where if axis == 0 else where[::-1], str(value), TEXT, INK)
+
+
+def _step(canvas: Canvas, axis: int) -> int:
+    """The smallest of 1, 2, 5, 10, 20, ... px whose labels are neither too many nor too tight."""
+    count = canvas.source[axis]
+    widest = canvas.text_size(f"{canvas.origin[axis] + count}0", TEXT)[axis]
+    for power in range(6):
+        for lead in (1, 2, 5):
+            step = lead * 10**power
+            if count <= LABELS * step and step * canvas.scale[axis] >= 1.2 * widest:
+                return step
+    return 10**6

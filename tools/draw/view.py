@@ -1,0 +1,74 @@
+"""The picture as a model is shown it: what it needs to point, in as few pixels as that takes.
+
+The photograph lies at the upper left, unscaled where it has a usual size, so that a place read
+off the image and one read off the rulers are the same. Providers bill by the pixel, and shrink
+what is longer than some 1,500 px.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from io import BytesIO
+
+import numpy as np
+
+from ..formation.plan import Plan
+from ..perception.attributes import Candidate
+from ..perception.image import Picture
+from ..scene import Box, Scene
+from .canvas import Canvas, Labels
+from .overlay import draw_scene
+from .rulers import RULER, draw_rulers
+
+MOST_LONG, LEAST_LONG = 1024, 400
+"""Long side of the photograph in a view, px: shrunk above, enlarged below by a whole factor."""
+CLOSER = 768
+"""Long side of a part that is looked at closer, px."""
+QUALITY = 90
+
+
+def view_scale(picture: Picture) -> float:
+    """Pixels of the view per pixel of the picture."""
+    long = max(picture.size)
+    if long > MOST_LONG:
+        return MOST_LONG / long
+    return float(-(-LEAST_LONG // long))
+
+
+def draw_view(
+    scene: Scene,
+    *,
+    plan: Plan | None = None,
+    candidates: Sequence[Candidate] = (),
+    region: Box | None = None,
+) -> bytes:
+    """The photograph with rulers along its right and lower edge, as a JPEG file.
+
+    Args:
+        scene: its targets are outlined and tagged with their ids.
+        plan: its robots are drawn.
+        candidates: outlined and numbered, 3 for c3.
+        region: x0, y0, x1, y1, a part to look at closer, image pixels; the rulers go with it.
+
+    Raises:
+        ToolError: the plan names a target that the scene does not have.
+    """
+    picture, origin = scene.picture, (0, 0)
+    long = max(round(view_scale(picture) * max(picture.size)), 1)
+    if region is not None:
+        picture, origin = _part(picture, region)
+        long = CLOSER
+    canvas = Canvas(picture, long, 1.0, (0, 0, RULER[2], RULER[3]), origin)
+    draw_scene(canvas, scene, plan, candidates, Labels(canvas.photo))
+    draw_rulers(canvas)
+    file = BytesIO()
+    canvas.finish().save(file, "JPEG", quality=QUALITY, subsampling=0)
+    return file.getvalue()
+
+
+def _part(picture: Picture, region: Box) -> tuple[Picture, tuple[int, int]]:
+    """A part of the picture, whole pixels, and where it begins."""
+    low = np.maximum(np.floor(region[:2]), 0).astype(int)
+    high = np.minimum(np.ceil(region[2:]), picture.size).astype(int)
+    (x0, y0), (x1, y1) = low, high
+    cut = np.ascontiguousarray(picture.pixels[y0:y1, x0:x1])
+    return replace(picture, pixels=cut), (int(x0), int(y0))

@@ -1,0 +1,45 @@
+"""JSON Schemas as short as they can be said: models read, and people pay for, every word of them.
+
+Titles repeat names, a null only says that something may be left out, and what is referred to once
+may as well stand there.
+"""
+
+import json
+from collections.abc import Mapping
+from typing import Any, cast
+
+from pydantic import BaseModel
+
+
+def compact_schema(model: type[BaseModel]) -> dict[str, Any]:
+    """A model's schema (draft 2020-12), which accepts all that the model's own does but nulls."""
+    whole = model.model_json_schema()
+    kinds = cast("dict[str, Any]", whole.pop("$defs", {}))
+    written = json.dumps([whole, kinds])
+    shared = {name for name in kinds if written.count(f'"#/$defs/{name}"') > 1}
+    once = {name: kind for name, kind in kinds.items() if name not in shared}
+    schema = _compact(whole, once)
+    if shared:
+        schema["$defs"] = {name: _compact(kinds[name], once) for name in sorted(shared)}
+    return schema
+
+
+def _compact(node: Any, once: Mapping[str, Any]) -> Any:
+    if isinstance(node, list):
+        return [_compact(item, once) for item in cast("list[Any]", node)]
+    if not isinstance(node, dict):
+        return node
+    fields = cast("dict[str, Any]", node)
+    name = str(fields.get("$ref", "")).removeprefix("#/$defs/")
+    if name in once:
+        return _compact({**once[name], **{k: v for k, v in fields.items() if k != "$ref"}}, once)
+    made: dict[str, Any] = {}
+    for key, value in fields.items():
+        if key == "properties":  # here keys are names of their own
+            made[key] = {name: _compact(kind, once) for name, kind in value.items()}
+        elif key == "anyOf" and {"type": "null"} in value and len(value) == 2:
+            (given,) = (choice for choice in value if choice != {"type": "null"})
+            made = _compact(given, once) | made
+        elif not (key == "title" or (key == "default" and value in (None, [], ""))):
+            made[key] = _compact(value, once)
+    return made
