@@ -27,6 +27,8 @@ COLUMNS = {
     "success_of_placed": "success,\nif placed",
     "iou": "mean IoU",
 }
+DIRECT = "former-direct@v001"
+"""What a model alone is told: to write coordinates."""
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
 
@@ -45,6 +47,7 @@ def photos(
     base_url: o.BaseUrl = None,
     planner: o.PlannerName = None,
     prompt: o.PromptName = None,
+    alone: o.Alone = False,
     record: o.RecordFolder = None,
     out: o.JsonFile = Path("photos-eval.json"),
 ) -> None:
@@ -61,6 +64,8 @@ def photos(
 
     def agent(task: Task) -> Agent:
         name = model if recorded is None else f"replay:{recorded[task.id]}"
+        if alone:
+            return Agent(name, base_url=base_url, prompt=prompt or DIRECT, tools=())
         return Agent(name, base_url=base_url, planner=planner, prompt=prompt)
 
     if tasks:

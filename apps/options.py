@@ -104,6 +104,10 @@ DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Photographs in the format of evals/photos.")
 ]
 TaskList = Annotated[list[str] | None, typer.Option("--task", help="Only this task; repeatable.")]
+Alone = Annotated[
+    bool,
+    typer.Option("--alone", help="No tools: the model writes the coordinates in its one reply."),
+]
 RecordFolder = Annotated[
     Path | None, typer.Option("--record", help="Keep a trace of every task here.")
 ]

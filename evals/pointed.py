@@ -5,6 +5,7 @@ box. outline: at most 12 vertices, each coordinate moved by up to 4 % of the siz
 the area). point: one point well inside. words: nothing is pointed at.
 """
 
+import json
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
@@ -44,7 +45,7 @@ class Row:
     """One task under one jitter: what was asked, what came of it, and how it was graded.
 
     `right` says whether the thing robots were placed about is the one meant: outlines that
-    overlap by more than half (intersection over union); None where nothing was placed.
+    overlap by more than half (intersection over union); None where nothing was placed or measured.
     """
 
     task: str
@@ -55,6 +56,7 @@ class Row:
     referring: str
     wording: str
     status: str
+    placed: bool
     right: bool | None
     success: bool
     strict: bool
@@ -131,16 +133,17 @@ def as_json(row: Row) -> dict[str, object]:
 def _means(rows: list[Row]) -> dict[str, float | None]:
     """Runs; shares placed, successful and strictly so; of those placed, about the right thing
     and successful; mean IoU of what was segmented."""
-    known = [row.iou for row in rows if row.iou is not None]
-    placed = [row for row in rows if row.right is not None]
+    found = [row.iou for row in rows if row.iou is not None]
+    placed = [row for row in rows if row.placed]
+    known = [row for row in placed if row.right is not None]
     return {
         "runs": len(rows),
         "placed": len(placed) / len(rows),
         "success": float(np.mean([row.success for row in rows])),
         "strict": float(np.mean([row.strict for row in rows])),
-        "right_of_placed": float(np.mean([bool(r.right) for r in placed])) if placed else None,
+        "right_of_placed": float(np.mean([bool(r.right) for r in known])) if known else None,
         "success_of_placed": float(np.mean([r.success for r in placed])) if placed else None,
-        "iou": float(np.mean(known)) if known else None,
+        "iou": float(np.mean(found)) if found else None,
     }
 
 
@@ -149,6 +152,8 @@ def _row(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) ->
     report = run.report
     cost = spent(run.outcome.messages, agent.system, agent.offered)
     placed = report.arrival.observed if report.arrival and report.arrival.arrived else None
+    if not agent.tools:
+        placed = written_positions(report.message)
     graded = grade(task, placed)
     targets = run.workspace.scene.targets
     target = targets[0] if targets else None
@@ -161,7 +166,10 @@ def _row(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) ->
         referring=task.referring,
         wording=task.wording,
         status=report.status,
-        right=None if placed is None else _right([t.outline.polygon for t in targets], task),
+        placed=placed is not None,
+        right=None
+        if placed is None or not targets
+        else _right([t.outline.polygon for t in targets], task),
         success=graded.success,
         strict=graded.strict,
         certified=report.verdict is not None and report.verdict.certified,
@@ -173,6 +181,18 @@ def _row(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) ->
         input_tokens=cost.input,
         output_tokens=cost.output,
     )
+
+
+def written_positions(text: str) -> tuple[tuple[float, float], ...] | None:
+    """The positions that a model alone, without tools, has written as JSON; None if it has not."""
+    whole = text[text.find("{") : text.rfind("}") + 1]
+    try:
+        pairs = np.asarray(json.loads(whole)["positions"], dtype=float)
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.isfinite(pairs).all():
+        return None
+    return tuple((float(x), float(y)) for x, y in pairs)
 
 
 def _run(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) -> Run:

@@ -60,13 +60,15 @@ def load_tasks(folder: Path | None = None) -> list[Task]:
     """All tasks of a folder of photographs, in file order.
 
     Args:
-        folder: holds annotations.json and the images it names; None for the shipped ones.
+        folder: holds annotations.json and the images it names, or is such a file by another name;
+            None for the shipped ones.
 
     Raises:
         InputError: no such file, not JSON, against the schema, or a picture or target missing.
     """
-    root = folder or photos_folder()
-    path = root / "annotations.json"
+    path = folder or photos_folder()
+    path = path if path.suffix == ".json" else path / "annotations.json"
+    root = path.parent
     try:
         entries = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -17,6 +17,8 @@ from .understand import Reading, understand
 from .which import Step, find, located_reasons
 
 MAX_LABEL = 100
+FARTHEST = 100_000
+"""Inside, a length that is named is the least distance from the edge, px."""
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 
 
@@ -135,7 +137,8 @@ def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
     if relation == "between":
         group["layout"] = reading.layout
     if reading.clearance is not None and relation not in ("between", "centre"):
-        group["clearance"] = [reading.clearance, reading.clearance + 1]
+        most = FARTHEST if relation == "inside" else reading.clearance + 1
+        group["clearance"] = [reading.clearance, most]
     return group
 
 

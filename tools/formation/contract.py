@@ -181,9 +181,12 @@ def with_defaults(
 
 
 def nominal(clearance: tuple[float, float]) -> float:
-    """The clearance aimed at within an allowed range: the geometric mean, px."""
+    """The clearance aimed at within an allowed range, px: the geometric mean.
+
+    "At least" allows everything further out as well; no more than twice the least is aimed at.
+    """
     least, greatest = clearance
-    return math.sqrt(least * greatest) if least > 0 else greatest / 2
+    return math.sqrt(least * min(greatest, 4 * least)) if least > 0 else greatest / 2
 
 
 def default_clearance(outline: Outline, room: tuple[float, float], radius: float) -> float:

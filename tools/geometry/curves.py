@@ -15,9 +15,12 @@ from shapely.geometry.base import BaseGeometry
 
 from .outline import FloatArray, Outline, distances, largest_part
 
-QUAD_SEGMENTS = 16
-ROUND_JOIN_DIP = 1 / math.cos(math.pi / (4 * QUAD_SEGMENTS))
-"""A round join is a polyline inside the true arc; offsetting this much further makes up for it."""
+QUAD_SEGMENTS = 24
+ROUND_JOIN_DIP = 1 / math.cos(1.5 * math.pi / (4 * QUAD_SEGMENTS))
+"""A round join is a polyline inside the true arc; offsetting this much further makes up for it.
+
+GEOS rounds the number of chords of an arc, so that one chord may span half as much again.
+"""
 FACING = math.radians(50)
 """How far a curve's outward normal may turn from a side's direction and still be that side."""
 SIDE_STEP = 400
