@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -74,6 +75,8 @@ def photos(
         record.mkdir(parents=True, exist_ok=True)
     rows = _run(tasks, chosen, jitters, agent, record)
     facts = {"seeds": jitters, "data": str(data) if data else "shipped", "model": model}
+    if model != "offline":
+        _print_costs(rows)
     _show(rows, chosen, facts, out)
 
 
@@ -132,16 +135,36 @@ def _stderr() -> Console:
 
 def _show(rows: list[Row], mode: str, facts: dict[str, Any], out: Path | None) -> None:
     means = summary(rows)
-    _print(means, rows, mode)
+    _print(means, rows, mode, facts.get("model", "offline"))
     if out is not None:
         content = {"mode": mode, **facts, "summary": means, "rows": [as_json(r) for r in rows]}
         write_whole(out, json.dumps(content, indent=1).encode())
 
 
-def _print(means: dict[str, dict[str, float | None]], rows: list[Row], mode: str) -> None:
+def _print_costs(rows: list[Row]) -> None:
+    """What each task took, and the medians."""
+    table = Table(title="what each took", header_style="cyan", box=None)
+    for name in ("task", "requests", "tokens in", "tokens out", "outcome", "strict"):
+        number = name.startswith(("requests", "tokens"))
+        table.add_column(name, justify="right" if number else "left")
+    spent = [(r.requests, r.input_tokens, r.output_tokens) for r in rows]
+    for row, counts in zip(rows, spent, strict=True):
+        numbers = [f"{n:,}" for n in counts]
+        table.add_row(row.task, *numbers, row.status, "yes" if row.strict else "no")
+    if rows:
+        middles = [f"{median(counts):,.0f}" for counts in zip(*spent, strict=True)]
+        strict = f"{sum(r.strict for r in rows)} of {len(rows)}"
+        table.add_row("median", *middles, "", strict)
+    Console(highlight=False).print(table)
+
+
+def _print(
+    means: dict[str, dict[str, float | None]], rows: list[Row], mode: str, model: str
+) -> None:
     console = Console(highlight=False)
+    who = "offline planner" if model == "offline" else model
     how = "from words alone" if mode == "words" else f"pointed by {mode}"
-    table = Table(title=f"offline planner, {how}", header_style="cyan", box=None)
+    table = Table(title=f"{who}, {how}", header_style="cyan", box=None)
     for name in ("tasks", "runs", *COLUMNS.values()):
         table.add_column(
             name, justify="left" if name == "tasks" else "right", no_wrap=name == "tasks"
