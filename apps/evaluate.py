@@ -28,7 +28,7 @@ COLUMNS = {
     "success_of_placed": "success,\nif placed",
     "iou": "mean IoU",
 }
-DIRECT = "former-direct@v001"
+DIRECT = "former-direct@v002"
 """What a model alone is told: to write coordinates."""
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
@@ -146,7 +146,7 @@ def _print_costs(rows: list[Row]) -> None:
     table = Table(title="what each took", header_style="cyan", box=None)
     for name in ("task", "requests", "tokens in", "tokens out", "outcome", "strict"):
         number = name.startswith(("requests", "tokens"))
-        table.add_column(name, justify="right" if number else "left")
+        table.add_column(name, justify="right" if number else "left", no_wrap=name == "task")
     spent = [(r.requests, r.input_tokens, r.output_tokens) for r in rows]
     for row, counts in zip(rows, spent, strict=True):
         numbers = [f"{n:,}" for n in counts]
@@ -177,5 +177,5 @@ def _print(
     for row in rows:
         if not row.strict:
             kind = "not strict" if row.success else row.status if row.failures else "failed"
-            why = "; ".join(row.failures) if row.status == "deployed" else row.message
+            why = "; ".join(row.failures) if row.placed else row.message
             console.print(f"{row.task} seed {row.seed}: {kind}: {why[:150]}", soft_wrap=True)

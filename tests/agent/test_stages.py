@@ -65,12 +65,12 @@ def test_the_looker_sees_and_the_planner_is_told(picture: Picture) -> None:
     planner.assert_complete()
     (looked,), (planned,) = looker.requests, planner.requests
     assert looked.system == load_prompt("context@v001").text
-    assert planned.system == load_prompt("former@v002").text
+    assert planned.system == load_prompt("former@v003").text
     assert pictures(looked) == 1
     assert pictures(planned) == 0
     assert PI in texts(planned)
     assert {t.name for t in looked.tools} == set(load_prompt("context@v001").tools)
-    assert {t.name for t in planned.tools} == set(load_prompt("former@v002").tools)
+    assert {t.name for t in planned.tools} == set(load_prompt("former@v003").tools)
     assert [p["id"] for p in report.prompts] == ["context", "former", "repair"]
     assert report.prompt == report.prompts[1]
 

@@ -14,7 +14,7 @@ from ..formation.wording import doubts
 from ..perception.prompts import Point, TargetPrompt
 from ..tool import ToolResult, tool
 from ..workspace import Settings, Workspace
-from .seeing import CLEAR, FRAME, measured, overlays, sighting, summary
+from .seeing import FRAME, doubtful, measured, overlays, sighting, summary
 
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
@@ -36,10 +36,10 @@ def propose_formation(
     Every violation comes back with numbers; what is not certified cannot be deployed.
 
     Args:
-        contract: what the instruction demands; its robots add up to those asked for.
-        targets: the things meant that are not segmented yet.
-        positions: (x, y) of every robot in the order of the groups, px; rarely needed.
-        samples: names of samples (s1, ...) to use as positions, in the order of the groups.
+        contract: what the instruction demands; its groups' robots add up to Robots.
+        targets: the things meant that are not measured yet.
+        positions: (x, y) of every robot in the order of the groups, px; for a free shape.
+        samples: names that sample tools gave (s1, ...), to use as positions instead.
     """
     if positions is not None and samples is not None:
         raise ToolError("propose_formation: give positions or samples, not both.")
@@ -141,12 +141,16 @@ def _check_clear(workspace: Workspace, plan: Plan) -> None:
     """A plan nobody has looked at may be deployed only about things that were measured clearly."""
     for name in plan.formation.contract.target_ids:
         target = workspace.scene.target(name)
-        if target.confidence < CLEAR:
+        if doubtful(target):
+            doubt = f"was measured with confidence {target.confidence:.2f}"
+            if target.missed:
+                places = ", ".join(f"({x:g}, {y:g})" for x, y in target.missed)
+                doubt = f"as measured leaves out your {places}"
             raise ToolError(
-                f"{name} was measured with confidence {target.confidence:.2f}; look whether the "
-                f"outline shown is the thing meant. If so deploy {plan.id} by its id, else "
-                "propose again with a closer outline, or with negative points on what is not part "
-                "of it."
+                f"Not deployed yet: {name} {doubt}. If the outline shown follows the thing meant, "
+                f"deploy plan_id {plan.id} (with tell); misses below the clearance do no harm. "
+                "Else propose again with a closer outline, points on what is left out, or negative "
+                "points on what is not part of it."
             )
 
 

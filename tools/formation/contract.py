@@ -48,18 +48,19 @@ class Group(_Frozen):
     """One arrangement."""
 
     relation: Relation = Field(
-        description="around: even ring; cage: closed ring, nothing gets out; corners: one at each "
-        "corner; along: beside one side or chosen edges; inside: spread evenly over it; between: "
-        "two targets; centre: gathered at its centre; shape: a line, or free positions."
+        description="around: even ring (surround, guard); cage: closed ring, nothing gets out; "
+        "corners: one at each corner; along: beside one side or chosen edges; inside: spread "
+        "evenly over it (in or on it); between: two targets; centre: gathered at its centre, if "
+        "that is said; shape: a line, or free positions."
     )
     targets: tuple[str, ...] = Field(
-        default=(), max_length=2, description="Ids such as t1; two for between, else one."
+        default=(), max_length=2, description="Ids such as t1: two for between, else one."
     )
     robots: int = Field(ge=1, le=MAX_ROBOTS, description="How many of the robots.")
     clearance: Annotated[tuple[Length, Length], _numbers(2)] | None = Field(
         default=None,
         description="Least and greatest distance from the outline to a robot's edge, px; only "
-        "where the person named a length.",
+        "where the person named a length: 15 px away is [15, 15], at least 15 is [15, 1000].",
     )
     fit: Fit = Field(default="normal", description="How close, where no length was named.")
     spacing: Literal["even", "free"] = Field(
@@ -133,7 +134,10 @@ class Contract(_Frozen):
 
     groups: tuple[Group, ...] = Field(min_length=1, max_length=50)
     robot_radius: Length = Field(default=0.0, description="Radius of a robot, px; 0 is a point.")
-    keep_out: tuple[str, ...] = Field(default=(), description="Further targets no robot may touch.")
+    keep_out: tuple[str, ...] = Field(
+        default=(),
+        description="Further targets no robot may touch; other things are not avoided.",
+    )
     reading: str = Field(
         default="",
         max_length=300,

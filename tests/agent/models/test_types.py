@@ -125,7 +125,7 @@ def test_the_default_prompt_its_tools_and_the_picture_are_sent(
     Agent(server.model(dialect.name)).run(PICTURE, "Surround it with 4 robots")
     (sent,) = server.requests
     tools = sent["tools"][0].get("functionDeclarations") or sent["tools"]
-    former = load_prompt("former@v002")
+    former = load_prompt("former@v003")
     named = [tool.get("function", tool)["name"] for tool in tools]
     assert named == [t.name for t in TOOLS if t.name in former.tools]
     assert sorted(named) == sorted(former.tools)
