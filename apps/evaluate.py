@@ -13,6 +13,7 @@ from rich.progress import Progress, track
 from rich.table import Table
 
 from ..agent.agent import Agent
+from ..evals.descriptors import descriptor_costs
 from ..evals.pointed import JITTERED, Mode, Row, as_json, evaluate, mode_named, one_target, summary
 from ..evals.scenes.build import write_scenes
 from ..evals.suite import Task, load_tasks
@@ -99,6 +100,18 @@ def scenes(
         write_scenes(bar, folder)
         rows = _run(load_tasks(folder), chosen, 1)
     _show(rows, chosen, {"seeds": f"{first}-{last}", "data": "drawn scenes"}, out)
+
+
+@app.command()
+def descriptors(data: o.DataFolder = None) -> None:
+    """Tokens that each way of putting a shape into text costs, over the photographs' things."""
+    table = Table(title="describe_shape", header_style="cyan", box=None)
+    for name in ("descriptor", "median tokens", "most", "beyond edges"):
+        table.add_column(name, justify="left" if name == "descriptor" else "right")
+    for cost in descriptor_costs(load_tasks(data)):
+        numbers = (f"{cost.median:,.0f}", f"{cost.most:,}", f"{cost.overhead:+.0%}")
+        table.add_row(cost.descriptor, *numbers)
+    Console(highlight=False).print(table)
 
 
 def recordings(model: str) -> dict[str, Path] | None:
