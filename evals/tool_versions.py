@@ -22,7 +22,7 @@ def retooled(
     """Tools that are not what they were when a prompt was released, or are none."""
     unknown = sorted(set(prompt.tools) - {t.name for t in tools})
     found = [
-        Finding(prompt.name, "tools", "error", f"It names {name}, which is no tool of formup.")
+        Finding(prompt.name, "tools", "warning", f"It names {name}, which is no tool of formup.")
         for name in unknown
     ]
     locked = read_lock(library.home(prompt.id)).get(prompt.name)

@@ -11,7 +11,7 @@ from .prompt import PromptError
 
 MAX_BYTES = 1 << 20
 """Of one file; a prompt is a few thousand."""
-PATIENCE = 5.0
+PATIENCE = 10.0
 """Seconds to wait while another process writes in the folder."""
 BUSY = ".writing"
 """The file that is there while somebody writes in the folder."""

@@ -99,5 +99,5 @@ def _shown(value: object) -> str:
     try:
         text = repr(value)
     except ValueError:  # Python writes no whole numbers of thousands of digits
-        return "A vast number"
+        return "a vast number"
     return text if len(text) < 60 else f"{text[:57]}..."

@@ -54,7 +54,8 @@ def new_draft(library: PromptLibrary, name: str, parent: str | None = None) -> P
     except OSError as error:
         raise PromptError(f"{folder} cannot be made: {error.strerror or error}.") from None
     known = id in library.ids()
-    source = library.load(parent or id) if parent or known else None
+    released = known and any("@v" in name for name in names_in(library.home(id), id))
+    source = library.load(parent or id) if parent or released else None
     with alone(folder):
         if known and library.home(id) != folder:
             _copy(id, folder)
