@@ -50,10 +50,10 @@ class TwoStages:
         """
         messages, tools = request.messages, request.tools
         if not measured(messages):
-            seen = Request(self._look.text, messages, offered(tools, self._look))
+            seen = Request(self._look.render(), messages, offered(tools, self._look))
             return await self._looker.reply(seen)
         prompt = self._repair if _uncertified(messages) else self._plan
-        told = Request(prompt.text, _without_pictures(messages), offered(tools, prompt))
+        told = Request(prompt.render(), _without_pictures(messages), offered(tools, prompt))
         return await self._planner.reply(told)
 
     async def aclose(self) -> None:

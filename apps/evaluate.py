@@ -17,6 +17,7 @@ from ..evals.descriptors import descriptor_costs
 from ..evals.pointed import JITTERED, Mode, Row, as_json, evaluate, mode_named, one_target, summary
 from ..evals.scenes.build import write_scenes
 from ..evals.suite import Task, load_tasks
+from ..prompts import PromptLibrary
 from ..tools.store import write_whole
 from . import inputs
 from . import options as o
@@ -49,6 +50,7 @@ def photos(
     base_url: o.BaseUrl = None,
     planner: o.PlannerName = None,
     prompt: o.PromptName = None,
+    prompts: o.PromptsFolder = None,
     alone: o.Alone = False,
     record: o.RecordFolder = None,
     out: o.JsonFile = Path("photos-eval.json"),
@@ -59,7 +61,7 @@ def photos(
     and point. --model replay:FOLDER replays what --record FOLDER has kept, as far as it goes.
     """
     chosen, tasks = mode_named(mode), inputs.tasks(task, load_tasks(data))
-    jitters = inputs.whole("--seeds", seeds, least=1)
+    jitters, library = inputs.whole("--seeds", seeds, least=1), PromptLibrary(prompts)
     recorded = recordings(model)
     if recorded is not None:
         tasks = [t for t in tasks if t.id in recorded]
@@ -67,8 +69,9 @@ def photos(
     def agent(task: Task) -> Agent:
         name = model if recorded is None else f"replay:{recorded[task.id]}"
         if alone:
-            return Agent(name, base_url=base_url, prompt=prompt or DIRECT, tools=())
-        return Agent(name, base_url=base_url, planner=planner, prompt=prompt)
+            told = prompt or DIRECT
+            return Agent(name, base_url=base_url, prompt=told, library=library, tools=())
+        return Agent(name, base_url=base_url, planner=planner, prompt=prompt, library=library)
 
     if tasks:
         agent(tasks[0])  # what cannot be asked is found before the work
