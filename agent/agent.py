@@ -78,12 +78,12 @@ class Agent:
         self.model = model_named(model, base_url) if isinstance(model, str) else model
         own = None if system else getattr(self.model, "prompt", None)
         self.library = library or PromptLibrary()
-        name = own if prompt is None else prompt
+        name = (own if planner is None else "planner") if prompt is None else prompt
         self.prompt = None if name is None else _prompt(self.library, name)
         self.prompts = () if self.prompt is None else (self.prompt,)
         self._names: tuple[str, str | None] = (self.model.name, None)
         if planner is not None:
-            made = _staged(self.model, planner, base_url, self.prompt, self.library)
+            made = _staged(self.model, planner, base_url, str(name), self.library)
             self.model, self.prompts = made
             self._names = made[0].names
         self.system = self.prompt.render() if self.prompt else system
@@ -300,20 +300,19 @@ def _staged(
     looker: Model,
     planner: str | Model,
     base_url: str | None,
-    plan: Prompt | None,
+    plan: str,
     library: PromptLibrary,
 ) -> tuple[TwoStages, tuple[Prompt, ...]]:
     """Two models as one, and their prompts."""
     second = model_named(planner, base_url) if isinstance(planner, str) else planner
     blind = [m.name for m in (looker, second) if not getattr(m, "prompt", None)]
-    if blind or plan is None:
+    if blind:
         raise InputError(
-            f"{blind[0] if blind else second.name} reads no prompt and cannot share the work: "
+            f"{blind[0]} reads no prompt and cannot share the work: "
             "--model and --planner both take a language model, such as openai:NAME."
         )
-    look, repair = _prompt(library, "context"), _prompt(library, "repair")
-    made = TwoStages(looker, second, look=look, plan=plan, repair=repair)
-    return made, (look, plan, repair)
+    look, made, repair = (_prompt(library, name) for name in ("context", plan, "repair"))
+    return TwoStages(looker, second, look=look, plan=made, repair=repair), (look, made, repair)
 
 
 def _noting(workspace: Workspace, writer: TraceWriter | None, show: Show | None) -> Show:

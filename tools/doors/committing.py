@@ -36,9 +36,9 @@ def propose_formation(
     Every violation comes back with numbers; what is not certified cannot be deployed.
 
     Args:
-        contract: what the instruction demands; its groups' robots add up to Robots.
+        contract: what the instruction demands; its robots add up to Robots, or to the words'.
         targets: the things meant that are not measured yet.
-        positions: (x, y) of every robot in the order of the groups, px; for a free shape.
+        positions: (x, y) of every robot in the order of the groups, px; usually left out.
         samples: names that sample tools gave (s1, ...), to use as positions instead.
     """
     if positions is not None and samples is not None:
@@ -109,7 +109,7 @@ def ask_user(workspace: Workspace, question: str, candidates: tuple[str, ...] = 
 
     Args:
         question: one clear question.
-        candidates: ids the person may choose from: candidates (c3) or targets (t1).
+        candidates: ids of numbered things (c3) or targets (t1) to choose from, if there are any.
     """
     listed = [
         sighting(workspace.candidate(c))

@@ -62,7 +62,11 @@ class Group(_Frozen):
         description="Least and greatest distance from the outline to a robot's edge, px; only "
         "where the person named a length: 15 px away is [15, 15], at least 15 is [15, 1000].",
     )
-    fit: Fit = Field(default="normal", description="How close, where no length was named.")
+    fit: Fit = Field(
+        default="normal",
+        description="How close, where no length was named. tight: snug; normal: also for 'just "
+        "off' and 'next to'; wide: well away.",
+    )
     spacing: Literal["even", "free"] = Field(
         default="even", description="free: neighbours need not be evenly spaced."
     )
@@ -221,7 +225,7 @@ def _default_range(
         aim = default_clearance(outline, room, radius) * FIT_FACTOR[group.fit]
         return (aim / 2, aim * 2)
     if group.relation == "corners":
-        aim = max(CORNER_SHARE * outline.size, MIN_STANDOFF) * FIT_FACTOR[group.fit]
+        aim = max(CORNER_SHARE * outline.size * FIT_FACTOR[group.fit], MIN_STANDOFF)
         return (aim / 3, aim * 3)
     if group.relation == "inside":
         least = min(INSIDE_SHARE * outline.size, 0.15 * outline.min_width)
