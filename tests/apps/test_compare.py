@@ -10,7 +10,7 @@ from formup.apps.cli import app
 from formup.apps.sweep import sweep
 from formup.evals.comparison import Comparison
 from formup.evals.executors import Work
-from formup.evals.journal import read_rows
+from formup.evals.journal import equal_lines, read_rows
 from formup.evals.runner import run_trials
 from formup.evals.trials import Trial, TrialRow
 from formup.tools.errors import InputError
@@ -45,13 +45,13 @@ def passing(**counts: int) -> Work:
     return work
 
 
-@pytest.fixture
-def runs(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Runs of one prompt each, old, better and worse, and one of two prompts."""
-    work = passing(v001=6, v002=8, v003=4)
+    work, folder = passing(v001=6, v002=8, v003=4), tmp_path_factory.mktemp("runs")
     for name, prompts in (("old", (1,)), ("better", (2,)), ("worse", (3,)), ("both", (1, 2))):
-        run_trials(planned(*prompts), work, tmp_path / name)
-    return tmp_path
+        run_trials(planned(*prompts), work, folder / name)
+    return folder
 
 
 def formup(*arguments: str | Path) -> int:
@@ -76,16 +76,12 @@ def test_compare_says_by_how_much(runs: Path, capsys: pytest.CaptureFixture[str]
     assert "B agent former@v002#000000000000 offline" in text
     (line,) = (line for line in text.splitlines() if line.startswith("all "))
     assert line.split()[:3] == ["all", "12", "+20.0"]
-    assert line.endswith("better")
+    assert line.split()[-1] == "better"
     assert {"caging", "infill"} <= set(text.split())
     assert max(map(len, text.splitlines())) <= 100
 
 
 def test_compare_says_what_would_settle_it(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert formup("eval", "compare", runs / "old", runs / "old") == 0
-    assert (
-        "to tell 5.0 points (power .8): 10 trials of each of these" not in capsys.readouterr().out
-    )
     uneven = runs / "uneven"
     run_trials(
         planned(2),
@@ -145,7 +141,7 @@ def test_merge(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     merged = runs / "merged"
     assert formup("eval", "merge", runs / "old", runs / "better", "--out", merged) == 0
     assert "240 trials in" in capsys.readouterr().out
-    assert read_rows(merged) == read_rows(runs / "both") or len(read_rows(merged)) == 240
+    assert equal_lines(read_rows(merged)) == equal_lines(read_rows(runs / "both"))
 
 
 def test_the_bar_tells_time_left_and_cost(tmp_path: Path) -> None:
