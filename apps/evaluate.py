@@ -19,7 +19,7 @@ from ..evals.scenes.build import write_scenes
 from ..evals.suite import Task, load_tasks
 from ..prompts import PromptLibrary
 from ..tools.store import write_whole
-from . import inputs
+from . import compare, inputs
 from . import options as o
 
 COLUMNS = {
@@ -115,6 +115,11 @@ def descriptors(data: o.DataFolder = None) -> None:
         numbers = (f"{cost.median:,.0f}", f"{cost.most:,}", f"{cost.overhead:+.0%}")
         table.add_row(cost.descriptor, *numbers)
     Console(highlight=False).print(table)
+
+
+app.command(name="compare")(compare.compare)
+app.command(name="gate")(compare.gate)
+app.command(name="merge")(compare.merge_shards)
 
 
 def recordings(model: str) -> dict[str, Path] | None:

@@ -1,0 +1,131 @@
+"""A trial and what came of it: the key that names it, its seed, its line in trials.jsonl.
+
+Everything a result depends on is in the key: a changed prompt, suite or tool schema makes other
+trials. Infrastructure errors (a provider was down) are kept apart from failures: never scored.
+"""
+
+import hashlib
+import json
+from functools import cached_property
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Sha = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+Name = Annotated[str, Field(min_length=1)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Status = Literal["pass", "fail", "model_invalid", "infra_error"]
+UNEQUAL = frozenset({"seconds", "host"})
+"""Fields that differ from run to run of the same trial."""
+
+
+class Trial(BaseModel):
+    """One try of one task by one arm of a sweep.
+
+    Attributes:
+        suite: SHA-256 of the suite of tasks.
+        trial: number of the try, from 0.
+        method: who decides, such as agent or alone.
+        prompt: id@vNNN, None for rules that read none.
+        prompt_sha: SHA-256 of the prompt's text.
+        tools_sha: SHA-256 of the schemas of the tools offered.
+        model: provider:name, or offline.
+        category: of the task, such as caging; results are also told by it.
+        setup: of the task, such as hidden; results are also told by it.
+        must_pass: the task is one that always succeeds.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    suite: Sha
+    task: Name
+    trial: Annotated[int, Field(ge=0)]
+    method: Name
+    prompt: Name | None = None
+    prompt_sha: Sha | None = None
+    tools_sha: Sha | None = None
+    model: Name
+    category: str = ""
+    setup: str = ""
+    must_pass: bool = False
+
+    @cached_property
+    def key(self) -> str:
+        """SHA-256 of all fields."""
+        return hashlib.sha256(canonical(self.model_dump(include=_FIELDS))).hexdigest()
+
+    @cached_property
+    def seed(self) -> int:
+        """For all chance in the trial, 63 bits; the same in every arm, which pairs their luck."""
+        named = canonical([self.suite, self.task, self.trial])
+        return int.from_bytes(hashlib.sha256(named).digest()[:8], "big") >> 1
+
+    @property
+    def order(self) -> tuple[Any, ...]:
+        """By task, trial, then arm: the order of compared results."""
+        arm = (self.method, self.prompt or "", self.model)
+        return (self.task, self.trial, *arm, self.key)
+
+
+_FIELDS = set(Trial.model_fields)
+
+
+class TrialRow(Trial):
+    """A trial with what came of it.
+
+    Attributes:
+        sr: success; None for an infrastructure error, as gcr and strict.
+        gcr: goal conditions recall, the share of robots that stand right.
+        strict: success at the tighter tolerances.
+        object_correct: whether it was about the right thing; None if that was not graded.
+        feedback: what was wrong, in a sentence.
+    """
+
+    status: Status
+    sr: bool | None = None
+    gcr: Share | None = None
+    strict: bool | None = None
+    object_correct: bool | None = None
+    feedback: str = ""
+    input_tokens: Annotated[int, Field(ge=0)] = 0
+    output_tokens: Annotated[int, Field(ge=0)] = 0
+    cost_usd: Amount = 0.0
+    seconds: Amount = 0.0
+    host: str = ""
+
+    @classmethod
+    def of(cls, trial: Trial, status: Status, **facts: Any) -> Self:
+        """The row of a trial; `sr` follows from the status."""
+        success = None if status == "infra_error" else status == "pass"
+        return cls(**trial.model_dump(include=_FIELDS), status=status, sr=success, **facts)
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if not self.scored and (self.sr, self.gcr, self.strict) != (None, None, None):
+            raise ValueError("an infrastructure error is not scored")
+        if self.scored and self.sr != (self.status == "pass"):
+            raise ValueError("sr must be true for the status pass and false for any other")
+        if self.strict and not self.sr:
+            raise ValueError("strict success is success")
+        return self
+
+    @property
+    def scored(self) -> bool:
+        """Whether it says anything about the arm."""
+        return self.status != "infra_error"
+
+    @property
+    def line(self) -> bytes:
+        """As written: one line of JSON, keys sorted, ASCII."""
+        return canonical(self.model_dump()) + b"\n"
+
+    @property
+    def equal_line(self) -> bytes:
+        """The line without times and host: equal wherever and however it was run."""
+        return canonical(self.model_dump(exclude=set(UNEQUAL))) + b"\n"
+
+
+def canonical(value: object) -> bytes:
+    """JSON that is equal for equal values."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
