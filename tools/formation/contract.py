@@ -69,7 +69,7 @@ class ShapeSpec(_Frozen):
     points: tuple[Pair, ...] | None = Field(
         default=None, min_length=2, max_length=500, description="line, polyline: (x, y) in turn."
     )
-    rows: int | None = Field(default=None, ge=1, le=MAX_ROBOTS, description="grid.")
+    rows: int | None = Field(default=None, ge=1, description="grid.")
     corners: int | None = Field(default=None, ge=3, le=100, description="polygon, star: tips.")
     angles: Pair | None = Field(
         default=None, description="arc: from, to in degrees, clockwise from the right."

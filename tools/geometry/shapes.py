@@ -16,8 +16,8 @@ from .outline import FloatArray
 
 Kind = Literal["line", "arc", "circle", "grid", "polygon", "star", "letters", "polyline"]
 Box = tuple[float, float, float, float]
-WAIST = 0.4
-"""Inner radius of a star by its outer where its sides cannot be those of a regular one."""
+WAIST = 0.5
+"""Inner radius of a star by its outer: one of 5 points is a little fuller than a pentagram."""
 CIRCLE_STEP = 3.0
 """Degrees between the points of a circle."""
 
@@ -109,14 +109,12 @@ def polygon_sketch(corners: int) -> Sketch:
 
 
 def star_sketch(points: int) -> Sketch:
-    """A star with one point up; of 5 or more points the regular one that joins every other point.
+    """A star with one point up.
 
     Raises:
         InputError: fewer than 3 points.
     """
-    half = math.pi / _enough(points)
-    waist = math.cos(2 * half) / math.cos(half) if points >= 5 else WAIST
-    return _loop(np.tile([1.0, min(waist, 0.7)], points), -90)
+    return _loop(np.tile([1.0, WAIST], _enough(points)), -90)
 
 
 def letters_sketch(text: str) -> Sketch:

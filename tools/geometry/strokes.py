@@ -16,8 +16,8 @@ from .curves import interpolate
 from .outline import CORNER_TURN, FloatArray
 from .sampling import spread_subset
 
-SNAP = 5e-4
-"""Lines that come as near as this share of the drawing's size touch."""
+RESOLUTION = 20_000
+"""Lines meet on a grid of so many steps over the drawing, whose outermost points lie on it."""
 EVEN = 0.5
 """Corners are taken where no gap is less than this share of the widest."""
 
@@ -43,12 +43,14 @@ def walks(lines: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
     Returns:
         Polylines from crossing or end to crossing or end; a loop repeats its first point.
     """
-    drawn = MultiLineString([LineString(line) for line in lines])
-    x0, y0, x1, y1 = drawn.bounds
-    size = min(x1 - x0, y1 - y0) or max(x1 - x0, y1 - y0)
-    noded = shapely.union_all(drawn, grid_size=SNAP * size)
-    merged = shapely.line_merge(noded)
-    return tuple(shapely.get_coordinates(g) for g in shapely.get_parts(merged) if g.length > 0)
+    points = np.concatenate(lines)
+    low = points.min(axis=0)
+    extent = np.ptp(points, axis=0)
+    unit = np.where(extent > 0, extent, 1.0) / RESOLUTION
+    drawn = MultiLineString([LineString((line - low) / unit) for line in lines])
+    merged = shapely.line_merge(shapely.union_all(drawn, grid_size=1.0))
+    found = [shapely.get_coordinates(g) for g in shapely.get_parts(merged) if g.length > 0]
+    return tuple(low + line * unit for line in found)
 
 
 def spread(lines: tuple[FloatArray, ...], n: int) -> FloatArray:
