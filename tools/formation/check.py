@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry.curves import ROUND_JOIN_DIP, Curve
-from ..geometry.interior import coverage_radius, inside
+from ..geometry.interior import coverage_radius, yardstick
+from ..geometry.lloyd import cells_of
 from ..geometry.outline import FARTHEST, FloatArray, distances
 from ..geometry.sampling import min_spacing, nearest
 from . import spacing
@@ -93,9 +94,11 @@ def _keep_out(points: FloatArray, contract: Contract, site: Site, audit: Audit) 
     """No robot stands on what is kept out of, or on what another group stands around."""
     groups = np.repeat(np.arange(len(contract.groups)), [g.robots for g in contract.groups])
     for name in contract.solid_targets:
-        distance = distances(site.outlines[name].filled, points)
         owners = [k for k, g in enumerate(contract.groups) if name in g.targets]
         foreign = ~np.isin(groups, owners)  # a group's own rule speaks of its own target
+        if not foreign.any():
+            continue
+        distance = distances(site.outlines[name].filled, points)
         for i in np.flatnonzero(foreign & (distance <= contract.robot_radius)):
             text = f"stands on {name}, which is to be kept free"
             audit.robot("keep_out", int(i), distance[i], contract.robot_radius, text)
@@ -255,14 +258,14 @@ def _evenly_inside(part: Part, audit: Audit) -> None:
     margin, depth = (bound + part.radius for bound in part.clearance)
     floor = part.group.min_spacing or 0.0
     region = part.site.visible(part.group.targets[0])
-    ideal = inside(region, part.group.robots, margin, depth, floor)
-    apart, cover = min_spacing(part.points), coverage_radius(region, part.points)
-    ideal_apart = min_spacing(ideal) if len(ideal) > 1 else 0.0
+    ideal_apart, ideal = yardstick(region, part.group.robots, margin, depth, floor)
+    cells = cells_of(region.polygon, part.group.robots)
+    apart, cover = min_spacing(part.points), coverage_radius(region, part.points, cells)
     audit.greatest("coverage_radius_px", cover)
     if ideal_apart:
         audit.least("spacing_ratio", apart / ideal_apart)
     least = SPACING_SHARE * ideal_apart
-    most = COVER_SHARE * coverage_radius(region, ideal) if len(ideal) else np.inf
+    most = COVER_SHARE * coverage_radius(region, ideal, cells) if len(ideal) else np.inf
     if apart < least - TOLERANCE:
         audit.whole(
             "uneven",

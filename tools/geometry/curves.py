@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiLineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from .outline import FloatArray, Outline, distances, largest_part
+from .outline import WALKED, FloatArray, Outline, distances, largest_part, nearest_segments
 
 QUAD_SEGMENTS = 24
 ROUND_JOIN_DIP = 1 / math.cos(1.5 * math.pi / (4 * QUAD_SEGMENTS))
@@ -209,6 +209,20 @@ def interpolate(line: FloatArray, stations: FloatArray) -> FloatArray:
     share = np.clip((stations - starts) / np.where(lengths[i] > 0, lengths[i], 1.0), 0.0, 1.0)
     share[stations >= ends[-1]] = 1.0
     return np.where((share < 1)[:, None], steps[i] * share[:, None] + line[i], line[i + 1])
+
+
+def locate(line: FloatArray, points: FloatArray) -> FloatArray:
+    """Arc length of the place on a polyline (m, 2) that is nearest to each of (n, 2) points, px."""
+    places = np.asarray(shapely.points(points), dtype=object)
+    whole = LineString(line)
+    if len(points) * len(line) < WALKED:
+        return np.asarray(shapely.line_locate_point(whole, places), dtype=float)
+    index = nearest_segments(whole, places)[0]
+    steps = np.diff(line, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    along = ((points - line[index]) * steps[index]).sum(axis=1)
+    share = np.clip(along / np.maximum(lengths[index] ** 2, 1e-300), 0.0, 1.0)
+    return (np.cumsum(lengths) - lengths)[index] + share * lengths[index]
 
 
 def _runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:

@@ -5,6 +5,7 @@ come nearer than allowed they stand on the widest lattice itself. Frame: image p
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -27,6 +28,8 @@ SOME = 100
 """Up to so many robots, four starts are tried; up to MANY, two."""
 SURELY = 1.2
 """Discs about robots take up no more of the ground they reach than hexagons do; this is slack."""
+RELAXED = 0.7
+"""The closest pair after relaxing a lattice of thousands, as a share of its pitch; measured."""
 THIN = 0.25
 """Area over boundary length, px, below which a region is treated as a line."""
 TURNS = (0.0, math.pi / 12, math.pi / 6)
@@ -48,9 +51,7 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
     Returns:
         (k, 2), k < n when no more fit.
     """
-    region = outline.polygon.buffer(-margin).difference(
-        outline.polygon.buffer(-min(depth, outline.perimeter))
-    )
+    region = _region(outline, margin, depth)
     if region.is_empty:
         return np.empty((0, 2))
     if region.area < THIN * region.length:
@@ -59,19 +60,55 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
     if n * spacing**2 * math.sqrt(3) / 2 < SURELY * reached:  # else they cannot all fit
         even = _even(region, n)
         if min_spacing(even) >= spacing:
-            return even
+            return even.copy()
     turns = (_long_angle(region), *TURNS)
     lies = [Lattice(t, p) for t in turns for p in (ALL_PHASES if n <= MANY else ALL_PHASES[:1])]
     packed = most(region, spacing, lies)
     return widest(region, n, lies, spacing) if len(packed) > n else packed
 
 
-def coverage_radius(outline: Outline, points: FloatArray) -> float:
-    """Greatest distance from a point of the region to its nearest robot, px (sampled)."""
-    cells = cells_of(outline.polygon, len(points))
-    return float(nearest(points, cells, 1)[0].max())
+def yardstick(
+    outline: Outline, n: int, margin: float, depth: float, spacing: float
+) -> tuple[float, FloatArray]:
+    """What to judge N points inside a region by: how near they may be, and places as even.
+
+    Up to MANY the points of `inside` themselves. Past it the lattice they would be relaxed from,
+    which leaves less bare than it does, and the share of its pitch that relaxing leaves.
+
+    Args:
+        outline, n, margin, depth, spacing: as for `inside`.
+
+    Returns:
+        The distance of the closest pair, px, and (k, 2); k = 0 where nothing fits.
+    """
+    region = _region(outline, margin, depth)
+    if n > MANY and region.area >= THIN * region.length:
+        lattice = widest(region, n, [Lattice(_long_angle(region))])
+        if len(lattice) == n:
+            return max(RELAXED * min_spacing(lattice), spacing), lattice
+    points = inside(outline, n, margin, depth, spacing)
+    return (min_spacing(points) if len(points) > 1 else 0.0), points
 
 
+def coverage_radius(outline: Outline, points: FloatArray, cells: FloatArray | None = None) -> float:
+    """Greatest distance from a point of the region to its nearest robot, px (sampled).
+
+    Args:
+        outline: the region.
+        points: (n, 2) robots.
+        cells: its samples, see `cells_of`, where they are at hand.
+    """
+    sampled = cells_of(outline.polygon, len(points)) if cells is None else cells
+    return float(nearest(points, sampled, 1)[0].max())
+
+
+def _region(outline: Outline, margin: float, depth: float) -> BaseGeometry:
+    """Where robots may stand: as deep inside as they must and no deeper than they may."""
+    deepest = outline.polygon.buffer(-min(depth, outline.perimeter))
+    return outline.polygon.buffer(-margin).difference(deepest)
+
+
+@lru_cache(maxsize=4)  # whoever places robots has them checked next
 def _even(region: BaseGeometry, n: int) -> FloatArray:
     """N points spread evenly over a region, however near to each other."""
     long = _long_angle(region)
