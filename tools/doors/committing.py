@@ -172,7 +172,7 @@ def _held_to(contract: Contract, settings: Settings) -> Contract:
 
 
 def _with_clearance(group: Group, clearance: float | None) -> Group:
-    if clearance is None or group.relation in ("between", "shape", "centre"):
+    if clearance is None or not group.keeps_clearance:
         return group
     slack = max(EXACT_PX, EXACT_SHARE * clearance)
     greatest = 100_000.0 if group.relation == "inside" else clearance + slack

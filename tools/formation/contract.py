@@ -7,11 +7,22 @@ outline to the robot's edge, so a robot of radius r keeps its centre r further a
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
 
+from ..errors import InputError
+from ..geometry.letters import letter_strokes
 from ..geometry.outline import Outline
+from ..geometry.shapes import Kind
 
 MAX_ROBOTS = 10_000
 MIN_SPACING = 2.0
@@ -42,6 +53,68 @@ OUTSIDE: frozenset[str] = frozenset({"around", "cage", "corners", "along"})
 
 class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+Pair = Annotated[tuple[Coordinate, Coordinate], _numbers(2)]
+Four = Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], _numbers(4)]
+Where = Literal["around", "inside", "on", "left", "right", "above", "below"]
+ENCLOSING: frozenset[Kind] = frozenset({"arc", "circle", "polygon", "star"})
+
+
+class ShapeSpec(_Frozen):
+    """What robots draw, and where: in a box, by a target, or through points of their own."""
+
+    kind: Kind
+    text: str | None = Field(default=None, max_length=40, description="letters: A-Z, 0-9, blanks.")
+    points: tuple[Pair, ...] | None = Field(
+        default=None, min_length=2, max_length=500, description="line, polyline: (x, y) in turn."
+    )
+    rows: int | None = Field(default=None, ge=1, description="grid.")
+    corners: int | None = Field(default=None, ge=3, le=100, description="polygon, star: tips.")
+    angles: Pair | None = Field(
+        default=None, description="arc: from, to in degrees, clockwise from the right."
+    )
+    box: Four | None = Field(default=None, description="x0, y0, x1, y1 to fit it into; or where.")
+    where: Where | None = Field(default=None, description="By the target.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        problems = [*self._misplaced(), *self._placeless()]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+    def _misplaced(self) -> Iterator[str]:
+        for name, kinds in _FIELD_OF.items():
+            if getattr(self, name) is not None and self.kind not in kinds:
+                yield f"{name} belongs to {' or '.join(kinds)}, not to {self.kind}"
+        if self.kind == "letters":
+            try:
+                letter_strokes(self.text or "")
+            except InputError as error:
+                yield str(error).rstrip(".")
+        if self.kind == "polyline" and self.points is None:
+            yield "a polyline takes points"
+        if self.points is not None and len(set(self.points)) < 2:
+            yield "points must differ"
+
+    def _placeless(self) -> Iterator[str]:
+        given = (self.box is not None) + (self.where is not None)
+        if given > 1 or (not given and self.points is None):
+            yield f"a {self.kind} takes either a box, or where with a target"
+        if self.where == "around" and self.kind not in ENCLOSING:
+            yield f"only {', '.join(sorted(ENCLOSING))} go around a target, not {self.kind}"
+        if self.box is not None and not (self.box[0] <= self.box[2] and self.box[1] <= self.box[3]):
+            yield f"box {self.box} must be x0 <= x1, y0 <= y1"
+
+
+_FIELD_OF: dict[str, tuple[Kind, ...]] = {
+    "text": ("letters",),
+    "points": ("line", "polyline"),
+    "rows": ("grid",),
+    "corners": ("polygon", "star"),
+    "angles": ("arc",),
+}
 
 
 class Group(_Frozen):
@@ -89,10 +162,20 @@ class Group(_Frozen):
         default="line",
         description="between: a line that joins them, or a divider that parts them.",
     )
-    line: Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], _numbers(4)] | None = (
-        Field(default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free.")
+    line: Four | None = Field(
+        default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free."
     )
     closure: Literal["ring"] | None = Field(default=None, description="cage: ring, the default.")
+    facing: str | None = Field(
+        default=None, description="along: the side that faces this target, instead of a side."
+    )
+    shape: ShapeSpec | None = Field(default=None, description="shape: a form drawn by the robots.")
+
+    @model_serializer(mode="wrap")
+    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what later versions added and is not used: the hash of a plan stays the same."""
+        written = standard(self)
+        return {k: v for k, v in written.items() if v is not None or k not in ("facing", "shape")}
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -101,22 +184,42 @@ class Group(_Frozen):
             raise ValueError("; ".join(problems))
         return self
 
+    @property
+    def keeps_clearance(self) -> bool:
+        """Whether a clearance says anything: of a shape, where a target gives it its place."""
+        if self.shape is not None:
+            return self.shape.where not in (None, "on")
+        return self.relation not in ("between", "centre", "shape")
+
+    @property
+    def enters(self) -> bool:
+        """Whether its robots are meant to stand on its target."""
+        within = self.shape is not None and self.shape.where in ("inside", "on")
+        return within or self.relation in ("inside", "centre")
+
     def _missing(self) -> Iterator[str]:
         wanted = {"between": 2, "shape": 0}.get(self.relation, 1)
         if self.relation != "shape" and len(self.targets) != wanted:
             yield f"{self.relation} takes {wanted} target(s), got {len(self.targets)}"
         if len(set(self.targets)) < len(self.targets):
             yield f"targets {self.targets} must differ"
-        if self.relation == "along" and (self.side is None) == (self.edges is None):
-            yield "along takes either a side or edges"
+        ways = [self.side, self.edges, self.facing]
+        if self.relation == "along" and sum(way is not None for way in ways) != 1:
+            yield "along takes either a side or edges, or facing: one of them"
+        if self.shape is not None and self.shape.where is not None and len(self.targets) != 1:
+            yield f"a shape {self.shape.where} a target takes 1 target, got {len(self.targets)}"
         if self.relation == "cage" and self.robots < 3:
             yield f"a cage takes 3 or more robots, got {self.robots}"
         if self.clearance is not None and not self.clearance[0] <= self.clearance[1] > 0:
             yield f"clearance {self.clearance} must be (least, greatest > 0)"
 
     def _misplaced(self) -> Iterator[str]:
-        if self.clearance is not None and self.relation in ("between", "centre", "shape"):
+        if self.clearance is not None and not self.keeps_clearance:
             yield f"clearance does not apply to {self.relation}"
+        if self.facing is not None and self.facing in self.targets:
+            yield f"{self.facing} cannot face itself"
+        if self.shape is not None and self.line is not None:
+            yield "a shape is either a line or a form"
         if self.relation == "cage" and self.spacing != "even":
             yield "a cage is evenly spaced"
         for name, only in _ONLY_IN.items():
@@ -130,6 +233,8 @@ _ONLY_IN = {
     "max_gap": "cage",
     "closure": "cage",
     "line": "shape",
+    "facing": "along",
+    "shape": "shape",
 }
 
 
@@ -157,12 +262,13 @@ class Contract(_Frozen):
     def target_ids(self) -> tuple[str, ...]:
         """Every target named, once, in order."""
         named = [t for group in self.groups for t in group.targets] + list(self.keep_out)
-        return tuple(dict.fromkeys(named))
+        faced = [group.facing for group in self.groups if group.facing is not None]
+        return tuple(dict.fromkeys(named + faced))
 
     @property
     def solid_targets(self) -> tuple[str, ...]:
         """Targets no robot may stand on or drive over: those that no group is to enter."""
-        entered = {t for g in self.groups if g.relation in ("inside", "centre") for t in g.targets}
+        entered = {t for g in self.groups if g.enters for t in g.targets}
         return tuple(t for t in self.target_ids if t in self.keep_out or t not in entered)
 
     @property
@@ -221,7 +327,9 @@ def _defaults(
 def _default_range(
     group: Group, outline: Outline, room: tuple[float, float], radius: float
 ) -> tuple[float, float] | None:
-    if group.relation in ("around", "cage", "along"):
+    if group.shape is not None and group.shape.where == "inside":
+        return (INSIDE_SHARE * outline.size, outline.size)
+    if group.relation in ("around", "cage", "along") or (group.shape and group.keeps_clearance):
         aim = default_clearance(outline, room, radius) * FIT_FACTOR[group.fit]
         return (aim / 2, aim * 2)
     if group.relation == "corners":

@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
-from ..geometry.curves import FACING, Curve
+from ..geometry.curves import FACING, Curve, locate
 from ..geometry.outline import FloatArray, distances
 from ..geometry.sampling import corner_points
 from .place import corner_reach
@@ -171,11 +171,12 @@ def _order(points: FloatArray, curve: Curve) -> NDArray[np.intp]:
 
 def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
     """Arc length of each point's foot on the curve, pieces laid end to end, and its piece."""
+    if len(curve.lines) == 1:
+        return locate(curve.lines[0], points), np.zeros(len(points), dtype=np.intp)
     lines = [LineString(line) for line in curve.lines]
-    places = shapely.points(points)
     piece = np.argmin(np.stack([distances(line, points) for line in lines]), axis=0)
     starts = np.concatenate([[0.0], np.cumsum([line.length for line in lines])])
-    along = np.stack([shapely.line_locate_point(line, places) for line in lines])
+    along = np.stack([locate(line, points) for line in curve.lines])
     return starts[piece] + along[piece, np.arange(len(points))], piece
 
 

@@ -34,6 +34,8 @@ RECESS_SHARE = 0.5
 """Recesses narrower than twice this share of the size are bridged where sides are meant."""
 KNOB_SHARE, BULK_SHARE = 0.05, 0.93
 """What an opening by this share of the size removes is a knob, if this share of the area stays."""
+WALKED = 200_000
+"""Points times vertices up to which walking along a geometry for each point is quick."""
 MIN_AREA = 4.0
 """Square pixels below which an outline has no usable shape."""
 
@@ -214,7 +216,38 @@ def outline_of(polygon: BaseGeometry) -> Outline:
 
 def distances(geometry: BaseGeometry, points: FloatArray) -> FloatArray:
     """Distance of each of (n, 2) points to a geometry, 0 inside a polygon, (n,), px."""
-    return np.asarray(shapely.distance(geometry, shapely.points(points)), dtype=float)
+    places = np.asarray(shapely.points(points), dtype=object)
+    if len(places) * shapely.get_num_coordinates(geometry) < WALKED:
+        return np.asarray(shapely.distance(geometry, places), dtype=float)
+    found = nearest_segments(geometry, places)[1]
+    if shapely.area(geometry) > 0:
+        shapely.prepare(geometry)
+        found[shapely.intersects_xy(geometry, points)] = 0.0
+    return found
+
+
+def nearest_segments(
+    geometry: BaseGeometry, places: NDArray[np.object_]
+) -> tuple[NDArray[np.intp], FloatArray]:
+    """The nearest segment of lines or boundaries to each of (n,) places, and its distance, px.
+
+    Segments count through all lines in their order. A tree answers where GEOS, asked for a
+    distance, walks along the whole of the geometry for each place.
+    """
+    points, line = shapely.get_coordinates(
+        shapely.get_parts(_lines_of(geometry)), return_index=True
+    )
+    joined = np.flatnonzero(line[1:] == line[:-1])
+    segments = shapely.linestrings(np.stack([points[joined], points[joined + 1]], axis=1))
+    index, distance = shapely.STRtree(np.asarray(segments, dtype=object)).query_nearest(
+        places, return_distance=True, all_matches=False
+    )
+    return np.asarray(index[1], dtype=np.intp), np.asarray(distance, dtype=float)
+
+
+def _lines_of(geometry: BaseGeometry) -> BaseGeometry:
+    """The boundary of what has an area, else the lines themselves."""
+    return geometry.boundary if shapely.area(geometry) > 0 else geometry
 
 
 def largest_part(geometry: shapely.Geometry) -> Polygon | None:
