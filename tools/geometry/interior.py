@@ -58,7 +58,7 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
         return _on_axis(region, n, spacing)
     reached = region.buffer(spacing / 2).area
     if n * spacing**2 * math.sqrt(3) / 2 < SURELY * reached:  # else they cannot all fit
-        even = _even(region, n)
+        even = _even(region, _region(outline, 0, depth), n)
         if min_spacing(even) >= spacing:
             return even.copy()
     turns = (_long_angle(region), *TURNS)
@@ -109,14 +109,17 @@ def _region(outline: Outline, margin: float, depth: float) -> BaseGeometry:
 
 
 @lru_cache(maxsize=4)  # whoever places robots has them checked next
-def _even(region: BaseGeometry, n: int) -> FloatArray:
-    """N points spread evenly over a region, however near to each other."""
+def _even(region: BaseGeometry, covered: BaseGeometry, n: int) -> FloatArray:
+    """N points of a region spread evenly over a wider one, however near to each other.
+
+    What lies within the margin is to be covered like the rest, though no robot stands there.
+    """
     long = _long_angle(region)
     if n <= FEW:
-        cells = cells_of(region, n)
+        cells = cells_of(covered, n)
         starts = [_thinned(region, n, turn) for turn in (long, *TURNS)]
         return max((relax(cells, region, s, LLOYD_STEPS) for s in starts), key=min_spacing)
-    cells = cells_of(region, n, max(BRISK_CELLS, min(CELLS_EACH * n, MAX_CELLS)))
+    cells = cells_of(covered, n, max(BRISK_CELLS, min(CELLS_EACH * n, MAX_CELLS)))
     turns = (long, *TURNS) if n <= SOME else (long, long + math.pi / 6) if n <= MANY else (long,)
     starts = [widest(region, n, [Lattice(turn)]) for turn in turns]
     full = [s if len(s) == n else _thinned(region, n, long) for s in starts]

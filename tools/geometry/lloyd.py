@@ -45,7 +45,7 @@ def relax(
     """Move every point towards the centroid of the cells nearest to it, a number of times.
 
     Args:
-        cells: (m, 2) that stand for the region, see `cells_of`.
+        cells: (m, 2) that stand for what is to be covered, see `cells_of`.
         region: no point leaves it.
         points: (n, 2) to start from.
         steps: at most so many.
@@ -69,7 +69,8 @@ def relax(
             moved[kept] = further[kept]
         outside = ~shapely.intersects_xy(region, moved)
         if outside.any():  # a concave cell's centroid: the nearest place in the region instead
-            moved[outside] = cells[nearest(cells, moved[outside], 1)[1]]
+            way = shapely.shortest_line(region, shapely.points(moved[outside]))
+            moved[outside] = shapely.get_coordinates(way)[::2]
         if float(np.abs(moved - points).max()) < SETTLED:
             return moved
         if step < steps - 1:
