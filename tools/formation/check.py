@@ -15,6 +15,8 @@ from ..geometry.curves import ROUND_JOIN_DIP, Curve
 from ..geometry.outline import FARTHEST, FloatArray, distances
 from ..geometry.sampling import coverage_radius, inside, min_spacing, nearest
 from . import spacing
+from .caging import escape_proof
+from .closure import judge
 from .contract import CENTRE_SHARE, Contract
 from .place import Site, reference_curve, side_direction
 from .verdict import TOLERANCE, Audit, Part, Verdict, parts_of
@@ -146,7 +148,8 @@ def _around(part: Part, audit: Audit) -> None:
         )
     if part.group.relation == "cage":
         spacing.enclosure(part, curve, audit)
-    if part.group.spacing == "even":
+        judge(part, curve, audit)
+    if part.group.spacing == "even" and not escape_proof(part.group):
         spacing.evenness(part, curve, audit)
 
 

@@ -9,7 +9,15 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
 
 from ..geometry.outline import Outline
 
@@ -87,7 +95,20 @@ class Group(_Frozen):
     line: Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], _numbers(4)] | None = (
         Field(default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free.")
     )
-    closure: Literal["ring"] | None = Field(default=None, description="cage: ring, the default.")
+    closure: Literal["ring", "escape-proof"] | None = Field(
+        default=None,
+        description="cage: ring, the default; escape-proof: certified that it cannot get out "
+        "however it moves and turns, evenly spaced or not; only if asked for.",
+    )
+    walls: bool | None = Field(
+        default=None, description="cage, escape-proof: the picture's border is a wall; if said."
+    )
+
+    @model_serializer(mode="wrap")
+    def _walls_if_said(self, dump: SerializerFunctionWrapHandler) -> dict[str, object]:
+        """Without walls where nothing is said of them: plans of before there were any keep ids."""
+        data: dict[str, object] = dump(self)
+        return data if self.walls is not None else {k: v for k, v in data.items() if k != "walls"}
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -114,6 +135,8 @@ class Group(_Frozen):
             yield f"clearance does not apply to {self.relation}"
         if self.relation == "cage" and self.spacing != "even":
             yield "a cage is evenly spaced"
+        if self.walls and self.closure != "escape-proof":
+            yield "walls belong to the closure escape-proof"
         for name, only in _ONLY_IN.items():
             if getattr(self, name) is not None and self.relation != only:
                 yield f"{name} belongs to {only}, not to {self.relation}"
@@ -124,6 +147,7 @@ _ONLY_IN = {
     "edges": "along",
     "max_gap": "cage",
     "closure": "cage",
+    "walls": "cage",
     "line": "shape",
 }
 

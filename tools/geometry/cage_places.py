@@ -68,12 +68,22 @@ class Demand:
         keep = least + self.radius
         return tuple(ring(self.outline, d, d, self.frame, keep=keep) for d in offsets)
 
+    @cached_property
+    def slides(self) -> "_Slides":
+        """What the rings' stations close off, which is worked out once."""
+        return _Slides(self)
+
     def holds(self, points: FloatArray, levels: int) -> bool:
         """Whether robots there are certified to cage the object, and are not too close."""
         if len(points) > 1 and min_spacing(points) < self.spacing:
             return False
         found = cage(
-            self.outline.filled, points, self.radius, walls=self.walls, levels=levels
+            self.outline.filled,
+            points,
+            self.radius,
+            walls=self.walls,
+            levels=levels,
+            escapes=False,
         )
         return found.state == "caged"
 
@@ -100,9 +110,7 @@ def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
     return None if even is None else caging_places(demand, even)
 
 
-def caging_places(
-    demand: Demand, n: int, preferred: Sequence[Curve] = ()
-) -> FloatArray | None:
+def caging_places(demand: Demand, n: int, preferred: Sequence[Curve] = ()) -> FloatArray | None:
     """Places of n robots that certainly cage an object, (n, 2), image pixels, or None.
 
     Args:
@@ -118,7 +126,7 @@ def caging_places(
                 return points
     if n > MOST_SLID:
         return None
-    return _Slides(demand).places(n)
+    return demand.slides.places(n)
 
 
 def _even_count(demand: Demand, at_least: int) -> int | None:

@@ -60,6 +60,7 @@ def cage(
     *,
     walls: BaseGeometry | None = None,
     levels: int = THOROUGH,
+    escapes: bool = True,
 ) -> Cage:
     """Whether robots that stand still hold an object that may move and turn in the plane.
 
@@ -70,6 +71,7 @@ def cage(
         walls: what else the object cannot pass. With walls, caged means that it cannot leave the
             hull of the robots and itself, and only the configuration space is tried.
         levels: of the flood, QUICK to THOROUGH; 0 for the disc alone.
+        escapes: whether to look for a way out, which takes longer than proving that there is none.
     """
     points = np.asarray(robots, dtype=float).reshape(-1, 2)
     filled = Polygon(region.exterior)
@@ -89,7 +91,7 @@ def cage(
     body, obstacles = body_of(filled), Obstacles(points, radius, walls)
     if len(points) > MOST_FLOODED or not levels or overlaps(body, obstacles):
         return Cage("not certified", None, *known)
-    found = flood(body, obstacles, levels)
+    found = flood(body, obstacles, levels, escapes=escapes)
     if found.enclosed:
         return Cage("caged", "configuration space", *known)
     return Cage("not certified" if found.path is None else "escape", None, *known, found.path)

@@ -6,11 +6,13 @@ follows from a flood: a way out counts only once its moves are checked continuou
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from .configuration_grid import Grid, IndexArray, component, first_grid, halved
 from .escape import way_out
@@ -34,7 +36,7 @@ class Flood:
     path: FloatArray | None = None
 
 
-def flood(body: Body, obstacles: Obstacles, levels: int) -> Flood:
+def flood(body: Body, obstacles: Obstacles, levels: int, *, escapes: bool = True) -> Flood:
     """Flood the configurations from where the body is, on ever finer grids.
 
     The domain is where the pivot lies within the hull of the robots and the body, a little
@@ -51,6 +53,7 @@ def flood(body: Body, obstacles: Obstacles, levels: int) -> Flood:
     Args:
         body, obstacles: of which none overlap.
         levels: how often at most the cells reached are halved, the first grid included.
+        escapes: whether to look for a way out.
     """
     table = _distance_table(body, obstacles.radius)
     grid = first_grid(body, obstacles)
@@ -63,7 +66,7 @@ def flood(body: Body, obstacles: Obstacles, levels: int) -> Flood:
         reached = component(free, grid.seed(body.pivot))
         if not reached[:, grid.border].any():
             return Flood(bool(reached.any()))
-        if level in SEARCHED:
+        if escapes and level in SEARCHED:
             room = np.full(alive.shape, -np.inf)
             room[cells] = gap
             path = way_out(body, obstacles, grid, np.where(reached, room, -np.inf))
@@ -104,7 +107,7 @@ def _distance_table(body: Body, radius: float) -> _Table:
     x, y = (axis.ravel() for axis in np.meshgrid(ticks, ticks))
     ring = shapely.get_coordinates(inner.exterior)
     squared = np.full(len(x), np.inf)
-    for (ax, ay), (bx, by) in zip(ring[:-1], ring[1:], strict=True):
+    for (ax, ay), (bx, by) in pairwise(ring.tolist()):
         dx, dy = bx - ax, by - ay
         px, py = x - ax, y - ay
         along = np.clip((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-30), 0, 1)
@@ -175,16 +178,19 @@ def clearances(body: Body, robots: FloatArray, radius: float, grid: Grid) -> NDA
     return fields.reshape(-1, grid.turns, *grid.domain.shape)
 
 
-def _points(
-    table: _Table, obstacles: Obstacles, grid: Grid
-) -> list[tuple[FloatArray, float]]:
+def _points(table: _Table, obstacles: Obstacles, grid: Grid) -> list[tuple[FloatArray, float]]:
     """Robots and their radius; points of the walls within reach and radius 0."""
     points = [(obstacles.robots, obstacles.radius)]
     if obstacles.walls is not None:
-        low, high = grid.origin, grid.origin + grid.side * np.array(grid.domain.shape[::-1])
-        near = shapely.box(*(low - table.half), *(high + table.half))
-        lines = shapely.intersection(obstacles.walls, near)
-        lines = lines.boundary if shapely.get_dimensions(lines) == 2 else lines
-        step = max(float(lines.length) / WALL_POINTS, grid.side / 4)
-        points.append((shapely.get_coordinates(shapely.segmentize(lines, step)), 0.0))
+        points.append((_wall_points(obstacles.walls, table.half, grid), 0.0))
     return points
+
+
+def _wall_points(walls: BaseGeometry, reach: float, grid: Grid) -> FloatArray:
+    """Points on the walls within a distance of the grid, (k, 2)."""
+    x0, y0 = grid.origin - reach
+    x1, y1 = grid.origin + grid.side * np.array(grid.domain.shape[::-1]) + reach
+    lines = walls.boundary if shapely.get_dimensions(walls) == 2 else walls
+    lines = lines.intersection(Polygon.from_bounds(float(x0), float(y0), float(x1), float(y1)))
+    step = max(float(lines.length) / WALL_POINTS, grid.side / 4)
+    return shapely.get_coordinates(shapely.segmentize(lines, step))

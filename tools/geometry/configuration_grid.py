@@ -43,7 +43,7 @@ class Grid:
         """Cells of the domain that have a neighbour outside it."""
         from scipy import ndimage
 
-        return self.domain & ~ndimage.binary_erosion(self.domain, np.ones((3, 3)))
+        return self.domain & ~ndimage.binary_erosion(self.domain, np.ones((3, 3), dtype=np.intp))
 
     def seed(self, point: FloatArray) -> tuple[int, int, int]:
         """The cell of the start pose; theta 0 is where the first cell begins."""
@@ -52,7 +52,7 @@ class Grid:
 
     def centres(self, cells: tuple[IndexArray, ...]) -> FloatArray:
         """Poses in the middle of cells, (k, 3)."""
-        k, j, i = (index + 0.5 for index in cells)
+        k, j, i = (index.astype(float) + 0.5 for index in cells)
         x, y = self.origin[0] + i * self.side, self.origin[1] + j * self.side
         return np.stack([x, y, k * self.angle], axis=1)
 
@@ -72,10 +72,11 @@ def first_grid(body: Body, obstacles: Obstacles) -> Grid:
     origin = np.array([x0, y0]) - 2 * side
     nx, ny = (int(np.ceil(length / side)) + 4 for length in (x1 - x0, y1 - y0))
     x, y = np.meshgrid(np.arange(nx) + 0.5, np.arange(ny) + 0.5)
-    domain = shapely.contains_xy(region, origin[0] + x * side, origin[1] + y * side)
+    centres = origin + np.stack([x.ravel(), y.ravel()], axis=1) * side
+    domain = np.asarray(shapely.contains_xy(region, centres), dtype=np.bool_).reshape(x.shape)
     even = np.pi * np.sqrt(2) * body.reach / side  # a turn then counts as much as a step
     turns = int(np.clip(np.ceil(even), MIN_TURNS, MAX_TURNS))
-    return Grid(origin, side, turns, np.asarray(domain))
+    return Grid(origin, side, turns, domain)
 
 
 def component(free: BoolArray, seed: tuple[int, int, int]) -> BoolArray:
@@ -86,9 +87,9 @@ def component(free: BoolArray, seed: tuple[int, int, int]) -> BoolArray:
 
     closed = np.concatenate([free, free[:1]])  # the first layer again, behind the last
     labels = np.empty(closed.shape, dtype=np.int32)
-    count = int(ndimage.label(closed, np.ones((3, 3, 3)), output=labels))
-    same = np.unique(np.stack([labels[0][free[0]], labels[-1][free[0]]]), axis=1)
-    links = coo_array((np.ones(same.shape[1]), (same[0], same[1])), (count + 1, count + 1))
+    count = int(ndimage.label(closed, np.ones((3, 3, 3), dtype=np.intp), output=labels))
+    same = np.stack([labels[0][free[0]], labels[-1][free[0]]])
+    links = coo_array((np.ones(len(same.T)), (same[0], same[1])), (count + 1, count + 1))
     _, part = connected_components(links, directed=False)
     wanted = part == part[labels[seed]]
     wanted[0] = False

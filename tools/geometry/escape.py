@@ -105,9 +105,7 @@ def _links(reached: BoolArray) -> IndexArray:
     return np.sort(np.concatenate(pairs), axis=1)
 
 
-def _shortest(
-    links: IndexArray, count: int, source: int, goals: IndexArray
-) -> IndexArray | None:
+def _shortest(links: IndexArray, count: int, source: int, goals: IndexArray) -> IndexArray | None:
     """Nodes of a path with the fewest links to the nearest goal."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order

@@ -144,9 +144,7 @@ def ways_out(body: Body, obstacles: Obstacles, pose: FloatArray) -> FloatArray:
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     short = (obstacles.robots @ ways.T).max(axis=0) + obstacles.radius - (ring @ ways.T).min(axis=0)
     far = np.maximum(short, 0) + CONTACT * body.reach
-    return np.concatenate(
-        [pose[:2] + far[:, None] * ways, np.full((WAYS, 1), pose[2])], axis=1
-    )
+    return np.concatenate([pose[:2] + far[:, None] * ways, np.full((WAYS, 1), pose[2])], axis=1)
 
 
 def shortened(body: Body, obstacles: Obstacles, path: FloatArray) -> FloatArray:
