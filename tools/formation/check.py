@@ -17,6 +17,8 @@ from ..geometry.lloyd import cells_of
 from ..geometry.outline import FARTHEST, FloatArray, distances
 from ..geometry.sampling import min_spacing, nearest
 from . import spacing
+from .caging import escape_proof
+from .closure import judge
 from .contract import CENTRE_SHARE, Contract
 from .drawn import on_figure
 from .figure import figure_of
@@ -152,7 +154,8 @@ def _around(part: Part, audit: Audit) -> None:
         )
     if part.group.relation == "cage":
         spacing.enclosure(part, curve, audit)
-    if part.group.spacing == "even":
+        judge(part, curve, audit)
+    if part.group.spacing == "even" and not escape_proof(part.group):
         spacing.evenness(part, curve, audit)
 
 

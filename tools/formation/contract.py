@@ -165,7 +165,14 @@ class Group(_Frozen):
     line: Four | None = Field(
         default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free."
     )
-    closure: Literal["ring"] | None = Field(default=None, description="cage: ring, the default.")
+    closure: Literal["ring", "escape-proof"] | None = Field(
+        default=None,
+        description="cage: ring, the default; escape-proof: certified that it cannot get out "
+        "however it moves and turns, evenly spaced or not; only if asked for.",
+    )
+    walls: bool | None = Field(
+        default=None, description="cage, escape-proof: the picture's border is a wall; if said."
+    )
     facing: str | None = Field(
         default=None, description="along: the side that faces this target, instead of a side."
     )
@@ -175,7 +182,7 @@ class Group(_Frozen):
     def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without what later versions added and is not used: the hash of a plan stays the same."""
         written = standard(self)
-        return {k: v for k, v in written.items() if v is not None or k not in ("facing", "shape")}
+        return {k: v for k, v in written.items() if v is not None or k not in _LATER}
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -222,16 +229,20 @@ class Group(_Frozen):
             yield "a shape is either a line or a form"
         if self.relation == "cage" and self.spacing != "even":
             yield "a cage is evenly spaced"
+        if self.walls and self.closure != "escape-proof":
+            yield "walls belong to the closure escape-proof"
         for name, only in _ONLY_IN.items():
             if getattr(self, name) is not None and self.relation != only:
                 yield f"{name} belongs to {only}, not to {self.relation}"
 
 
+_LATER = frozenset({"facing", "shape", "walls"})
 _ONLY_IN = {
     "side": "along",
     "edges": "along",
     "max_gap": "cage",
     "closure": "cage",
+    "walls": "cage",
     "line": "shape",
     "facing": "along",
     "shape": "shape",

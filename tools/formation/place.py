@@ -20,6 +20,7 @@ from ..geometry.sampling import (
     min_spacing,
     spread_subset,
 )
+from .caging import caged_places, escape_proof
 from .contract import CENTRE_SHARE, Contract, Group, nominal
 from .figure import figure_of, place_figure
 from .site import CapacityError, Site
@@ -41,6 +42,7 @@ def place(contract: Contract, site: Site) -> FloatArray:
 
     Raises:
         CapacityError: a group has more robots than fit; its `fits` says how many do.
+        CageError: its robots cannot be placed escape-proof; `needed` says how many would do.
         ToolError: the contract leaves positions to the caller (a free shape).
     """
     parts = [_place_group(group, site, contract.robot_radius) for group in contract.groups]
@@ -132,6 +134,9 @@ def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
         points, why = _place_at_target(group, site, radius)
     else:
         curve = reference_curve(group, site, radius)
+        if escape_proof(group):
+            outline = site.outlines[group.targets[0]]
+            return caged_places(group, outline, radius, site.frame(radius), curve)
         points = _fit(curve, n, spacing)
         why = f"the {curve.length:.0f} px that are left to stand on allow no more at {spacing:g} px"
     if len(points) < n:

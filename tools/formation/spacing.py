@@ -12,6 +12,7 @@ from shapely.geometry import LineString, Polygon
 from ..geometry.curves import FACING, Curve, locate
 from ..geometry.outline import FloatArray, distances
 from ..geometry.sampling import corner_points
+from .caging import escape_proof
 from .place import corner_reach
 from .verdict import TOLERANCE, Audit, Part
 
@@ -98,19 +99,23 @@ def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
 
 
 def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
-    """A closed ring: the robots' polygon holds the target, no opening wider than allowed."""
+    """A closed ring: the robots' polygon holds the target, no opening wider than allowed.
+
+    What is to be escape-proof is judged by its certificate, openings only where one is named.
+    """
     points = part.points[_order(part.points, curve)]
     opening = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) - 2 * part.radius
     allowed = part.group.max_gap
     if allowed is None:
-        allowed = WIDEST * curve.whole_length / len(points)
+        even = WIDEST * curve.whole_length / len(points)
+        allowed = np.inf if escape_proof(part.group) else even
     audit.greatest("widest_opening_px", opening.max())
     audit.measures["min_width_px"] = round(part.outline.min_width, 2)
     encloses = len(points) > 2 and shapely.make_valid(Polygon(points)).contains(
         shapely.Point(part.outline.centre)
     )
     name = part.group.targets[0]
-    if not encloses:
+    if not encloses and not escape_proof(part.group):
         audit.whole(
             "not_enclosed",
             len(points),
