@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, MultiLineString, Polygon
+from shapely.geometry import GeometryCollection, LineString, MultiPoint, Polygon
 
 from ..errors import InputError, ToolError
 from ..geometry.curves import QUAD_SEGMENTS, ROUND_JOIN_DIP
@@ -54,8 +54,7 @@ def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sket
         placed = _placed(sketch, group, shape, site, radius)
     except InputError as error:
         raise ToolError(str(error)) from None
-    drawn = placed.lines if placed.places is None else (*placed.lines, placed.places)
-    points = np.concatenate(drawn)
+    points = placed.points
     box = site.frame(radius).box.buffer(1e-6)
     if not shapely.intersects_xy(box, points).all():
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
@@ -145,11 +144,12 @@ def _within(sketch: Sketch, outline: Outline, margin: float) -> Sketch:
     room = outline.polygon.buffer(-margin * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
     x0, y0, x1, y1 = outline.bounds
     width, height = sketch.size
-    most = math.hypot(x1 - x0, y1 - y0) / max(width, height)
+    most = math.hypot(x1 - x0, y1 - y0) / (max(width, height) or 1.0)
     for _ in range(SEARCH):
-        lines = MultiLineString([LineString(x) for x in sketch.at(outline.centre, most).lines])
-        if room.covers(lines):
-            return sketch.at(outline.centre, most)
+        placed = sketch.at(outline.centre, most)
+        lines = [LineString(line) for line in placed.lines]
+        if room.covers(GeometryCollection([*lines, MultiPoint(placed.points)])):
+            return placed
         most *= 0.95
     raise ToolError(f"It has no room inside the target, {margin:.1f} px from its edge.")
 
@@ -198,7 +198,7 @@ def _beside(
     if min(wide, high, most) <= 0:
         raise ToolError(f"There is no room {where} {group.targets[0]} in the picture.")
     extent = (y1 - y0) / height if dx and height else (x1 - x0) / width if dy and width else most
-    scale = min(extent, most)
+    scale = min(extent, most) if width or height else 1.0
     apart = min_spacing(robots_on(sketch, group.robots)) * scale
     if apart < (group.min_spacing or 0.0):
         scale = min(most, ROOMY * scale * (group.min_spacing or 0.0) / max(apart, 1e-9))

@@ -44,6 +44,11 @@ class Sketch:
         x0, y0, x1, y1 = self.frame
         return x1 - x0, y1 - y0
 
+    @property
+    def points(self) -> FloatArray:
+        """Every point of it, of the lines and of the places, (m, 2)."""
+        return np.concatenate([*self.lines, *([] if self.places is None else [self.places])])
+
     def at(self, centre: tuple[float, float], scale: float, stretch: float = 1.0) -> "Sketch":
         """The sketch enlarged about its middle, y by `stretch` more, and moved to a centre."""
         x0, y0, x1, y1 = self.frame
@@ -68,6 +73,8 @@ def fitted(sketch: Sketch, box: Box) -> Sketch:
     x0, y0, x1, y1 = box
     width, height = sketch.size
     centre = ((x0 + x1) / 2, (y0 + y1) / 2)
+    if width == height == 0:
+        return sketch.at(centre, 1.0)
     across = (x1 - x0) / width if width > 0 else math.inf
     down = (y1 - y0) / height if height > 0 else math.inf
     scale = min(across, down)
@@ -146,6 +153,8 @@ def grid_sketch(n: int, rows: int) -> Sketch:
     places = np.stack([index % columns, index // columns], axis=1).astype(float)
     full = -(-n // columns)  # 5 places in 4 rows of 2 fill only 3
     lines = tuple(np.array([(0.0, y), (columns - 1.0, y)]) for y in range(full) if columns > 1)
+    if columns == 1 and full > 1:
+        lines = (np.array([(0.0, 0.0), (0.0, full - 1.0)]),)
     return Sketch(lines, (0.0, 0.0, columns - 1.0, full - 1.0), places, fills=True)
 
 
