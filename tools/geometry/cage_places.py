@@ -151,7 +151,11 @@ class _Slides:
 
     def __init__(self, demand: Demand) -> None:
         self._demand = demand
-        self._rings = [_stations(curve) for curve in demand.curves if curve.length > 0]
+        # What the frame cuts open and no wall closes is no ring to slide on.
+        rings = [
+            c for c in demand.curves if c.closed or (demand.walls is not None and c.length > 0)
+        ]
+        self._rings = [_stations(curve) for curve in rings]
         body = body_of(demand.outline.filled)
         every = np.concatenate(self._rings) if self._rings else np.empty((0, 2))
         self._grid: Grid = first_grid(body, Obstacles(every, demand.radius))
