@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from .cages import QUICK, THOROUGH, cage
+from .cages import QUICK, THOROUGH, State, cage
 from .configuration import clearances
 from .configuration_grid import Grid, component, first_grid
 from .curves import Curve, Frame, ring
@@ -35,7 +35,7 @@ SWEEPS, STARTS = 6, 2
 BISECTIONS = 7
 MOST_SLID = 40
 """More robots than this are placed evenly or not at all."""
-TRIES = 8
+TRIES = 6
 """Numbers of robots tried below the even ring that the disc test certifies."""
 
 
@@ -73,19 +73,12 @@ class Demand:
         """What the rings' stations close off, which is worked out once."""
         return _Slides(self)
 
-    def holds(self, points: FloatArray, levels: int) -> bool:
-        """Whether robots there are certified to cage the object, and are not too close."""
+    def state(self, points: FloatArray, levels: int, escapes: bool = False) -> State:
+        """What is known of robots there as a cage; too near to each other they are none."""
         if len(points) > 1 and min_spacing(points) < self.spacing:
-            return False
-        found = cage(
-            self.outline.filled,
-            points,
-            self.radius,
-            walls=self.walls,
-            levels=levels,
-            escapes=False,
-        )
-        return found.state == "caged"
+            return "not certified"
+        region, radius, walls = self.outline.filled, self.radius, self.walls
+        return cage(region, points, radius, walls=walls, levels=levels, escapes=escapes).state
 
 
 def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
@@ -122,7 +115,7 @@ def caging_places(demand: Demand, n: int, preferred: Sequence[Curve] = ()) -> Fl
     levels = (0,) if n > MOST_SLID else (0, QUICK)
     for level in levels:
         for points in rings:
-            if demand.holds(points, level):
+            if demand.state(points, level) == "caged":
                 return points
     if n > MOST_SLID:
         return None
@@ -135,7 +128,7 @@ def _even_count(demand: Demand, at_least: int) -> int | None:
         most = int(curve.length / demand.spacing) if demand.spacing > 0 else 1000
         n = at_least
         while n <= most:
-            if any(demand.holds(points, 0) for points in _even_rings(curve, n)):
+            if any(demand.state(points, 0) == "caged" for points in _even_rings(curve, n)):
                 return n
             n = max(n + 1, int(n * 1.05))
     return None
@@ -158,7 +151,11 @@ class _Slides:
 
     def __init__(self, demand: Demand) -> None:
         self._demand = demand
-        self._rings = [_stations(curve) for curve in demand.curves if curve.length > 0]
+        # What the frame cuts open and no wall closes is no ring to slide on.
+        rings = [
+            c for c in demand.curves if c.closed or (demand.walls is not None and c.length > 0)
+        ]
+        self._rings = [_stations(curve) for curve in rings]
         body = body_of(demand.outline.filled)
         every = np.concatenate(self._rings) if self._rings else np.empty((0, 2))
         self._grid: Grid = first_grid(body, Obstacles(every, demand.radius))
@@ -175,9 +172,16 @@ class _Slides:
         for width, k, chosen in sorted(starts)[:STARTS]:
             width, chosen = self._tightened(k, chosen, width)
             points = self._rings[k][chosen]
-            if width < 0 and self._demand.holds(points, THOROUGH):
+            if width < 0 and self._certified(points):
                 return points
         return None
+
+    def _certified(self, points: FloatArray) -> bool:
+        """What leaks is mostly found out on coarse grids, before the finest are tried."""
+        state = self._demand.state(points, QUICK, escapes=True)
+        if state == "not certified":
+            state = self._demand.state(points, THOROUGH)
+        return state == "caged"
 
     def _clearances(self, body: Body, points: FloatArray) -> NDArray[np.float32]:
         fields = clearances(body, points, self._demand.radius, self._grid)
@@ -220,17 +224,10 @@ class _Slides:
 
 
 def _stations(curve: Curve) -> FloatArray:
-    """Points evenly along a curve, (k, 2); the ends of an open one twice at most."""
-    points = [
-        shapely.get_coordinates(
-            shapely.line_interpolate_point(
-                LineString(line), np.linspace(0, 1, _share(line, curve), endpoint=False), True
-            )
-        )
-        for line in curve.lines
-    ]
-    return np.concatenate(points)
-
-
-def _share(line: FloatArray, curve: Curve) -> int:
-    return max(round(STATIONS * LineString(line).length / curve.length), 2)
+    """Points evenly along the pieces of a curve, (k, 2)."""
+    pieces: list[FloatArray] = []
+    for line in map(LineString, curve.lines):
+        count = max(round(STATIONS * line.length / curve.length), 2)
+        at = np.arange(count) * line.length / count
+        pieces.append(shapely.get_coordinates(shapely.line_interpolate_point(line, at)))
+    return np.concatenate(pieces)

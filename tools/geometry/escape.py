@@ -42,15 +42,14 @@ def way_out(body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray) -> F
         nodes = _shortest(links, len(cells), source, goals)
         if nodes is None:
             return None
-        path = poses[nodes]
+        path = np.stack([body.start, *poses[nodes], exits[int(cells[nodes[-1]])]])
         path[:, 2] = np.unwrap(path[:, 2])
         clear = clear_moves(body, obstacles, path[:-1], path[1:])
         if clear.all():
-            last = exits[int(cells[nodes[-1]])].copy()
-            last[2] = path[-1, 2]
-            whole = np.concatenate([body.start[None], path, last[None]])
-            return shortened(body, obstacles, whole)
-        bad = np.sort(np.stack([nodes[:-1], nodes[1:]], axis=1)[~clear], axis=1)
+            return shortened(body, obstacles, path)
+        if not (clear[0] and clear[-1]):
+            return None
+        bad = np.sort(np.stack([nodes[:-1], nodes[1:]], axis=1)[~clear[1:-1]], axis=1)
         links = links[~np.isin(links @ (len(cells), 1), bad @ (len(cells), 1))]
     return None
 
