@@ -74,7 +74,7 @@ def at_corners(outline: Outline, n: int, standoff: float) -> FloatArray:
 def corner_points(outline: Outline, n: int) -> FloatArray:
     """The corners that n robots are matched with, (k, 2).
 
-    Four robots on an outline with another number of corners take the minimum-area rectangle's.
+    Four robots on an outline with another number of corners take the bulk's rectangle's.
     """
     corners = outline.corners
     return outline.bulk_rectangle if n == 4 and len(corners) != 4 else corners
