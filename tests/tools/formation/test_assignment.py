@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-MANY = settings(derandomize=True, deadline=None, max_examples=60)
+MANY = settings(derandomize=True, deadline=None, max_examples=40)
 seeds = st.integers(0, 2**32 - 1)
 OBJECTIVES: tuple[assignment.Objective, ...] = ("squares", "makespan", "named")
 SHAPES = ("scattered", "lattice", "ring", "one spot", "far")
