@@ -100,6 +100,9 @@ async def deploy(
         "worst_robot": worst + 1,
         "tolerance_px": arrival.tolerance_px,
     }
+    if arrival.assignment_gap is not None:
+        most = f"{arrival.assignment_gap:.2%} of the summed squared ways"
+        data["assignment"] = f"approximate: another could have saved {most} at most"
     return ToolResult(data, told=_told(tell, arrival) if arrival.arrived else None)
 
 

@@ -49,8 +49,15 @@ def place(contract: Contract, site: Site) -> FloatArray:
     return np.concatenate(parts)
 
 
-def reference_curve(group: Group, site: Site, radius: float) -> Curve:
-    """The curve a ring, side, line, shape or between group stands on."""
+def reference_curve(group: Group, site: Site, radius: float, offset: float | None = None) -> Curve:
+    """The curve a ring, side, line, shape or between group stands on.
+
+    Args:
+        group: with its defaults written out.
+        site: outlines and picture.
+        radius: of a robot, px.
+        offset: of robots' centres from the outline, px; None for the one the clearance aims at.
+    """
     frame = site.frame(radius)
     if group.shape is not None:
         lines = figure_of(group, group.shape, site, radius).lines
@@ -62,10 +69,10 @@ def reference_curve(group: Group, site: Site, radius: float) -> Curve:
         return _between(group, site, frame)
     outline = site.outlines[group.targets[0]]
     assert group.clearance is not None
-    offset = nominal(group.clearance) + radius
+    offset = nominal(group.clearance) + radius if offset is None else offset
     if group.relation != "along":
         least, greatest = (bound + radius for bound in group.clearance)
-        return ring(outline, offset, greatest, frame, keep=least)
+        return ring(outline, offset, max(greatest, offset), frame, keep=min(least, offset))
     if group.edges is not None:
         last = len(outline.edges) - 1
         if max(group.edges) > last:
