@@ -1,11 +1,13 @@
 """Reading and writing files of prompts: whole or not at all, never over one that is released."""
 
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Generator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from .prompt import PromptError
 
@@ -14,7 +16,7 @@ MAX_BYTES = 1 << 20
 PATIENCE = 10.0
 """Seconds to wait while another process writes in the folder."""
 BUSY = ".writing"
-"""The file that is there while somebody writes in the folder."""
+"""The file that is locked while somebody writes in the folder; by itself it means nothing."""
 
 
 def read_text(path: Path) -> str:
@@ -50,33 +52,72 @@ def write_new(path: Path, text: str) -> None:
         PromptError: there is one, or it cannot be written there.
     """
     with _refusals(path), _beside(path, text) as written:
-        os.link(written, path)  # unlike a renaming it fails where there is a file
+        try:
+            os.link(written, path)  # unlike a renaming it fails where there is a file
+        except FileExistsError:
+            raise
+        except OSError:  # this file system may have no hard links
+            _rename_new(written, path)
 
 
 @contextmanager
 def alone(folder: Path) -> Generator[None]:
-    """The only one to write in a folder, among processes.
+    """The only one to write in a folder; the system lets go of it when a process ends.
 
     Raises:
         PromptError: somebody else is still at it, or it cannot be written there.
     """
-    busy, until = folder / BUSY, time.monotonic() + PATIENCE
-    while True:
-        try:
-            os.close(os.open(busy, os.O_CREAT | os.O_EXCL))
-            break
-        except FileExistsError:
-            if time.monotonic() > until:
-                raise PromptError(
-                    f"Another process writes in {folder}; if none does, delete {busy}."
-                ) from None
-        except OSError as error:
-            raise PromptError(f"{folder} cannot be written: {error.strerror or error}.") from None
-        time.sleep(0.02)
+    path, until = folder / BUSY, time.monotonic() + PATIENCE
+    with _refusals(folder):
+        busy = _held(path)
+        while busy is None and time.monotonic() < until:
+            time.sleep(0.02)
+            busy = _held(path)
+    if busy is None:
+        raise PromptError(f"Another process writes in {folder}; try again when it is done.")
     try:
         yield
     finally:
-        busy.unlink(missing_ok=True)
+        with suppress(OSError):  # Windows deletes no open file; it may lie there
+            path.unlink()
+        busy.close()
+
+
+def _rename_new(written: Path, path: Path) -> None:
+    """Rename where there is no file: an empty one of our own takes the place first."""
+    path.open("xb").close()
+    try:
+        written.replace(path)
+    except BaseException:
+        path.unlink()
+        raise
+
+
+def _held(path: Path) -> BinaryIO | None:
+    """The file, locked; None while another has it, or has just deleted it."""
+    with ExitStack() as stack:
+        file = stack.enter_context(path.open("ab"))
+        with suppress(FileNotFoundError):
+            if _lock(file.fileno()) and os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                stack.pop_all()
+                return file
+    return None
+
+
+def _lock(handle: int) -> bool:
+    """Whether the lock of an open file could be had; the system keeps it until it is closed."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        return False
+    return True
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     StrictBool,
@@ -16,8 +17,15 @@ from pydantic import (
     model_validator,
 )
 
+
+def _word(name: object) -> object:
+    if isinstance(name, bool):
+        raise ValueError("YAML reads on, yes, off and no as true and false; put a name in quotes")
+    return name
+
+
 Value = StrictStr | StrictBool | StrictInt | StrictFloat
-InputName = Annotated[str, StringConstraints(pattern=r"^[a-z_][a-z0-9_]*$")]
+InputName = Annotated[str, BeforeValidator(_word), StringConstraints(pattern=r"^[a-z_][a-z0-9_]*$")]
 LARGEST = 2**63
 """Whole numbers stay below it, either way."""
 

@@ -84,13 +84,18 @@ class PromptLibrary:
         name = name if "@" in name else self.current(name)
         if name not in self.names():
             raise PromptError(f"Unknown prompt {name!r}. There are: {', '.join(self.names())}.")
-        home = self.home(name.partition("@")[0])
+        home, path = self.home(name.partition("@")[0]), self.path(name)
         lock = read_lock(home)
-        prompt = parse_prompt(
-            name, read_text(self.path(name)), lambda ref: read_partial(home, ref, lock)
-        )
-        if isinstance(prompt.version, int):
-            _check(prompt, lock.get(name), self.path(name))
+        released = "@draft-" not in name
+        if released and name not in lock:
+            raise PromptError(
+                f"{path} was never released: it is not in LOCK.json. If a release broke off, "
+                "delete it and release the draft again; else take its version out, name it "
+                f"draft-NAME{_END} and release that."
+            )
+        prompt = parse_prompt(name, read_text(path), lambda ref: read_partial(home, ref, lock))
+        if released:
+            _check(prompt, lock[name], path)
         return prompt
 
 
@@ -124,11 +129,6 @@ def read_partial(home: Path, ref: str, lock: dict[str, Locked]) -> str:
 _PUT_BACK = "put it back, and make a new version for the change"
 
 
-def _check(prompt: Prompt, locked: Locked | None, path: Path) -> None:
-    if locked is None:
-        raise PromptError(
-            f"{path} was never released: it is not in LOCK.json. Name it draft-NAME{_END} and "
-            "release it with `formup prompts release`."
-        )
+def _check(prompt: Prompt, locked: Locked, path: Path) -> None:
     if (locked.file_sha256, locked.sha256) != (prompt.file_sha256, prompt.sha256):
         raise PromptError(f"{path} was changed after it was released; {_PUT_BACK}.")

@@ -1,7 +1,7 @@
 """From a draft to a released version, and from a released version to the current one.
 
-What is released is linked into its place, never renamed over another, and entered in LOCK.json and
-CHANGELOG.md; one process at a time writes in a folder.
+What is released is put where there is no file, never over another, and then entered in LOCK.json
+and CHANGELOG.md; one process at a time writes in a folder.
 """
 
 import re

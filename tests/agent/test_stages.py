@@ -100,7 +100,7 @@ def test_what_is_not_certified_is_repaired_under_a_prompt_of_its_own(picture: Pi
     planner = Seer(script)
     agent = Agent(Seer([SEGMENT]), planner=planner, prompt="former-direct@v001")
     assert agent.run(picture, "Six around it").report.status == "deployed"
-    direct, repair = load_prompt("former-direct@v001").text, load_prompt("repair@v001").text
+    direct, repair = load_prompt("former-direct@v001").text, load_prompt("repair").text
     assert [r.system for r in planner.requests] == [direct, repair, repair]
 
 

@@ -26,7 +26,9 @@ WHY = ("--why", "a reason")
 
 
 @pytest.fixture
-def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Cli:
+def cli_as_shipped(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Cli:
     monkeypatch.setenv("FORMUP_PROMPTS", "mine")
     monkeypatch.setenv("COLUMNS", "200")
     monkeypatch.chdir(tmp_path)
@@ -40,6 +42,12 @@ def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp
         return ended.value.code, out, err
 
     return run
+
+
+@pytest.fixture
+def cli(shipped: Path, cli_as_shipped: Cli) -> Cli:
+    """With prompts that stay as they are in the place of those that ship."""
+    return cli_as_shipped
 
 
 def done(outcome: tuple[int, str, str]) -> str:
@@ -61,39 +69,42 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new), "utf-8")
 
 
-def comparison(path: Path, **changes: Any) -> Path:
+def comparison(path: Path, old: str, new: str, **changes: Any) -> Path:
     library = PromptLibrary(path.parent / "mine")
     sides = {
         key: {"prompt": name, "sha256": library.load(name).sha256}
-        for key, name in (("a", "former@v002"), ("b", "former@v003"))
+        for key, name in (("a", old), ("b", new))
     }
     path.write_text(json.dumps({**sides, "suite": "dev", "verdict": "pass", **changes}))
     return path
 
 
-def test_the_page_about_prompts_runs_as_written(cli: Cli, tmp_path: Path) -> None:
+def test_the_page_about_prompts_runs_as_written(cli_as_shipped: Cli, tmp_path: Path) -> None:
     page = (ROOT / "docs/prompts.md").read_text("utf-8")
+    assert not re.search("|".join(f"{id}@v[0-9]" for id in PromptLibrary().ids()), page)
     blocks = re.findall(r"```console\n(.*?)```", page, re.DOTALL)
     commands = [line.removeprefix("$ formup ") for block in blocks for line in block.splitlines()]
-    shown: dict[str, str] = {}
-    for command in commands:
-        words = shlex.split(command)
+    shown: list[tuple[str, str]] = []
+    for number, words in enumerate(map(shlex.split, commands), start=1):
         if words[1] == "promote":
-            comparison(tmp_path / "comparison.json")
-        shown[words[1]] = done(cli(*words))
+            comparison(tmp_path / "comparison.json", "rough@v001", "rough@v002")
+        shown.append((words[1], done(cli_as_shipped(*words))))
         if words[1] == "new":
-            draft = tmp_path / "mine/former/draft-rough.prompt.md"
-            edit(draft, "hypothesis:", "hypothesis: Fewer vertices do.")
-            edit(draft, "8 to 12 vertices", "6 to 9 vertices")
-    assert " ".join(shown) == "new lint diff render release list promote log tree"
-    assert "0 errors, 0 warnings" in shown["lint"]
-    assert "6 to 9 vertices" in shown["diff"]
-    assert "a rough outline of it, 6 to 9" in " ".join(shown["render"].split()).replace("  ", " ")
-    assert shown["release"] == "former@v003\n"
-    assert re.search(r"\* +former@v002", shown["list"])
-    assert "v003 current: passed on dev against former@v002" in shown["log"]
-    assert re.search("└── former@v002 .*\n +└── former@v003 [*]", shown["tree"])
-    assert PromptLibrary(tmp_path / "mine").load("former").name == "former@v003"
+            draft = tmp_path / "mine/rough" / f"{words[2].partition('@')[2]}.prompt.md"
+            edit(draft, "hypothesis:", "hypothesis: More of this do.")
+            draft.write_text(f"{draft.read_text('utf-8')}Change {number}.\n", "utf-8")
+    verbs = "new lint diff render release list new release promote log tree"
+    assert " ".join(verb for verb, _ in shown) == verbs
+    _, lint, diff, render, first, listed, _, second, _, log, tree = (out for _, out in shown)
+    assert lint == "0 errors, 0 warnings\n"
+    assert "+Change 1.\n" in diff
+    assert render == f"{load_prompt('former').render()}Change 1.\n"
+    assert (first, second) == ("rough@v001\n", "rough@v002\n")
+    assert re.search(r"\* +rough@v001", listed)
+    assert "v002 current: passed on dev against rough@v001" in log
+    parent = re.escape(load_prompt("former").name)
+    assert re.search(f"── {parent} .*\n.*── rough@v001 .*\n.*── rough@v002 [*]", tree)
+    assert PromptLibrary(tmp_path / "mine").load("rough").name == "rough@v002"
 
 
 def test_show_gives_hashes_and_the_file(cli: Cli, tmp_path: Path) -> None:
@@ -158,12 +169,13 @@ def test_nothing_with_an_error_is_released(cli: Cli, tmp_path: Path) -> None:
     assert not (tmp_path / "mine/LOCK.json").exists()
 
 
+COMPARED = ("former@v002", "former@v003")
 REPORTS: list[tuple[dict[str, Any], tuple[str, ...]]] = [
     ({"verdict": "block"}, ("verdict is 'block'",)),
     ({"verdict": "inconclusive"}, ("verdict is 'inconclusive'",)),
     ({"b": {"prompt": "former@v003", "sha256": "0" * 64}}, ("its b is another text",)),
     (
-        {"a": {"prompt": "former@v001", "sha256": load_prompt("former@v001").sha256}},
+        {"a": {"prompt": "former@v001", "sha256": "0"}},
         ("its a is former@v001, not former@v002, the current version",),
     ),
     (
@@ -190,7 +202,7 @@ def released(cli: Cli, tmp_path: Path) -> Path:
 def test_a_comparison_that_does_not_allow_it_is_refused(
     changes: dict[str, Any], words: tuple[str, ...], cli: Cli, released: Path
 ) -> None:
-    report = comparison(released / "comparison.json", **changes)
+    report = comparison(released / "comparison.json", *COMPARED, **changes)
     refused(cli("prompts", "promote", "former@v003", "--report", report), *words)
     assert (released / "mine/former/CURRENT").read_text() == "v002\n"
     assert "v003 current" not in (released / "mine/former/CHANGELOG.md").read_text()
@@ -203,7 +215,7 @@ def test_a_promotion_needs_a_comparison_or_a_reason(cli: Cli, released: Path) ->
     refused(cli(*promote, "--force"), "--why")
     refused(cli(*promote, "--report", "nowhere.json"), "nowhere.json")
     refused(cli(*promote, "--report", "broken.json"), "is not JSON")
-    report = comparison(released / "comparison.json")
+    report = comparison(released / "comparison.json", *COMPARED)
     refused(cli(*promote, "--report", report, "--force", *WHY), "--report FILE")
     assert done(cli(*promote, "--force", *WHY)) == "former is now former@v003\n"
     assert "v003 current: forced: a reason" in done(cli("prompts", "log", "former"))

@@ -18,10 +18,6 @@ def found(folder: Path, body: str, head: str = HEAD) -> list[tuple[str, str]]:
     return [(f.severity, f.rule) for f in lint(PromptLibrary(folder), ["mine@draft-x"])]
 
 
-def test_the_shipped_prompts_are_clean() -> None:
-    assert lint(PromptLibrary()) == []
-
-
 def test_a_sound_draft_is_clean(tmp_path: Path) -> None:
     assert found(tmp_path, "Draw an outline: pixels, y down. Schöne Grüße, привет.") == []
 
@@ -79,6 +75,7 @@ def test_all_of_it_is_found_at_once(tmp_path: Path) -> None:
     assert {rule for _, rule in rules} == {"secret", "spaces", "frame", "hypothesis"}
 
 
+@pytest.mark.usefixtures("shipped")
 def test_what_was_released_must_be_there_and_unchanged(tmp_path: Path) -> None:
     library = PromptLibrary(tmp_path)
     new_draft(library, "former@draft-x")

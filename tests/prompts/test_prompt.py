@@ -112,6 +112,8 @@ BROKEN = [
     ("{{n}}", "inputs: {n: {type: integer, max_chars: 3}}\n", ("max_chars is for strings",)),
     ("{{n}}", "inputs: {n: {type: list}}\n", ("inputs.n.type",)),
     ("text", "inputs: {N: {type: string}}\n", ("inputs.N",)),
+    ("{{on}}", "inputs: {on: {type: string}}\n", ("YAML reads on, yes, off and no as true",)),
+    ("{{no}}", "inputs: {no: {type: string}}\n", ("put a name in quotes",)),
     ("text", "tools: [look\n", ("no YAML",)),
     ("text", "created: 2026-13-45\n", ("no YAML",)),
     (" \n ", "", ("it has no text",)),
@@ -128,6 +130,11 @@ def test_what_is_wrong_with_a_file_is_said_all_at_once(
         assert word in str(refused.value)
 
 
+def test_names_that_yaml_reads_as_truth_values_go_in_quotes() -> None:
+    prompt = made("{{on}} {{no}}", declared({"on": "string", "no": "string"}))
+    assert prompt.render({"on": "a", "no": "b"}) == "a b\n"
+
+
 def test_a_file_must_be_what_its_place_says() -> None:
     with pytest.raises(PromptError, match=r"id is 'mine' but its folder 'other'.*file v002"):
         made("text", name="other@v002")
@@ -140,7 +147,7 @@ def test_a_file_must_be_what_its_place_says() -> None:
 def test_the_example_of_the_docs_is_a_prompt() -> None:
     page = (Path(__file__).parent.parent.parent / "docs/prompts.md").read_text("utf-8")
     source = page.split("```\n")[1]
-    prompt = parse_prompt("former@v003", source, lambda ref: "Pixels, y down.")
+    prompt = parse_prompt("rough@v002", source, lambda ref: "Pixels, y down.")
     assert prompt.render() == "Draw an outline of 8 vertices. Pixels, y down.\n"
 
 

@@ -1,6 +1,9 @@
 """Drafts, releases and promotions: what is written, and what never is."""
 
+import errno
 import json
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from datetime import date
 from pathlib import Path
@@ -9,10 +12,10 @@ import pytest
 from formup.prompts import PromptError, PromptLibrary, files
 from formup.prompts import release as releases
 from formup.prompts.history import diff, lineage, log
-from formup.prompts.library import SHIPPED
 from formup.prompts.release import new_draft, promote, release
 
 DAY = date(2026, 11, 25)
+pytestmark = pytest.mark.usefixtures("shipped")
 
 
 @pytest.fixture
@@ -31,7 +34,9 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new), "utf-8")
 
 
-def test_a_draft_of_a_shipped_id_brings_its_versions_along(library: PromptLibrary) -> None:
+def test_a_draft_of_a_shipped_id_brings_its_versions_along(
+    library: PromptLibrary, shipped: Path
+) -> None:
     path = new_draft(library, "former@draft-ring")
     assert library.names() == [
         "context@v001",
@@ -43,7 +48,7 @@ def test_a_draft_of_a_shipped_id_brings_its_versions_along(library: PromptLibrar
     assert made.sha256 == library.load("former").sha256
     assert path.parent.parent == library.folder
     assert library.home("former") == library.folder
-    assert library.home("context") == SHIPPED
+    assert library.home("context") == shipped
 
 
 def test_a_draft_of_a_new_id_is_a_page_to_fill(library: PromptLibrary) -> None:
@@ -193,16 +198,64 @@ def test_releases_at_the_same_time_get_versions_of_their_own(library: PromptLibr
     assert left == []
 
 
-def test_a_writer_that_was_killed_is_found_out(
-    library: PromptLibrary, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_writes_is_waited_for(library: PromptLibrary, monkeypatch: pytest.MonkeyPatch) -> None:
     new_draft(library, "mine@draft-x")
     assert library.folder is not None
-    (library.folder / files.BUSY).touch()
     monkeypatch.setattr(files, "PATIENCE", 0.05)
-    with pytest.raises(PromptError, match=r"Another process writes .* delete .*\.writing"):
+    with (
+        files.alone(library.folder),
+        pytest.raises(PromptError, match=r"Another process writes in .* try again"),
+    ):
         release(library, "mine@draft-x", "x", DAY)
+    assert release(library, "mine@draft-x", "x", DAY) == "mine@v001"
+
+
+KILLED = """
+import os, sys
+from datetime import date
+from pathlib import Path
+from formup.prompts import PromptLibrary, release
+
+release._write_lock = lambda *_: os._exit(9)
+release.release(PromptLibrary(Path(sys.argv[1])), "mine@draft-x", "x", date(2026, 11, 25))
+"""
+
+
+def test_a_release_whose_process_was_killed_is_told_and_done_again(library: PromptLibrary) -> None:
+    new_draft(library, "mine@draft-x")
+    assert library.folder is not None
+    command = [sys.executable, "-c", KILLED, str(library.folder)]
+    assert subprocess.run(command, check=False).returncode == 9
     assert (library.folder / files.BUSY).exists()
+    left = library.folder / "mine/v001.prompt.md"
+    for torn in (left.read_text("utf-8"), ""):
+        left.write_text(torn, "utf-8")
+        with pytest.raises(PromptError, match=r"v001.* If a release broke off, delete it and"):
+            library.load("mine@v001")
+    left.unlink()
+    assert release(library, "mine@draft-x", "x", DAY) == "mine@v001"
+    assert library.load("mine").name == "mine@v001"
+    assert [p.name for p in library.folder.rglob(".*")] == []
+
+
+def test_a_file_system_without_hard_links_will_do(
+    library: PromptLibrary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(*_: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(files.os, "link", none)
+    new_draft(library, "former@draft-x")
+    assert release(library, "former@draft-x", "x", DAY) == "former@v003"
+    assert library.load("former@v003").text == library.load("former@v002").text
+    assert library.folder is not None
+    before = files_of(library.folder)
+    with pytest.raises(PromptError, match="is there already and is not overwritten"):
+        files.write_new(library.folder / "former/v002.prompt.md", "other")
+    monkeypatch.setattr(Path, "replace", none)
+    with pytest.raises(PromptError, match="cannot be written: Operation not permitted"):
+        files.write_new(library.folder / "former/v004.prompt.md", "other")
+    assert files_of(library.folder) == before
 
 
 def test_partials_are_released_with_what_includes_them(library: PromptLibrary) -> None:

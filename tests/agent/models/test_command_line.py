@@ -49,7 +49,7 @@ def test_a_model_on_another_server(cli: Cli, server: Any, dialect: Any, http: An
     data = json.loads(out)
     assert (data["status"], data["message"]) == ("planned", "Six robots have a place.")
     assert data["model"] == f"{dialect.name}:m"
-    former = load_prompt("former@v003")
+    former = load_prompt("former")
     assert data["prompt"] == former.facts
     assert data["usage"]["input_tokens"] == 200
     assert data["usage"]["cost_usd"] == 0
