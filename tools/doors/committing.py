@@ -11,7 +11,9 @@ from ..fleet.simulated import SimulatedFleet
 from ..formation.contract import Contract, Group
 from ..formation.plan import Plan, make_plan
 from ..formation.wording import doubts
+from ..geometry.outline import distances
 from ..perception.prompts import Point, TargetPrompt
+from ..scene import Target
 from ..tool import ToolResult, tool
 from ..workspace import Settings, Workspace
 from .seeing import FRAME, doubtful, measured, overlays, sighting, summary
@@ -145,16 +147,22 @@ def _check_clear(workspace: Workspace, plan: Plan) -> None:
     for name in plan.formation.contract.target_ids:
         target = workspace.scene.target(name)
         if doubtful(target):
-            doubt = f"was measured with confidence {target.confidence:.2f}"
-            if target.missed:
-                places = ", ".join(f"({x:g}, {y:g})" for x, y in target.missed)
-                doubt = f"as measured leaves out your {places}"
             raise ToolError(
-                f"Not deployed yet: {name} {doubt}. If the outline shown follows the thing meant, "
-                f"deploy plan_id {plan.id} (with tell); misses below the clearance do no harm. "
-                "Else propose again with a closer outline, points on what is left out, or negative "
-                "points on what is not part of it."
+                f"Not deployed yet: {name} {_doubt(target)}. If the outline shown follows the "
+                f"thing meant, deploy plan_id {plan.id} (with tell): what it leaves out has less "
+                "clearance. Else propose again with a closer outline, with points on what is left "
+                "out beside it, or with negative points on what is not part of it."
             )
+
+
+def _doubt(target: Target) -> str:
+    """Why a target has to be looked at."""
+    if not target.missed:
+        return f"was measured with confidence {target.confidence:.2f}"
+    away = distances(target.outline.filled, np.asarray(target.missed))
+    places = zip(target.missed, away, strict=True)
+    left = ", ".join(f"({x:g}, {y:g}) by {px:.0f} px" for (x, y), px in places)
+    return f"as measured leaves out your {left}"
 
 
 def _told(tell: str | None, arrival: Arrival) -> str | None:

@@ -53,9 +53,9 @@ MEASURES = (
 )
 """What the footer tells: of those measured the first three."""
 CAGED = {
-    "caged": "cannot get out",
+    "certified": "cannot get out",
     "not certified": "may get out",
-    "escape": "can get out",
+    "gets out": "can get out",
 }
 NEAR = 2.0
 """Robots more than so many long sides of the picture away are not led lines to."""
@@ -189,8 +189,8 @@ def _facts(plan: Plan) -> list[str]:
     measured = plan.verdict.measures
     count = len(plan.formation.positions)
     told = [form.format(measured[key]) for key, form in MEASURES if key in measured]
-    if "cage" in measured:
-        told.insert(0, CAGED[str(measured["cage"])])
+    if "escape_proof" in measured:
+        told.insert(0, CAGED[str(measured["escape_proof"])])
     if "widest_opening_px" in measured:
         told = [fact for fact in told if not fact.startswith("widest gap")]
     return [plan.id, f"{count} robot{'s' * (count != 1)}", *told[:3]]

@@ -10,7 +10,9 @@ from ..geometry.curves import Curve
 from .caging import escape_proof, walls_of
 from .verdict import Audit, Escape, Part
 
-WORSE = ("caged", "not certified", "escape")
+WORDS = {"caged": "certified", "not certified": "not certified", "escape": "gets out"}
+"""What the measure `escape_proof` says of each state; the worst one last."""
+WORSE = tuple(WORDS.values())
 
 
 def judge(part: Part, curve: Curve, audit: Audit) -> None:
@@ -28,13 +30,13 @@ def judge(part: Part, curve: Curve, audit: Audit) -> None:
         walls=walls_of(part.group, part.site.room),
         levels=levels,
     )
-    before = audit.measures.get("cage")
-    if before is None or WORSE.index(found.state) > WORSE.index(str(before)):
-        audit.measures["cage"] = found.state
-    if found.test is not None and audit.measures.get("cage_test") != "configuration space":
-        audit.measures["cage_test"] = found.test
-    if audit.measures["cage"] != "caged":
-        audit.measures.pop("cage_test", None)
+    before, state = audit.measures.get("escape_proof"), WORDS[found.state]
+    if before is None or WORSE.index(state) > WORSE.index(str(before)):
+        audit.measures["escape_proof"] = state
+    if found.test is not None and audit.measures.get("escape_test") != "configuration space":
+        audit.measures["escape_test"] = found.test
+    if audit.measures["escape_proof"] != WORDS["caged"]:
+        audit.measures.pop("escape_test", None)
     if found.path is not None and audit.escape is None:
         poses = tuple((float(x), float(y), float(turn)) for x, y, turn in found.path.round(4))
         audit.escape = Escape(target=part.group.targets[0], poses=poses)

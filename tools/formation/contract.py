@@ -29,7 +29,7 @@ MIN_SPACING = 2.0
 """Centres of point robots nearer than this, px, are the same place."""
 CLEARANCE_SHARE, MIN_CLEARANCE = 0.16, 6.0
 """Default clearance: this share of the target's size (square root of its area), at least 6 px."""
-CORNER_SHARE, MIN_STANDOFF = 0.045, 3.0
+CORNER_SHARE, MIN_STANDOFF = 0.06, 3.0
 INSIDE_SHARE = 0.05
 CENTRE_SHARE = 0.2
 

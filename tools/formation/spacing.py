@@ -31,7 +31,7 @@ def evenness(part: Part, curve: Curve, audit: Audit) -> None:
     if len(part.points) < 2:
         return
     spread = _spread(part, curve)
-    mean = float(np.mean(spread.gaps or [curve.length]))
+    mean = float(np.mean(spread.gaps or [curve.length / len(part.points)]))
     if spread.gaps:
         audit.least("spacing_ratio", min(spread.gaps) / mean if mean > 0 else 0.0)
         audit.greatest("worst_gap_px", max(spread.gaps))

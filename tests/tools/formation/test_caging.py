@@ -27,15 +27,17 @@ def planned(thing: Outline, n: int, radius: float = 3.0, **more: object) -> Plan
     return make_plan(contract, Site({"t1": thing}, 640, 480), "s")
 
 
-@pytest.mark.parametrize(("thing", "n", "state"), [(SQUARE, 4, "escape"), (SQUARE, 9, "caged")])
+@pytest.mark.parametrize(
+    ("thing", "n", "state"), [(SQUARE, 4, "gets out"), (SQUARE, 9, "certified")]
+)
 def test_of_a_ring_it_is_reported_whether_it_holds_and_no_fault_found(
     thing: Outline, n: int, state: str
 ) -> None:
     verdict = planned(thing, n).verdict
     assert verdict.certified
-    assert verdict.measures["cage"] == state
-    assert verdict.measures.get("cage_test") == ("disc" if state == "caged" else None)
-    assert (verdict.escape is not None) == (state == "escape")
+    assert verdict.measures["escape_proof"] == state
+    assert verdict.measures.get("escape_test") == ("disc" if state == "certified" else None)
+    assert (verdict.escape is not None) == (state == "gets out")
     assert Verdict.model_validate_json(verdict.model_dump_json()) == verdict
 
 
@@ -57,7 +59,7 @@ def test_escape_proof_is_placed_certified_or_refused_with_a_number(thing: Outlin
         assert again.verdict.certified
         return
     assert plan.verdict.certified
-    assert plan.verdict.measures["cage"] == "caged"
+    assert plan.verdict.measures["escape_proof"] == "certified"
     assert plan.verdict.escape is None
 
 
@@ -80,7 +82,7 @@ def test_what_escape_proof_lacks_is_said_so_that_one_turn_mends_it() -> None:
     limit = verdict.findings[0].limit
     assert limit == pytest.approx(100, rel=0.01), "the diameter of the inscribed disc"
     enough = int(said.split(" robots evenly")[0].split()[-1])
-    assert planned(SQUARE, enough).verdict.measures["cage_test"] == "disc"
+    assert planned(SQUARE, enough).verdict.measures["escape_test"] == "disc"
 
 
 def test_uneven_robots_are_no_fault_of_an_escape_proof_cage_but_of_a_ring() -> None:
