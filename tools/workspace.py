@@ -235,7 +235,7 @@ ADVICE = {
     "candidate": "Draw a rough outline of 4 to 12 vertices around the thing.",
     "box": "Draw a rough outline of 4 to 12 vertices around the thing.",
     "outline": "Draw the outline closer, or name points that do not belong; if what was found "
-    "looks right, allow a lower threshold.",
+    "looks right, the person may allow a lower threshold.",
 }
 
 

@@ -149,9 +149,9 @@ def _check_clear(workspace: Workspace, plan: Plan) -> None:
         if doubtful(target):
             raise ToolError(
                 f"Not deployed yet: {name} {_doubt(target)}. If the outline shown follows the "
-                f"thing meant, deploy plan_id {plan.id} (with tell): what it leaves out has less "
-                "clearance. Else propose again with a closer outline, with points on what is left "
-                "out beside it, or with negative points on what is not part of it."
+                f"thing meant, deploy plan_id {plan.id} (with tell). Else propose again with a "
+                "closer outline, with a point on what is left out beside it, or with negative "
+                "points on what is not part of it."
             )
 
 
@@ -162,7 +162,7 @@ def _doubt(target: Target) -> str:
     away = distances(target.outline.filled, np.asarray(target.missed))
     places = zip(target.missed, away, strict=True)
     left = ", ".join(f"({x:g}, {y:g}) by {px:.0f} px" for (x, y), px in places)
-    return f"as measured leaves out your {left}"
+    return f"as measured leaves out your {left}, which has so much less clearance"
 
 
 def _told(tell: str | None, arrival: Arrival) -> str | None:
