@@ -23,7 +23,7 @@ from ..geometry.outline import FloatArray
 from ..geometry.rings import equal_chords, hole_rings, nested_rings
 from ..geometry.sampling import along_curve, min_spacing
 from ..geometry.shapes import Kind
-from ..perception.prompts import Point
+from ..perception.prompts import Box, Point
 from ..tool import ToolResult, tool, violations
 from ..workspace import Workspace
 from .seeing import FRAME
@@ -110,7 +110,7 @@ def sample_shape(
     rows: int | None = None,
     corners: int | None = None,
     angles: Point | None = None,
-    box: tuple[float, float, float, float] | None = None,
+    box: Box | None = None,
     where: Where | None = None,
 ) -> ToolResult:
     """Positions on a shape: a line, a drawn form, between two targets, or at a target's centre.

@@ -189,7 +189,8 @@ def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.
 class _Spread:
     """Robots along a curve: gaps and who is on either side, ends past the last, bare pieces.
 
-    `jumps` are straight distances from the last robot of a piece to the first of the next.
+    `jumps` are distances from the last robot of a piece to the first of the next, along the pieces
+    and straight from one to the other: as gaps are, no chord across a sharp corner.
     """
 
     gaps: list[float]
@@ -218,10 +219,10 @@ def _spread(part: Part, curve: Curve) -> _Spread:
             spread.bare.append(length)
             continue
         if last is not None:
-            pair = (last, mine[0][1])
-            ends = part.points[[pair[0] - part.first, pair[1] - part.first]]
-            spread.jumps.append((float(np.linalg.norm(ends[1] - ends[0])), pair))
-        last = mine[-1][1]
+            robot, left, end = last
+            across = float(np.linalg.norm(line[0] - end))
+            spread.jumps.append((left + across + mine[0][0], (robot, mine[0][1])))
+        last = (mine[-1][1], length - mine[-1][0], line[-1])
         for (a, i), (b, j) in pairwise(mine):
             spread.gaps.append(b - a)
             spread.pairs.append((i, j))
