@@ -17,7 +17,7 @@ from ..evals.pointed import JITTERED, Mode, Row, as_json, evaluate, mode_named, 
 from ..evals.scenes.build import write_scenes
 from ..evals.suite import Task, load_tasks
 from ..tools.store import write_whole
-from . import inputs
+from . import compare, inputs
 from . import options as o
 
 COLUMNS = {
@@ -99,6 +99,11 @@ def scenes(
         write_scenes(bar, folder)
         rows = _run(load_tasks(folder), chosen, 1)
     _show(rows, chosen, {"seeds": f"{first}-{last}", "data": "drawn scenes"}, out)
+
+
+app.command(name="compare")(compare.compare)
+app.command(name="gate")(compare.gate)
+app.command(name="merge")(compare.merge_shards)
 
 
 def recordings(model: str) -> dict[str, Path] | None:

@@ -120,3 +120,22 @@ SceneSeeds = Annotated[str, typer.Option("--seeds", help="First and last seed: 0
 KeepFolder = Annotated[
     Path | None, typer.Option("--keep", help="Keep pictures and annotations.json here.")
 ]
+OldRun = Annotated[Path, typer.Argument(metavar="A", help="Folder of trials: the baseline.")]
+NewRun = Annotated[Path, typer.Argument(metavar="B", help="Folder of trials: the new version.")]
+OldArm = Annotated[
+    str | None,
+    typer.Option("--arm-a", help="Which of A's, if several: words of method, prompt, model."),
+]
+NewArm = Annotated[
+    str | None,
+    typer.Option("--arm-b", help="Which of B's, if several: words of method, prompt, model."),
+]
+MetricName = Annotated[str, typer.Option("--metric", help="What is compared: sr, strict or gcr.")]
+Margin = Annotated[
+    str, typer.Option("--margin", help="Loss of success the gate tolerates, as a share.")
+]
+ReportFile = Annotated[
+    Path | None, typer.Option("--out", help="Where to write the comparison as JSON.")
+]
+Shards = Annotated[list[Path], typer.Argument(help="Folders of trials.", show_default=False)]
+MergedFolder = Annotated[Path, typer.Option("--out", help="The new folder.", show_default=False)]

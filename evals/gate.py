@@ -98,7 +98,7 @@ def gate(
         names = [name for name, fails in zip(paired.tasks, failing, strict=True) if fails]
         more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
         blocks.append(f"below 9 of 10 on what must pass: {', '.join(names[:NAMED])}{more}")
-    if invalid.estimate > INVALID_MARGIN:
+    if invalid.estimate > INVALID_MARGIN + TINY:
         shown = invalid.low > INVALID_MARGIN
         text = f"invalid output rises by more than {_points(INVALID_MARGIN)}: {_bounds(invalid)}"
         (blocks if shown else doubts).append(text if shown else f"perhaps {text}")
@@ -136,5 +136,5 @@ def _points(share: float) -> str:
 
 
 def _bounds(rise: Rise) -> str:
-    low, high = 100 * rise.low, 100 * rise.high
-    return f"{100 * rise.estimate:+.1f} points, bounds {low:+.1f} and {high:+.1f}"
+    estimate, low, high = (f"{round(100 * value, 1) + 0.0:+.1f}" for value in rise)
+    return f"{estimate} points, bounds {low} and {high}"

@@ -1,0 +1,61 @@
+"""Trials for the tests of the runner, importable by the processes that run them.
+
+Run as a script it is a sweep to be killed: FOLDER, then seconds that each trial takes.
+"""
+
+import random
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from formup.evals.runner import run_trials
+from formup.evals.trials import Trial, TrialRow
+from formup.tools.errors import ModelError
+
+SUITE = "a" * 64
+
+
+@dataclass(frozen=True)
+class Coin:
+    """Passes seven times of ten; what it says depends on the trial alone."""
+
+    seconds: float = 0.0
+    broken: str = ""
+
+    def __call__(self, trial: Trial) -> TrialRow:
+        time.sleep(self.seconds)
+        if trial.task == self.broken:
+            raise ModelError("The provider is down.")
+        luck = random.Random(trial.key)
+        passed = luck.random() < 0.7
+        return TrialRow.of(
+            trial,
+            "pass" if passed else "fail",
+            gcr=1.0 if passed else round(luck.random(), 3),
+            feedback="" if passed else "robot 3 stands inside; é\u2028",
+            input_tokens=luck.randrange(2000),
+            cost_usd=0.01,
+        )
+
+
+def sweep(tasks: int = 4, tries: int = 3, *, suite: str = SUITE, model: str = "m") -> list[Trial]:
+    """Two prompts on some tasks."""
+    return [
+        Trial(
+            suite=suite,
+            task=f"t{task}",
+            trial=number,
+            method="agent",
+            prompt=f"former@v00{version}",
+            prompt_sha=str(version) * 64,
+            model=model,
+        )
+        for version in (1, 2)
+        for task in range(tasks)
+        for number in range(tries)
+    ]
+
+
+if __name__ == "__main__":
+    run_trials(sweep(8, 10), Coin(float(sys.argv[2])), Path(sys.argv[1]))
