@@ -17,7 +17,7 @@ from ..agent.trace import NAME, prompt_name, read_trace
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
 from ..tools.workspace import Settings
-from . import evaluate, inputs, plans, tools, traces
+from . import eval_run, inputs, plans, tools, traces
 from . import options as o
 from .carry import Desk
 from .output import Folder
@@ -34,7 +34,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(tools.app, name="tools", help="The tools the model sees.")
-app.add_typer(evaluate.app, name="eval", help="How good it is.")
+app.add_typer(eval_run.app, name="eval", help="How good it is.")
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""Policies that know where the thing is and understand nothing: what a score is worth is beside them.
+"""Policies that know where the thing is and understand nothing: what scores are measured against.
 
 The best of them, by cell, is the chance level printed with every table. They stand on the true
 outline, so they say what finding the thing alone would give.

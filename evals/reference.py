@@ -39,10 +39,10 @@ def reference(goal: Task) -> FloatArray:
         quick = _spread(goal)
         return quick if grade_goals([goal], quick).strict else _placed(goal, where, WIDTHS[0])
     bands = WIDTHS if "band_px" in goal.success else WIDTHS[:1]
-    placed = (_placed(goal, where, width) for width in bands)
-    return next(
-        (p for p in placed if grade_goals([goal], p).strict), _placed(goal, where, bands[-1])
-    )
+    placed = [_placed(goal, where, bands[0])]
+    if not grade_goals([goal], placed[0]).strict:
+        placed += [_placed(goal, where, width) for width in bands[1:]]
+    return placed[-1]
 
 
 def _spread(goal: Task) -> FloatArray:

@@ -7,8 +7,8 @@ scene's own.
 from typing import Any
 
 import numpy as np
-import shapely
 from PIL import Image, ImageDraw
+from shapely.geometry import Polygon
 
 from ...tools.draw.text import font, wrapped
 from ..scenes.build import Story, entry_of, tell
@@ -55,12 +55,12 @@ def _place(story: Story, size: tuple[float, float]) -> tuple[float, float]:
     width, height = story.scene.size
     xs = np.linspace(4, max(4.0, width - size[0] - 4), 13)
     ys = np.linspace(4, max(4.0, height - size[1] - 4), 13)
-    best: tuple[float, float, float, float] | None = None
-    for x in xs.tolist():
-        for y in ys.tolist():
-            box = shapely.box(x, y, x + size[0], y + size[1])
-            gaps = [box.distance(thing.polygon) for thing in story.scene.things]
-            option = (min(*gaps, CLEAR), box.distance(story.target.polygon), x, y)
-            best = option if best is None or option > best else best
-    assert best is not None
-    return best[2], best[3]
+    corners = [(float(x), float(y)) for x in xs for y in ys]
+
+    def room(corner: tuple[float, float]) -> tuple[float, float]:
+        x, y = corner
+        box = Polygon.from_bounds(x, y, x + size[0], y + size[1])
+        nearest = min(box.distance(thing.polygon) for thing in story.scene.things)
+        return min(nearest, CLEAR), box.distance(story.target.polygon)
+
+    return max(corners, key=room)

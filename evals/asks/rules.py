@@ -6,8 +6,8 @@ Lengths are pixels: that is what a picture without a scale allows, and what the 
 import math
 from typing import Any
 
+import shapely
 from numpy.random import Generator
-from shapely.geometry import Polygon
 
 from ..scenes.layout import room
 from ..scenes.rules import success
@@ -61,7 +61,7 @@ def margin(random: Generator, thing: Thing) -> int | None:
     if most < 3:
         return None
     d = int(random.integers(3, most + 1))
-    return d if isinstance(thing.polygon.buffer(-d), Polygon) else None
+    return d if shapely.get_num_geometries(thing.polygon.buffer(-d)) == 1 else None
 
 
 def many(random: Generator, thing: Thing, arrangement: str, bounds: tuple[int, int]) -> int:

@@ -68,9 +68,14 @@ def _order(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
     one are. The rule of the photographs knows the hull alone and so can find gaps that are none.
     """
     middle = target.buffer(max(float(np.mean(distances(target, points))), 1.0)).exterior
-    station = shapely.line_locate_point(middle, shapely.points(points))
+    station = _stations(middle, points)
     orders = (around(target, points), np.argsort(station, kind="stable"))
     return min(orders, key=lambda order: float(_gaps(points[order]).max()))
+
+
+def _stations(line: LineString, points: FloatArray) -> FloatArray:
+    """Arc length of the place of a line that is nearest to each point, (m,), px."""
+    return np.asarray(shapely.line_locate_point(line, shapely.points(points)), dtype=float)
 
 
 def _gaps(loop: FloatArray) -> FloatArray:
@@ -92,7 +97,7 @@ def _widest(task: Task, loop: FloatArray, gaps: FloatArray) -> str:
 def _closed_share(target: Polygon, loop: FloatArray, closed: NDArray[np.bool_]) -> float:
     """Share of the convex hull's length that lies in no open gap."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
-    station = shapely.line_locate_point(hull, shapely.points(loop))
+    station = _stations(hull, loop)
     open_ends = zip(station[~closed], np.roll(station, -1)[~closed], strict=True)
     bare = sum((end - start) % hull.length for start, end in open_ends)
     return float(np.clip(1 - bare / hull.length, 0, 1))
@@ -111,7 +116,7 @@ def _goes_round(centre: tuple[float, float], loop: FloatArray) -> bool:
 def _reach(target: Polygon, loop: FloatArray) -> float:
     """Share of the convex hull's length that the robots are spread along."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
-    station = np.sort(shapely.line_locate_point(hull, shapely.points(loop)))
+    station = np.sort(_stations(hull, loop))
     return 1 - float(np.diff(station, append=station[0] + hull.length).max() / hull.length)
 
 
@@ -123,7 +128,7 @@ def _even(task: Task, target: Polygon, loop: FloatArray) -> tuple[bool, float]:
     if not task.success.get("even") or len(loop) < 3:
         return True, 1.0
     middle = target.buffer(max(float(np.mean(distances(target, loop))), 1.0)).exterior
-    station = shapely.line_locate_point(middle, shapely.points(loop))
+    station = _stations(middle, loop)
     width, height = task.size
     n = len(loop)
     if shapely.box(0, 0, width - 1, height - 1).contains(middle):

@@ -24,7 +24,9 @@ def matched(points: FloatArray, slots: FloatArray, tolerance: float) -> NDArray[
     """
     distance = np.linalg.norm(points[:, None] - slots[None], axis=2)
     beyond = (min(distance.shape) + 1) * max(tolerance, 1.0)
-    rows, columns = linear_sum_assignment(np.where(distance <= tolerance, distance, beyond))
+    cost = distance.copy()
+    cost[distance > tolerance] = beyond
+    rows, columns = linear_sum_assignment(cost)
     found = np.full(len(points), -1, dtype=np.intp)
     good = distance[rows, columns] <= tolerance
     found[rows[good]] = columns[good]

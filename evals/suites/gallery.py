@@ -1,4 +1,4 @@
-"""The pictures of a suite as files, drawn where they are not there yet, and the hashes of pixels."""
+"""The pictures of a suite as files, drawn where they are not there yet, and what they hash to."""
 
 import hashlib
 from collections.abc import Callable, Sequence

@@ -17,6 +17,7 @@ import yaml
 
 from ...agent.report import Status
 from ...tools.errors import InputError
+from ...tools.store import write_whole
 from ..asks.frontier import frontier
 from ..asks.inscribed import inscribed
 from ..asks.styled import styled
@@ -81,6 +82,32 @@ def load_suite(name: str, split: str | None = None) -> Suite:
     return Suite(content["name"], " ".join(content["description"].split()), tasks)
 
 
+def described(name: str) -> str:
+    """What a shipped suite is, in its own words."""
+    content = yaml.safe_load((Path(__file__).parent / f"{name}.yaml").read_text(encoding="utf-8"))
+    return " ".join(content["description"].split())
+
+
+def write_suite(folder: Path, name: str) -> Path:
+    """Make a suite of a folder in the photos' format; the path of its YAML file.
+
+    Raises:
+        InputError: it has one already, or there is no annotations.json that can be read.
+    """
+    path = folder / FILE
+    read_entries(folder / "annotations.json")
+    if path.exists():
+        raise InputError(f"{path} is there already; remove it to make it anew.")
+    called = re.sub(r"[^a-z0-9_-]+", "-", name.lower()).strip("-_") or "mine"
+    content = {
+        "name": called,
+        "description": f"Tasks on the pictures of {folder.name}.",
+        "tasks": [{"folder": ".", "family": called}],
+    }
+    write_whole(path, yaml.safe_dump(content, sort_keys=False).encode())
+    return path
+
+
 def schema() -> dict[str, Any]:
     """The JSON Schema of suites."""
     return json.loads((Path(__file__).parent / "schema.json").read_text(encoding="utf-8"))
@@ -105,7 +132,7 @@ class _Families:
         """The split of a family; None if it is not wanted."""
         found: Split = "dev"
         if self.named:
-            splits = [s for s in SPLITS if family in self.named.get(s, ())]
+            splits: list[Split] = [s for s in SPLITS if family in self.named.get(s, ())]
             if len(splits) != 1:
                 raise InputError(
                     f"{self.path}: the family {family!r} is in {len(splits)} splits; every family "
