@@ -22,7 +22,8 @@ def check_task(task: SuiteTask) -> list[str]:
         return [f"{task.id}: no right answer could be placed: {error}"]
     graded = grade_goals(task.goals, placed)
     problems = [] if graded.sr else [f"{task.id}: a right answer fails: {graded.feedback}."]
+    crowd = sum(goal.robots for goal in task.goals) > 1  # of one, finding the thing may be all
     for name in POLICIES:
-        if scores(name, task.goals)[0] == 1:
+        if crowd and scores(name, task.goals)[0] == 1:
             problems.append(f"{task.id}: the policy {name}, which understands nothing, succeeds.")
     return problems

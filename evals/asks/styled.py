@@ -27,7 +27,7 @@ def styled(seed: int) -> dict[str, Any]:
     """The entry of annotations.json of a seed: its scene, with a task of its own."""
     story = tell(seed)
     random = np.random.default_rng([seed, 4])
-    fitting = arrangements(story.target, story.category)
+    fitting = [a for a in arrangements(story.target, story.category) if a != "centre"]
     arrangement = fitting[random.integers(len(fitting))]
     side = str(random.choice(["left", "right", "upper", "lower"]))
     robots = _robots(random, story, arrangement)
