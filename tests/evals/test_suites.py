@@ -116,7 +116,10 @@ def test_words_in_a_picture_stand_beside_the_thing_meant() -> None:
         changed = (np.asarray(plain) != np.asarray(written)).any(axis=2)
         assert changed.sum() > 200
         rows, columns = np.nonzero(changed)
-        touched = [story.target.polygon.distance(Point(x, y)) for x, y in zip(columns, rows)]  # noqa: B905
+        touched = [
+            story.target.polygon.distance(Point(x, y))
+            for x, y in zip(columns.tolist(), rows.tolist(), strict=True)
+        ]
         assert min(touched) > 0
 
 

@@ -99,7 +99,7 @@ def moved(task: Task, change: Callable[[FloatArray], FloatArray], scale: float) 
         if key == "points":
             rule[key] = ring(value)
         elif key.endswith("_px"):
-            rule[key] = [v * scale for v in value] if isinstance(value, list) else value * scale
+            rule[key] = (np.asarray(value) * scale).tolist()
     target = task.target
     thing = Thing(target.id, target.name, ring(target.polygon), [ring(h) for h in target.holes])
     return replace(task, target=thing, success=rule, size=(4000, 4000))
