@@ -19,7 +19,7 @@ from .suite import Task
 DRAWS = 4
 """Repetitions of the policies that draw lots, for a chance level."""
 CEILINGS = {"pile": 0.1, "scatter": 0.3, "boundary": 0.1, "circle": 0.35, "line": 0.35}
-"""Mean GCR over the tasks of a suite that no policy may exceed; a test holds every suite to it."""
+"""Mean GCR over a suite's tasks for more than one robot that a policy may reach; tested."""
 LUCKY = 0.02
 """Share of tasks for more than one robot that a policy may solve by chance."""
 BOX = 1.5
