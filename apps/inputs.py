@@ -114,6 +114,20 @@ def share(name: str, text: str | None) -> float | None:
     return value
 
 
+def dollars(name: str, text: str | None) -> float | None:
+    """An amount of money in US dollars.
+
+    Raises:
+        InputError: not a number above 0.
+    """
+    if text is None:
+        return None
+    value = _number(text)
+    if value is None or not 0 < value <= 1_000_000:
+        raise InputError(f"{name} {text!r} cannot be used; give US dollars above 0, such as 2.50.")
+    return value
+
+
 def descriptor(text: str) -> Descriptor:
     """How shapes are put into text.
 

@@ -87,7 +87,7 @@ def _boundary(task: Task, points: FloatArray, result: Grade) -> None:
     far = float(distances(target.convex_hull, points).max())
     _limit(result, near < low, False, f"{near:.1f} px from the target, {low} needed")
     _limit(result, far > high, False, f"{far:.1f} px from the target, {high} allowed")
-    loop = points[_around(target, points)]
+    loop = points[around(target, points)]
     gaps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     widest = float(gaps.max()) if len(loop) > 1 else float("inf")
     most = rule["max_gap_px"]
@@ -96,7 +96,7 @@ def _boundary(task: Task, points: FloatArray, result: Grade) -> None:
         _even(_gaps_along(target, loop, task), result)
 
 
-def _around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
+def around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
     """Order of the points along the target's convex hull, nearer ones first where that ties."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
     station = shapely.line_locate_point(hull, shapely.points(points))
@@ -175,12 +175,12 @@ def _side(task: Task, points: FloatArray, result: Grade) -> None:
     )
     most = rule["min_span_frac"]
     _limit(result, span < most * extent, False, f"spans {span / extent:.2f}, {most} needed")
-    _limit(result, not _beyond(target, points, name), False, f"not all on the {name} side")
+    _limit(result, not beyond(target, points, name), False, f"not all on the {name} side")
     ordered = points[np.argsort(points[:, axis])]
     _even(np.linalg.norm(np.diff(ordered, axis=0), axis=1), result)
 
 
-def _beyond(target: Polygon, points: FloatArray, name: str) -> bool:
+def beyond(target: Polygon, points: FloatArray, name: str) -> bool:
     """Nothing of the target lies between a robot and the picture's border on that side."""
     far = 1e5
     way = {"left": (-far, 0), "right": (far, 0), "top": (0, -far), "bottom": (0, far)}[name]

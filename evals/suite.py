@@ -68,9 +68,17 @@ def load_tasks(folder: Path | None = None) -> list[Task]:
     """
     path = folder or photos_folder()
     path = path if path.suffix == ".json" else path / "annotations.json"
-    root = path.parent
+    return [task for entry in read_entries(path) for task in _tasks(entry, path.parent)]
+
+
+def read_entries(path: Path, entries: Any = None) -> list[dict[str, Any]]:
+    """The entries of a file in the photos' format, or those given as if they stood in it.
+
+    Raises:
+        InputError: no such file, not JSON, against the schema, or a picture missing.
+    """
     try:
-        entries = json.loads(path.read_text(encoding="utf-8"))
+        entries = json.loads(path.read_text(encoding="utf-8")) if entries is None else entries
     except OSError as error:
         raise InputError(
             f"{path}: {error.strerror or error}; --data takes a folder with an annotations.json."
@@ -78,7 +86,10 @@ def load_tasks(folder: Path | None = None) -> list[Task]:
     except ValueError as error:
         raise InputError(f"{path} is not JSON: {error}.") from None
     _validate(entries, path)
-    return [task for entry in entries for task in _tasks(entry, root)]
+    for entry in entries:
+        if not (path.parent / entry["image"]).is_file():
+            raise InputError(f"{path} names {entry['image']}, which is not there.")
+    return entries
 
 
 def _validate(entries: Any, path: Path) -> None:
@@ -94,15 +105,14 @@ def _validate(entries: Any, path: Path) -> None:
 
 
 def _tasks(entry: dict[str, Any], root: Path) -> list[Task]:
-    image = root / entry["image"]
-    if not image.is_file():
-        raise InputError(f"{root / 'annotations.json'} names {entry['image']}, which is not there.")
     things = {
         o["id"]: Thing(o["id"], o["name"], o["polygon"], o.get("holes", []))
         for o in entry["objects"]
     }
     tasks: list[Task] = []
     for task in entry["tasks"]:
+        if "expects" in task:
+            continue  # asking or refusing is right: of suites alone
         named = [task["target"], *filter(None, [task["success"].get("other")])]
         missing = [name for name in named if name not in things]
         if missing:
@@ -117,7 +127,7 @@ def _tasks(entry: dict[str, Any], root: Path) -> list[Task]:
                 robots=task["robots"],
                 category=task["category"],
                 setup=task["setup"],
-                image=image,
+                image=root / entry["image"],
                 size=(entry["width"], entry["height"]),
                 target=things[task["target"]],
                 success=task["success"],

@@ -36,6 +36,14 @@ COMMANDS = [
 ]
 
 
+SHOWN = {
+    "formup run": "deployed:",
+    "formup eval suites": "zerocap15",
+    "formup eval run": "chance GCR",
+}
+"""What commands print, by how they begin."""
+
+
 class Provider(BaseHTTPRequestHandler):
     """A server in the provider's place that proposes, deploys and says so, and tries every tool
     that is not formup's own first."""
@@ -96,7 +104,8 @@ def test_commands_run_as_written(command: str, tmp_path: Path) -> None:
     arguments = [sys.executable, "-m", *shlex.split(command)]
     done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert ("deployed:" if command.startswith("formup run") else '"settled": true') in done.stdout
+    shown = (text for start, text in SHOWN.items() if command.startswith(start))
+    assert next(shown, '"settled": true') in done.stdout
 
 
 def test_there_is_something_to_run() -> None:

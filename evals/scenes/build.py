@@ -23,7 +23,7 @@ from .families import FAMILIES
 from .layout import GAP, clearance, nearest_gap, room
 from .paint import draw
 from .rules import arrangements, robots_for, success
-from .things import Scene, Thing
+from .things import Family, Scene, Thing
 
 CELLS = tuple(product(("general", "infill", "caging"), ("single", "multi", "hidden")))
 SHARES = {"single": (0.01, 0.15), "multi": (0.004, 0.08), "hidden": (0.004, 0.08)}
@@ -69,10 +69,15 @@ def make_scene(seed: int) -> tuple[Image.Image, dict[str, Any]]:
     return draw(story.scene), entry_of(story)
 
 
+def family_of(seed: int) -> Family:
+    """The family a seed's scene is of."""
+    return FAMILIES[(seed // 9 + seed % 9) % 6]
+
+
 def tell(seed: int) -> Story:
     """The scene of a seed, undrawn, and what is asked of it."""
     category, setup = CELLS[seed % 9]
-    family = FAMILIES[(seed // 9 + seed % 9) % 6]
+    family = family_of(seed)
     random = np.random.default_rng([seed, 0])
     kinds = {"single": ("single", "single", "colour", "shape"), "hidden": HIDDEN, "multi": KINDS}
     while True:
@@ -102,7 +107,7 @@ def _fitting(
         group = scene.things if general or setup == "hidden" else own
         common = general or len(own) < len(group)
         slots = told(kind, thing, group, view)
-        if slots is None or not low <= thing.area <= high or not _standable(thing, scene):
+        if slots is None or not low <= thing.area <= high or not standable(thing, scene):
             continue
         if category == "infill" and thing.outline.min_width < 20:
             continue
@@ -112,7 +117,8 @@ def _fitting(
     return found
 
 
-def _standable(thing: Thing, scene: Scene) -> bool:
+def standable(thing: Thing, scene: Scene) -> bool:
+    """Whether robots can stand around a thing: room to the border and to other things."""
     others = [t for t in scene.things if t is not thing]
     free = nearest_gap(thing, others) >= (GAP - 0.02) * thing.size
     return free and not thing.sort.encloses and room(thing, scene.size) >= clearance(thing) + 2
@@ -172,14 +178,20 @@ def _object(name: str, thing: Thing) -> dict[str, Any]:
 def _words(
     random: Generator, story: Story, arrangement: str, robots: int, side: str, words: dict[str, Any]
 ) -> str:
-    kind = story.kind
-    if kind in ("odd_colour", "odd_size", "odd_shape") and random.random() < 0.5:
-        kind = "odd"
-    templates, phrases = words["arrangements"][arrangement], words["referring"][kind]
-    thing = phrases[random.integers(len(phrases))].format(**story.slots)
+    thing = named(random, story, words)
+    templates = words["arrangements"][arrangement]
     count = NUMBERS[robots - 1] if random.random() < 0.4 else str(robots)
     text = templates[random.integers(len(templates))].format(n=count, thing=thing, side=side)
     return text[:1].upper() + text[1:]
+
+
+def named(random: Generator, story: Story, words: dict[str, Any] | None = None) -> str:
+    """A phrase that says which thing is meant, in the known wordings if none are given."""
+    kind = story.kind
+    if kind in ("odd_colour", "odd_size", "odd_shape") and random.random() < 0.5:
+        kind = "odd"
+    phrases = (words or wordings()[0])["referring"][kind]
+    return phrases[random.integers(len(phrases))].format(**story.slots)
 
 
 @cache

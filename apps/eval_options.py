@@ -1,0 +1,40 @@
+"""Options of `formup eval run`, `suites` and `add`, said once."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SuiteName = Annotated[
+    str, typer.Argument(help="A suite's name (formup eval suites), YAML file or folder.")
+]
+MethodName = Annotated[
+    str,
+    typer.Option("--method", help="rules, agent, alone, pile, scatter, boundary, circle or line."),
+]
+ModelList = Annotated[
+    list[str] | None,
+    typer.Option("--model", help="Of agent and alone, as in formup run; repeatable."),
+]
+PromptList = Annotated[
+    list[str] | None, typer.Option("--prompt", help="ID@VERSION; repeatable, side by side.")
+]
+DescriptorList = Annotated[
+    list[str] | None,
+    typer.Option("--descriptor", help="edges, edges+vertices or matrix; repeatable."),
+]
+Trials = Annotated[str, typer.Option("--trials", help="Tries of every task.")]
+Split = Annotated[str, typer.Option("--split", help="train, dev or test (scores only).")]
+RunFolder = Annotated[
+    Path | None,
+    typer.Option("--out", help="The folder of the run; one that is there is gone on with."),
+]
+Shard = Annotated[str | None, typer.Option("--shard", help="i/n: the i-th of n parts.")]
+Budget = Annotated[str | None, typer.Option("--budget", help="Most to spend, USD.")]
+Jobs = Annotated[str, typer.Option("--jobs", help="Processes at once.")]
+NewFolder = Annotated[
+    Path, typer.Argument(metavar="FOLDER", help="Pictures with an annotations.json.")
+]
+Name = Annotated[
+    str | None, typer.Option("--name", help="Of the suite; the folder's name by default.")
+]

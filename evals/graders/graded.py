@@ -1,0 +1,73 @@
+"""What a grader finds: of one goal robot by robot, and of a whole attempt as a value.
+
+GCR, goal conditions recall, is divided by the larger of the robots asked for and the positions
+given, so that robots too many cost as much as robots too few.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...tools.geometry.outline import FloatArray
+
+VERSION = 1
+"""Of all graders together; part of a suite's hash, so that a changed rule is another suite."""
+APART = 2.0
+"""Robots nearer to each other than this, px, stand in one place, which counts once."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One goal, judged.
+
+    Attributes:
+        right: whether each robot stands where it may, (m,).
+        whole: share of what the robots shall do together that is done, such as cover a region.
+        problems: what is wrong, the worst first.
+        strict_problems: what is wrong at the tighter tolerances only.
+        measures: lengths in px, shares without a unit.
+    """
+
+    right: NDArray[np.bool_]
+    whole: float = 1.0
+    problems: tuple[str, ...] = ()
+    strict_problems: tuple[str, ...] = ()
+    measures: Mapping[str, float] = field(default_factory=dict[str, float])
+
+    def success(self, robots: int) -> bool:
+        """All of so many robots are right, and together they do what they shall."""
+        return len(self.right) == robots and bool(self.right.all()) and not self.problems
+
+    def hits(self, robots: int) -> float:
+        """Robots that count, at most one fewer than asked for where anything is wrong."""
+        counted = min(float(self.right.sum()), self.whole * robots)
+        return counted if self.success(robots) else min(counted, robots - 1.0)
+
+
+@dataclass(frozen=True)
+class Graded:
+    """An attempt, graded.
+
+    Attributes:
+        sr: success: every robot is right.
+        gcr: goal conditions recall, 0 to 1; 1 exactly where sr.
+        strict: success at the tighter tolerances.
+        object_correct: whether it was about the thing meant; None where that is not known.
+        feedback: what was wrong, in a sentence.
+        measures: of all goals, named after them where there are several.
+    """
+
+    sr: bool
+    gcr: float
+    strict: bool
+    object_correct: bool | None = None
+    feedback: str = ""
+    measures: Mapping[str, float] = field(default_factory=dict[str, float])
+
+
+def distinct(points: FloatArray) -> NDArray[np.bool_]:
+    """Which of (m, 2) points stand in a place of their own: the first of those that share one."""
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2) < APART
+    return ~np.tril(apart, -1).any(axis=1)

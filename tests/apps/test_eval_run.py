@@ -1,0 +1,159 @@
+"""`formup eval run`, `suites` and `add`, as a person meets them."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+from formup.agent import agent as agent_module
+from formup.apps.cli import app
+from formup.evals.journal import read_rows
+from formup.evals.obedient import DUTIES
+from formup.prompts import Prompt, load_prompt
+from formup.tools.errors import InputError
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "evals"))
+write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
+
+GOOD, BAD = "former@v002", "former@v902"
+TASKS = 12
+
+
+def formup(*arguments: str | Path) -> int:
+    return app([*map(str, arguments)], standalone_mode=False) or 0
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = write_folder(tmp_path_factory.mktemp("pictures"), TASKS)
+    assert formup("eval", "add", folder, "--name", "Squares") == 0
+    return folder
+
+
+@pytest.fixture
+def forgetful(monkeypatch: pytest.MonkeyPatch) -> Iterator[Prompt]:
+    """A version of the prompt that lacks one sentence a test model goes by."""
+    whole = load_prompt(GOOD)
+    duty = next(d for d in DUTIES if d.kind == "own positions")
+    text = " ".join(whole.text.split()).replace("Never work out coordinates", "Mind coordinates")
+    assert not any(sentence in text.lower() for sentence in duty.sentences)
+    bad = replace(whole, version=902, text=text)
+
+    def load(name: str) -> Prompt:
+        return bad if name == BAD else load_prompt(name)
+
+    monkeypatch.setattr(agent_module, "load_prompt", load)
+    yield bad
+
+
+def test_rules_run_with_nothing_else(
+    suite: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert formup("eval", "run", suite, "--out", out) == 0
+    printed = capsys.readouterr().out
+    assert f"{TASKS}/{TASKS}" in printed
+    assert "chance" in printed
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
+    (cells,) = summary["arms"].values()
+    total = cells[-1]
+    assert (total["name"], total["passed"], total["scored"]) == ("total", TASKS, TASKS)
+    assert 0 < total["chance"]["gcr"] < 1
+    assert {cell["name"] for cell in cells} >= {"general single", "caging single", "caging"}
+    attempt = json.loads(next((out / "attempts").glob("*.json")).read_text("utf-8"))
+    assert attempt["observed"]
+    assert attempt["graded"]["measures"]["planned_gcr"] == 1
+    assert formup("eval", "run", suite, "--out", out) == 0  # all there already
+    assert len((out / "trials.jsonl").read_text("utf-8").splitlines()) == TASKS
+
+
+def test_a_policy_is_a_method_and_scores_its_chance(suite: Path, tmp_path: Path) -> None:
+    for name in ("circle", "pile"):
+        assert formup("eval", "run", suite, "--method", name, "--out", tmp_path / name) == 0
+    rows = [*read_rows(tmp_path / "circle"), *read_rows(tmp_path / "pile")]
+    assert not any(row.sr for row in rows)
+    assert all(row.feedback for row in rows)
+
+
+def test_shards_are_the_whole_and_merge(suite: Path, tmp_path: Path) -> None:
+    for part in ("1/2", "2/2"):
+        out = tmp_path / part[0]
+        assert formup("eval", "run", suite, "--method", "line", "--shard", part, "--out", out) == 0
+    merged = tmp_path / "merged"
+    assert formup("eval", "merge", tmp_path / "1", tmp_path / "2", "--out", merged) == 0
+    assert len(read_rows(merged)) == TASKS
+
+
+def test_a_planted_regression_is_blocked(suite: Path, tmp_path: Path, forgetful: Prompt) -> None:
+    run: list[Any] = ["eval", "run", suite, "--method", "agent", "--model", "obedient"]
+    more = ["--prompt", GOOD, "--prompt", BAD, "--trials", "2", "--out", tmp_path / "both"]
+    assert formup(*run, *more) == 0
+    rows = read_rows(tmp_path / "both")
+    rates = {p: [bool(r.sr) for r in rows if r.prompt == p] for p in (GOOD, BAD)}
+    assert {len(successes) for successes in rates.values()} == {2 * TASKS}
+    assert sum(rates[GOOD]) == 2 * TASKS
+    assert sum(rates[BAD]) < 0.9 * 2 * TASKS  # 0.3 of all trials lapse
+    assert all(row.input_tokens for row in rows)
+    gate: list[Any] = ["eval", "gate", tmp_path / "both", tmp_path / "both"]
+    assert formup(*gate, "--arm-a", GOOD, "--arm-b", BAD) == 1
+    assert formup(*gate, "--arm-a", BAD, "--arm-b", GOOD) == 0
+
+
+def test_the_test_split_shows_scores_and_writes_the_look_down(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = write_folder(tmp_path / "pictures", 4)
+    item = "tasks: [{folder: ., family: squares}]\nsplits: {test: [squares]}\n"
+    (folder / "suite.yaml").write_text(f"name: held\ndescription: Held out.\n{item}")
+    out = tmp_path / "runs" / "one"
+    with pytest.raises(InputError, match="It has: test"):
+        formup("eval", "run", folder, "--out", out)
+    assert formup("eval", "run", folder, "--split", "test", "--out", out, "--method", "pile") == 0
+    assert "look 1" in capsys.readouterr().err
+    assert not any(row.feedback for row in read_rows(out))
+    assert not (out / "attempts").exists()
+    assert not (out / "pictures").exists()
+    ledger = (tmp_path / "runs" / "heldout-ledger.jsonl").read_text("utf-8")
+    assert json.loads(ledger)["suite"] == "held"
+
+
+def test_suites_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert formup("eval", "suites") == 0
+    printed = capsys.readouterr().out
+    assert "zerocap15" in printed
+    assert "infeasible" in printed
+
+
+def test_a_task_with_a_wrong_truth_is_not_added(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path / "bad", 2)
+    path = folder / "annotations.json"
+    path.write_text(path.read_text("utf-8").replace('"max_gap_px": 70.0', '"max_gap_px": 7.0'))
+    with pytest.raises(InputError, match="ring_00: a right answer fails: a gap of"):
+        formup("eval", "add", folder)
+    assert not (folder / "suite.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--method", "magic"], "There are: rules, agent, alone, pile"),
+        (["--method", "agent"], "takes a --model"),
+        (["--method", "alone", "--model", "offline"], "--method rules"),
+        (["--method", "alone", "--model", "obedient"], "writes no coordinates alone"),
+        (["--method", "rules", "--prompt", GOOD], "--prompt goes with"),
+        (["--method", "agent", "--model", "obedient", "--prompt", "x@v001"], "Unknown prompt"),
+        (["--trials", "0"], "--trials '0'"),
+        (["--budget", "-1"], "--budget '-1'"),
+        (["--shard", "3/2"], "--shard '3/2'"),
+        (["--descriptor", "poem"], "poem"),
+    ],
+)
+def test_what_cannot_be_run_is_said(
+    suite: Path, tmp_path: Path, arguments: list[str], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        formup("eval", "run", suite, "--out", tmp_path / "x", *arguments)

@@ -1,0 +1,134 @@
+"""Methods: what a model's replies become, and whose fault it is when nothing comes."""
+
+import json
+import pickle
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+from formup.agent import agent as agent_module
+from formup.agent.messages import Call, Reply
+from formup.agent.model import Model
+from formup.agent.models.doubles import FunctionModel
+from formup.evals.executors import attempt, executor
+from formup.evals.journal import read_rows
+from formup.evals.methods import Method, SuiteWork, arm_key, method, trials_of
+from formup.evals.obedient import DUTIES, lapses_of
+from formup.evals.reference import reference
+from formup.evals.runner import run_trials
+from formup.evals.suites.gallery import hang
+from formup.evals.suites.load import load_suite, write_suite
+from formup.evals.trials import Trial, TrialRow
+from formup.prompts import load_prompt
+from formup.tools.errors import ModelError
+
+sys.path.insert(0, str(Path(__file__).parent))
+write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
+
+ASKED = {"question": "Which one?"}
+
+
+def work_of(folder: Path, arm: Method, keep: Path | None = None) -> tuple[SuiteWork, list[Trial]]:
+    suite = load_suite(str(folder))
+    hung = hang(suite.tasks, folder)
+    trials = trials_of("0" * 64, suite.tasks, [arm.facts(None)], 1)
+    work = SuiteWork(
+        {t.id: t for t in suite.tasks},
+        {name: picture.path for name, picture in hung.items()},
+        {arm_key(trials[0]): arm},
+        keep=keep,
+    )
+    return work, trials
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = write_folder(tmp_path_factory.mktemp("pictures"), 3)
+    write_suite(made, "squares")
+    return made
+
+
+def row_of(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, reply: Reply | ModelError
+) -> TrialRow:
+    """The row of the first task for a model that always says the same."""
+
+    def says(request: Any) -> Reply:
+        if isinstance(reply, ModelError):
+            raise reply
+        return reply
+
+    def named(model: str, base_url: str | None = None) -> Model:
+        return FunctionModel(says, model)
+
+    monkeypatch.setattr(agent_module, "model_named", named)
+    arm = Method(name, "openai:x", "former-direct@v001")
+    work, trials = work_of(folder, arm, folder)
+    return attempt(work, trials[0])
+
+
+def written(folder: Path, **change: Any) -> str:
+    task = load_suite(str(folder)).tasks[0]
+    return json.dumps({"positions": reference(task.goals[0]).tolist()} | change)
+
+
+def test_a_model_alone_is_graded_by_what_it_writes(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = row_of(folder, monkeypatch, "alone", Reply(text=f"Here: {written(folder)}"))
+    assert (right.status, right.gcr, right.tools_sha) == ("pass", 1.0, None)
+    few = row_of(folder, monkeypatch, "alone", Reply(text=written(folder, positions=[[1, 1]])))
+    assert few.status == "fail"
+    for text in ("I cannot see a square.", '{"positions": "all"}', '<tool_call>{"x": 1}'):
+        lost = row_of(folder, monkeypatch, "alone", Reply(text=text))
+        assert (lost.status, lost.gcr) == ("model_invalid", 0.0)
+
+
+def test_a_provider_that_fails_says_nothing_about_the_model(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = row_of(folder, monkeypatch, "agent", ModelError("503: overloaded"))
+    assert (row.status, row.sr, row.gcr) == ("infra_error", None, None)
+    assert "503" in row.feedback
+
+
+def test_an_agent_that_makes_no_call_is_invalid_and_one_that_asks_is_not(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = row_of(folder, monkeypatch, "agent", Reply(text="Done."))
+    assert words.status == "model_invalid"
+    unknown = Reply(calls=(Call(id="1", name="fly", arguments={}),))
+    assert row_of(folder, monkeypatch, "agent", unknown).status == "model_invalid"
+    asks = Reply(calls=(Call(id="1", name="ask_user", arguments=ASKED),))
+    asked = row_of(folder, monkeypatch, "agent", asks)
+    assert (asked.status, asked.feedback) == ("fail", "question: Which one?")
+
+
+def test_work_can_be_given_to_other_processes(folder: Path, tmp_path: Path) -> None:
+    work, trials = work_of(folder, method("circle", None, None, "edges"))
+    again = pickle.loads(pickle.dumps(work))
+    assert again(trials[0]) == work(trials[0])
+    run_trials(trials, work, tmp_path, executor=executor("pool", 1))
+    assert [row.status for row in read_rows(tmp_path)] == ["fail"] * 3
+
+
+def test_a_descriptor_is_part_of_the_arm() -> None:
+    facts = [Method("rules", "offline", None, d).facts(None) for d in ("edges", "matrix")]
+    assert [fact["method"] for fact in facts] == ["rules", "rules/matrix"]
+    assert facts[0]["tools_sha"] == facts[1]["tools_sha"]
+
+
+def test_the_test_model_goes_by_the_sentences_of_its_prompt() -> None:
+    for name in ("former@v001", "former@v002"):
+        text = load_prompt(name).text
+        assert all(lapses_of(text, seed) == set() for seed in range(50))
+        assert lapses_of(text.upper(), 3) == set()
+    counts = {duty.kind: 0 for duty in DUTIES}
+    for seed in range(2000):
+        for kind in lapses_of("Do your best.", seed):
+            counts[kind] += 1
+    for duty in DUTIES:
+        assert counts[duty.kind] / 2000 == pytest.approx(duty.share, abs=0.04)

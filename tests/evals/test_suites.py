@@ -1,0 +1,215 @@
+"""Suites: their format, their pictures, and every task of every one against a right answer."""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+from formup.evals.asks.inscribed import inscribed
+from formup.evals.asks.styled import STYLES
+from formup.evals.graders.grading import Attempt, grade_attempt, grade_goals
+from formup.evals.policies import CEILINGS, LUCKY, POLICIES, scores
+from formup.evals.reference import reference
+from formup.evals.scenes.build import family_of, tell
+from formup.evals.scenes.paint import draw
+from formup.evals.suite import load_tasks, photos_folder
+from formup.evals.suites.gallery import hang
+from formup.evals.suites.ledger import look
+from formup.evals.suites.load import load_suite, schema, seeds, shipped, write_suite
+from formup.evals.suites.tasks import Drawing, Suite
+from formup.tools.errors import InputError
+from shapely.geometry import Point
+
+SPLIT = {"formation-dev": ("train", "dev", "test")}
+PARTS = [(name, split) for name in shipped() for split in SPLIT.get(name, ("dev",))]
+STRIDE = 3
+"""Of more than 20 tasks every third is tried by the policies; all are held to a right answer."""
+FOLDER = Path(__file__).parents[2] / "evals" / "suites"
+
+
+TASKS, MANY = load_tasks(), load_tasks(photos_folder() / "many.json")
+
+
+@cache
+def loaded(name: str, split: str = "dev") -> Suite:
+    return load_suite(name, split)
+
+
+def write(folder: Path, tasks: list[dict[str, Any]], **more: Any) -> str:
+    content = {"name": "mine", "description": "Mine.", "tasks": tasks, **more}
+    (folder / "suite.yaml").write_text(yaml.safe_dump(content))
+    return str(folder)
+
+
+@pytest.mark.parametrize(("name", "split"), PARTS)
+def test_a_right_answer_scores_1_and_no_understanding_little(name: str, split: str) -> None:
+    tasks = [task for task in loaded(name, split).tasks if task.goals]
+    wrong: list[str] = []
+    for task in tasks:
+        graded = grade_goals(task.goals, np.concatenate([reference(goal) for goal in task.goals]))
+        if not (graded.sr and graded.strict and graded.gcr == 1):
+            wrong.append(f"{task.id}: {graded.feedback}")
+    assert wrong == []
+    teams = [task for task in tasks if sum(goal.robots for goal in task.goals) > 1]
+    some = teams[:: STRIDE if len(teams) > 20 else 1]
+    for policy in POLICIES if some else ():
+        found = [scores(policy, task.goals, 1) for task in some]
+        assert np.mean([gcr for _, gcr in found]) <= CEILINGS[policy]
+        lucky = LUCKY * len(some) if len(some) > 50 else float(len(some) > 20)
+        assert sum(sr for sr, _ in found) <= lucky
+
+
+def test_what_ships() -> None:
+    assert shipped() == [
+        "formation-dev",
+        "frontier",
+        "infeasible",
+        "injection",
+        "smoke",
+        "zerocap15",
+    ]
+    jsonschema.Draft202012Validator.check_schema(schema())
+    for path in FOLDER.glob("*.yaml"):
+        assert yaml.safe_load(path.read_text("utf-8"))["name"] == path.stem
+
+
+def test_the_papers_grid() -> None:
+    tasks = loaded("zerocap15").tasks
+    assert len(tasks) == 15
+    assert sum(isinstance(task.picture, Drawing) for task in tasks) == 10
+    assert len({task.cell for task in tasks}) == 9
+    for kind in range(2):
+        counts = [task.cell[kind] for task in tasks]
+        assert {counts.count(value) for value in counts} == {5}
+
+
+def test_the_development_suite_is_broad_and_split_by_family() -> None:
+    train = loaded("formation-dev", "train").tasks  # the smallest; the others are made alike
+    robots = [task.robots or 0 for task in train]
+    assert min(robots) == 3
+    assert 50 < max(robots) <= 64
+    assert {task.style for task in train} == set(STYLES)
+    assert {task.family for task in train} == {"warehouse"}
+    assert sum("px" in task.instruction for task in train) >= 12
+    assert len({task.cell for task in train}) == 9
+    content = yaml.safe_load((FOLDER / "formation-dev.yaml").read_text("utf-8"))
+    drawn = [family_of(seed).name for seed in seeds(content["tasks"][0]["scenes"], FOLDER)]
+    dev = sum(name in content["splits"]["dev"] for name in drawn) + len(TASKS) + len(MANY)
+    assert dev >= 150
+    families = [name for names in content["splits"].values() for name in names]
+    assert sorted(families) == sorted({*drawn, "photos"})
+
+
+def test_the_frontier_has_what_it_says() -> None:
+    tasks = loaded("frontier").tasks
+    assert min(task.robots or 0 for task in tasks) >= 20
+    assert max(task.robots or 0 for task in tasks) > 80
+    assert sum(len(task.goals) > 1 for task in tasks) == 12
+    assert any(task.goals[0].target.holes for task in tasks)
+    assert sum(bool(task.goals[0].success.get("closed")) for task in tasks) == 12
+
+
+def test_where_nothing_is_to_be_placed_moving_is_wrong() -> None:
+    for task in loaded("infeasible").tasks:
+        assert "deployed" not in task.expects
+        asked = Attempt(task.expects[0], declined=True)
+        assert grade_attempt(task.goals, task.expects, asked).sr
+        words = grade_attempt(task.goals, task.expects, Attempt(task.expects[0], said="No."))
+        assert not words.sr
+        assert "in words alone" in words.feedback
+        moved = Attempt(task.expects[0], [(1, 1)], [(1, 1)], declined=True)
+        assert "moved" in grade_attempt(task.goals, task.expects, moved).feedback
+
+
+def test_words_in_a_picture_stand_beside_the_thing_meant() -> None:
+    for seed in (50004, 50011, 50021):
+        plain, story = draw(tell(seed).scene), tell(seed)
+        written = Drawing(seed, inscribed(seed)["inscription"]).image()
+        changed = (np.asarray(plain) != np.asarray(written)).any(axis=2)
+        assert changed.sum() > 200
+        rows, columns = np.nonzero(changed)
+        touched = [
+            story.target.polygon.distance(Point(x, y))
+            for x, y in zip(columns.tolist(), rows.tolist(), strict=True)
+        ]
+        assert min(touched) > 0
+
+
+def test_pictures_are_drawn_once_and_hashed_by_their_pixels(tmp_path: Path) -> None:
+    suite = loaded("zerocap15")
+    some = Suite("some", "", suite.tasks[4:7])
+    first = hang(some.tasks, tmp_path / "a")
+    again = hang(some.tasks, tmp_path / "b")
+    pixels = {name: picture.pixels for name, picture in first.items()}
+    assert pixels == {name: picture.pixels for name, picture in again.items()}
+    assert some.sha256(pixels) == some.sha256(dict(reversed(pixels.items())))
+    assert some.sha256(pixels) != some.sha256(dict.fromkeys(pixels, "0"))
+    assert some.sha256(pixels) != Suite("other", "", some.tasks).sha256(pixels)
+    drawn = next(p.path for p in first.values() if p.path.parent == tmp_path / "a")
+    before = drawn.stat().st_mtime_ns
+    hang(some.tasks, tmp_path / "a")
+    assert drawn.stat().st_mtime_ns == before
+
+
+def test_a_folder_of_pictures_becomes_a_suite(tmp_path: Path) -> None:
+    entries = json.loads((photos_folder() / "annotations.json").read_text("utf-8"))[:1]
+    (tmp_path / "images").symlink_to(photos_folder() / "images")
+    entries[0]["tasks"].append(
+        {
+            "id": "nobody",
+            "instruction": "Surround the giraffe.",
+            "robots": None,
+            "category": "general",
+            "setup": "single",
+            "expects": ["question"],
+        }
+    )
+    (tmp_path / "annotations.json").write_text(json.dumps(entries))
+    write_suite(tmp_path, "My Suite")
+    made = load_suite(str(tmp_path))
+    assert made.name == "my-suite"
+    assert len(made.tasks) == len(entries[0]["tasks"])
+    assert made.tasks[-1].goals == ()
+    with pytest.raises(InputError, match="is there already"):
+        write_suite(tmp_path, "again")
+
+
+def test_tasks_in_full_stand_in_the_file_itself(tmp_path: Path) -> None:
+    entries = json.loads((photos_folder() / "annotations.json").read_text("utf-8"))[:1]
+    (tmp_path / "images").symlink_to(photos_folder() / "images")
+    (task,) = load_suite(write(tmp_path, [{"pictures": entries}])).tasks[:1]
+    assert task.instruction == entries[0]["tasks"][0]["instruction"]
+    assert task.picture == tmp_path / entries[0]["image"]
+
+
+def test_what_is_wrong_with_a_suite_is_said(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="zerocap15"):
+        load_suite("nonsense")
+    with pytest.raises(InputError, match="train, dev, test"):
+        load_suite("smoke", "holdout")
+    with pytest.raises(InputError, match=r"no tasks in the split test\. It has: dev"):
+        load_suite("smoke", "test")
+    with pytest.raises(InputError, match="breaks the format"):
+        load_suite(write(tmp_path, [{"scenes": "0-1", "photos": "all"}]))
+    with pytest.raises(InputError, match="'nobody'"):
+        load_suite(write(tmp_path, [{"photos": ["nobody"]}]))
+    with pytest.raises(InputError, match="more than one task"):
+        load_suite(write(tmp_path, [{"scenes": [3]}, {"scenes": [3]}]))
+    with pytest.raises(InputError, match="in 2 splits"):
+        splits = {"dev": ["table"], "test": ["table"]}
+        load_suite(write(tmp_path, [{"scenes": [3], "family": "table"}], splits=splits))
+    (tmp_path / "suite.yaml").write_text("a: [")
+    with pytest.raises(InputError, match="is not YAML"):
+        load_suite(str(tmp_path))
+
+
+def test_looks_at_held_out_tasks_are_counted(tmp_path: Path) -> None:
+    assert look(tmp_path, "s", "a" * 64, ["rules"]) == 1
+    assert look(tmp_path, "s", "b" * 64, ["rules"]) == 1
+    assert look(tmp_path, "s", "a" * 64, ["agent"]) == 2
+    lines = (tmp_path / "heldout-ledger.jsonl").read_text("utf-8").splitlines()
+    assert [json.loads(line)["arms"] for line in lines] == [["rules"], ["rules"], ["agent"]]
