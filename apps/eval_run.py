@@ -25,6 +25,7 @@ from ..evals.suites.ledger import look
 from ..evals.suites.load import described, load_suite, shipped, write_suite
 from ..evals.suites.tasks import Suite
 from ..evals.trials import Trial
+from ..prompts import PromptLibrary
 from ..tools.errors import InputError
 from ..tools.store import write_whole
 from . import eval_options as e
@@ -44,6 +45,7 @@ def run_suite(
     model: e.ModelList = None,
     base_url: o.BaseUrl = None,
     prompt: e.PromptList = None,
+    prompts: o.PromptsFolder = None,
     descriptor: e.DescriptorList = None,
     trials: e.Trials = "1",
     split: e.Split = "dev",
@@ -57,7 +59,7 @@ def run_suite(
     Several models, prompts and descriptors are run side by side. A killed run is gone on with by
     naming its folder again. The split test shows scores only, and each look at it is written down.
     """
-    arms = _arms(method, model, prompt, descriptor)
+    arms = _arms(method, model, prompt, descriptor, PromptLibrary(prompts))
     made = [arm.facts(base_url) for arm in arms]  # what cannot be asked is found before the work
     count = inputs.whole("--trials", trials, least=1)
     workers = inputs.whole("--jobs", jobs, least=1)
@@ -123,10 +125,11 @@ def _arms(
     models: list[str] | None,
     prompts: list[str] | None,
     descriptors: list[str] | None,
+    library: PromptLibrary,
 ) -> list[Method]:
     """Every model with every prompt and descriptor."""
     return [
-        method(name, model, prompt, inputs.descriptor(descriptor))
+        method(name, model, prompt, inputs.descriptor(descriptor), library)
         for model in models or [None]
         for prompt in prompts or [None]
         for descriptor in descriptors or ["edges"]

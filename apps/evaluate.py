@@ -30,7 +30,7 @@ COLUMNS = {
     "success_of_placed": "success,\nif placed",
     "iou": "mean IoU",
 }
-DIRECT = "former-direct@v002"
+DIRECT = "former-direct"
 """What a model alone is told: to write coordinates."""
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 

@@ -17,6 +17,7 @@ from ..agent.agent import Agent, Run
 from ..agent.messages import Result
 from ..agent.model import Model
 from ..agent.outcomes import Answered, Stopped
+from ..prompts import PromptLibrary
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
 from ..tools.store import write_whole
@@ -32,12 +33,13 @@ from .tokens import spent
 from .trials import Status, Trial, TrialRow, canonical
 
 METHODS = ("rules", "agent", "alone", *POLICIES)
-DIRECT = "former-direct@v001"
+DIRECT = "former-direct"
 """What a model alone is told: to write coordinates."""
 LONGEST = 400
 """Characters of feedback in a row."""
 NO_MODEL = {"rules": "offline", **dict.fromkeys(POLICIES, "none")}
 OBEDIENT = "obedient"
+SHIPPED = PromptLibrary()
 
 
 @dataclass(frozen=True)
@@ -47,14 +49,16 @@ class Method:
     Attributes:
         name: one of METHODS.
         model: of agent and alone, as Agent takes it, or `obedient`; the others have none.
-        prompt: id@vNNN, None for the newest of the model's own.
+        prompt: id@vNNN, None for the current one of the model's own.
         descriptor: edges, edges+vertices or matrix.
+        library: where prompts are.
     """
 
     name: str
     model: str
     prompt: str | None = None
     descriptor: Descriptor = "edges"
+    library: PromptLibrary = SHIPPED
 
     @property
     def called(self) -> str:
@@ -87,13 +91,20 @@ class Method:
         model: str | Model = ObedientModel(seed) if self.model == OBEDIENT else self.model
         url = base_url if isinstance(model, str) and model != "offline" else None
         if self.name != "alone":
-            return Agent(model, base_url=url, prompt=self.prompt)
+            return Agent(model, base_url=url, prompt=self.prompt, library=self.library)
         if self.model in ("offline", OBEDIENT):
             raise InputError(f"{self.model} writes no coordinates alone; --model takes another.")
-        return Agent(model, base_url=url, prompt=self.prompt or DIRECT, tools=())
+        prompt = self.prompt or DIRECT
+        return Agent(model, base_url=url, prompt=prompt, library=self.library, tools=())
 
 
-def method(name: str, model: str | None, prompt: str | None, descriptor: Descriptor) -> Method:
+def method(
+    name: str,
+    model: str | None,
+    prompt: str | None,
+    descriptor: Descriptor,
+    library: PromptLibrary = SHIPPED,
+) -> Method:
     """A method by name.
 
     Raises:
@@ -110,7 +121,7 @@ def method(name: str, model: str | None, prompt: str | None, descriptor: Descrip
         raise InputError(f"The method {name} takes a --model, such as openai:NAME.")
     if model == "offline":
         raise InputError("The offline rules are a method of their own: --method rules.")
-    return Method(name, model, prompt, descriptor)
+    return Method(name, model, prompt, descriptor, library)
 
 
 @dataclass(frozen=True)

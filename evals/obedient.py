@@ -34,7 +34,15 @@ class Duty:
 
 
 DUTIES = (
-    Duty("own positions", ("never work out coordinates", "never compute coordinates"), 0.3),
+    Duty(
+        "own positions",
+        (
+            "never work out coordinates",
+            "never compute coordinates",
+            "never work out where robots go",
+        ),
+        0.3,
+    ),
     Duty("own lengths", ("leave out lengths the person did not name", "leave lengths out"), 0.2),
     Duty("no deployment", ("call deploy", "deploy a certified plan"), 0.5),
     Duty("no question", ("ask one question",), 1.0),

@@ -1,25 +1,24 @@
 """`formup eval run`, `suites` and `add`, as a person meets them."""
 
 import json
+import re
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
-from formup.agent import agent as agent_module
 from formup.apps.cli import app
 from formup.evals.journal import read_rows
 from formup.evals.obedient import DUTIES
-from formup.prompts import Prompt, load_prompt
+from formup.prompts import PromptLibrary, load_prompt
 from formup.tools.errors import InputError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "evals"))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 
-GOOD, BAD = "former@v002", "former@v902"
+GOOD, BAD = load_prompt("former").name, "former@draft-forgetful"
 TASKS = 12
 
 
@@ -35,19 +34,20 @@ def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def forgetful(monkeypatch: pytest.MonkeyPatch) -> Iterator[Prompt]:
-    """A version of the prompt that lacks one sentence a test model goes by."""
-    whole = load_prompt(GOOD)
+def forgetful(tmp_path: Path) -> Path:
+    """A folder with a draft of the prompt that lacks one sentence a test model goes by."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    assert formup("prompts", "new", BAD, "--prompts", folder) == 0
+    (draft,) = folder.glob("*/draft-forgetful.prompt.md")
     duty = next(d for d in DUTIES if d.kind == "own positions")
-    text = " ".join(whole.text.split()).replace("Never work out coordinates", "Mind coordinates")
-    assert not any(sentence in text.lower() for sentence in duty.sentences)
-    bad = replace(whole, version=902, text=text)
-
-    def load(name: str) -> Prompt:
-        return bad if name == BAD else load_prompt(name)
-
-    monkeypatch.setattr(agent_module, "load_prompt", load)
-    yield bad
+    text = draft.read_text("utf-8")
+    sentence = re.search(r"Never work out[^.;]*[.;]", text)
+    assert sentence is not None
+    draft.write_text(text.replace(sentence[0], ""), "utf-8")
+    told = " ".join(PromptLibrary(folder).load(BAD).render().lower().split())
+    assert not any(said in told for said in duty.sentences)
+    return folder
 
 
 def test_rules_run_with_nothing_else(
@@ -88,10 +88,10 @@ def test_shards_are_the_whole_and_merge(suite: Path, tmp_path: Path) -> None:
     assert len(read_rows(merged)) == TASKS
 
 
-def test_a_planted_regression_is_blocked(suite: Path, tmp_path: Path, forgetful: Prompt) -> None:
+def test_a_planted_regression_is_blocked(suite: Path, tmp_path: Path, forgetful: Path) -> None:
     run: list[Any] = ["eval", "run", suite, "--method", "agent", "--model", "obedient"]
-    more = ["--prompt", GOOD, "--prompt", BAD, "--trials", "2", "--out", tmp_path / "both"]
-    assert formup(*run, *more) == 0
+    more: list[Any] = ["--prompt", GOOD, "--prompt", BAD, "--prompts", forgetful, "--trials", "2"]
+    assert formup(*run, *more, "--out", tmp_path / "both") == 0
     rows = read_rows(tmp_path / "both")
     rates = {p: [bool(r.sr) for r in rows if r.prompt == p] for p in (GOOD, BAD)}
     assert {len(successes) for successes in rates.values()} == {2 * TASKS}
