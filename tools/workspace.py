@@ -82,6 +82,7 @@ class Workspace:
         pointed: what the person pointed at, in order t1, t2, ...
         instruction: the person's words, if there are any.
         samples: positions kept by the sampling tools under s1, s2, ...
+        exact: targets to be kept a named distance from, by plan id.
         doubted: what was found last with too little confidence, for a person to look at.
         found: what was found in the picture, once somebody has asked.
         arrivals: by plan id, what was observed after a deployment, and the way there.
@@ -94,6 +95,7 @@ class Workspace:
     plans: dict[str, Plan] = field(default_factory=dict[str, Plan])
     samples: dict[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     doubted: Target | None = None
+    exact: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     found: tuple[Candidate, ...] | None = None
     arrivals: dict[str, Arrival] = field(default_factory=dict[str, Arrival])
     frames: dict[str, list[FloatArray]] = field(default_factory=dict[str, list[FloatArray]])
@@ -107,7 +109,7 @@ class Workspace:
     def copy(self) -> "Workspace":
         """One to work on that leaves this one as it is."""
         made = copy(self)
-        for name in ("plans", "samples", "arrivals", "frames"):
+        for name in ("plans", "samples", "arrivals", "frames", "exact"):
             setattr(made, name, dict(getattr(self, name)))
         return made
 

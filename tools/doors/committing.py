@@ -64,8 +64,12 @@ def propose_formation(
     plan = make_plan(held, workspace.scene.site(held), workspace.scene.version, places)
     workspace.plans.pop(plan.id, None)  # proposed again, it is the latest again
     workspace.plans[plan.id] = plan
-    shown = [workspace.scene.target(t) for t in held.target_ids]
-    return ToolResult(_proposal(workspace, plan), overlays(workspace, shown))
+    exact = {t for group in contract.groups if group.clearance is not None for t in group.targets}
+    workspace.exact[plan.id] = tuple(sorted(exact))
+    shown = [
+        t for t in map(workspace.scene.target, held.target_ids) if doubtful(t) or t.id in exact
+    ]
+    return ToolResult(_proposal(workspace, plan), overlays(workspace, shown, plan))
 
 
 @tool("actuate")
@@ -146,7 +150,7 @@ def _check_clear(workspace: Workspace, plan: Plan) -> None:
     """A plan nobody has looked at may be deployed only about things that were measured clearly."""
     for name in plan.formation.contract.target_ids:
         target = workspace.scene.target(name)
-        if doubtful(target):
+        if doubtful(target) or name in workspace.exact.get(plan.id, ()):
             raise ToolError(
                 f"Not deployed yet: {name} {_doubt(target)}. If the outline shown follows the "
                 f"thing meant, deploy plan_id {plan.id} (with tell). Else propose again with a "
@@ -157,6 +161,8 @@ def _check_clear(workspace: Workspace, plan: Plan) -> None:
 
 def _doubt(target: Target) -> str:
     """Why a target has to be looked at."""
+    if not doubtful(target):
+        return "is to be kept a named distance from, so its outline has to be seen first"
     if not target.missed:
         return f"was measured with confidence {target.confidence:.2f}"
     away = distances(target.outline.filled, np.asarray(target.missed))

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from ..draw import draw_view, view_scale
 from ..errors import ToolError
+from ..formation.plan import Plan
 from ..perception.attributes import Candidate
 from ..perception.candidates import clear_ones
 from ..perception.prompts import Box, Point, TargetPrompt, box_problems
@@ -188,7 +189,7 @@ def segment(
     )
     target = measured(workspace, prompt)
     data = {**summary(target), "parts": dict(target.parts), "frame": FRAME}
-    return ToolResult(data, overlays(workspace, (target,)))
+    return ToolResult(data, overlays(workspace, (target,) if doubtful(target) else ()))
 
 
 def measured(workspace: Workspace, prompt: TargetPrompt) -> Target:
@@ -207,9 +208,11 @@ def measured(workspace: Workspace, prompt: TargetPrompt) -> Target:
         raise error.showing(_closer(workspace.scene, doubted)) from None
 
 
-def overlays(workspace: Workspace, targets: Iterable[Target]) -> tuple[bytes, ...]:
-    """Pictures of those targets whose masks a model should look at before it trusts them."""
-    return tuple(_closer(workspace.scene, t) for t in targets if doubtful(t))
+def overlays(
+    workspace: Workspace, targets: Iterable[Target], plan: Plan | None = None
+) -> tuple[bytes, ...]:
+    """Pictures of targets whose masks a model should look at before it trusts them."""
+    return tuple(_closer(workspace.scene, target, plan) for target in targets)
 
 
 def doubtful(target: Target) -> bool:
@@ -217,11 +220,11 @@ def doubtful(target: Target) -> bool:
     return target.confidence < CLEAR or bool(target.missed)
 
 
-def _closer(scene: Scene, target: Target) -> bytes:
+def _closer(scene: Scene, target: Target, plan: Plan | None = None) -> bytes:
     x0, y0, x1, y1 = target.box
     out = AROUND * max(x1 - x0, y1 - y0) + 2
-    alone = replace(scene, targets=(target,))
-    return draw_view(alone, region=(x0 - out, y0 - out, x1 + out, y1 + out))
+    shown = replace(scene, targets=(target,)) if plan is None else scene
+    return draw_view(shown, plan=plan, region=(x0 - out, y0 - out, x1 + out, y1 + out))
 
 
 def parse_prompt(values: dict[str, Any]) -> TargetPrompt:
