@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..prompts import Prompt, PromptError, list_prompts, load_prompt
+from ..prompts import Prompt, PromptError, PromptLibrary
 from ..tools.doors import TOOLS
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
@@ -44,7 +44,9 @@ class Agent:
             given by default; its `aclose`, if it has one, is awaited by `run` and `resume` when
             they are done.
         base_url: of the server, for models given by name.
-        prompt: `id@vNNN`; None for the newest version of the model's own.
+        prompt: `id@vNNN`, `id@draft-NAME`, or an id for its current version; None for the current
+            version of the model's own.
+        library: where prompts are taken from; the shipped ones by default.
         planner: a second model, which makes the formation without seeing the picture; the first
             then only says what is meant. The prompt is the planner's.
         tools: what the model may call.
@@ -63,6 +65,7 @@ class Agent:
         *,
         base_url: str | None = None,
         prompt: str | None = None,
+        library: PromptLibrary | None = None,
         planner: str | Model | None = None,
         tools: tuple[Tool, ...] = TOOLS,
         system: str = "",
@@ -74,14 +77,16 @@ class Agent:
             raise InputError("A base URL goes with a model's name; this model is an object.")
         self.model = model_named(model, base_url) if isinstance(model, str) else model
         own = None if system else getattr(self.model, "prompt", None)
-        self.prompt = _prompt(prompt, own)
+        self.library = library or PromptLibrary()
+        name = (own if planner is None else "planner") if prompt is None else prompt
+        self.prompt = None if name is None else _prompt(self.library, name)
         self.prompts = () if self.prompt is None else (self.prompt,)
         self._names: tuple[str, str | None] = (self.model.name, None)
         if planner is not None:
-            made = _staged(self.model, planner, base_url, self.prompt)
+            made = _staged(self.model, planner, base_url, str(name), self.library)
             self.model, self.prompts = made
             self._names = made[0].names
-        self.system = self.prompt.text if self.prompt else system
+        self.system = self.prompt.render() if self.prompt else system
         self.base_url, self.tools, self.limits, self.policy = base_url, tools, limits, policy
         self._tracer = tracer
         if tracer is not None:
@@ -245,6 +250,7 @@ class Agent:
             "model": self._names[0],
             "planner": self._names[1],
             "base_url": self.base_url,
+            "library": self.library.folder and str(self.library.folder.absolute()),
             **self._prompts(),
             "settings": settings_facts(settings),
             "limits": asdict(self.limits),
@@ -253,7 +259,7 @@ class Agent:
 
     def _prompts(self) -> dict[str, Any]:
         """The prompt and, where two models share the work, all of theirs."""
-        facts = tuple({"id": p.id, "version": p.version, "sha256": p.sha256} for p in self.prompts)
+        facts = tuple(p.facts for p in self.prompts)
         mine = [f for f, p in zip(facts, self.prompts, strict=True) if p == self.prompt]
         return {"prompt": mine[0] if mine else None, "prompts": facts}
 
@@ -280,31 +286,33 @@ class Agent:
         raise InputError("An event loop runs here already: await agent.arun(...) or aresume(...).")
 
 
-def _prompt(name: str | None, own: str | None) -> Prompt | None:
-    """The prompt of a name, else the newest of the model's own, if it has one."""
-    if name is None and own is not None:
-        name = own if "@" in own else max(n for n in list_prompts() if n.startswith(f"{own}@"))
+def _prompt(library: PromptLibrary, name: str) -> Prompt:
+    """The prompt of a name, which a run gives no values."""
     try:
-        return load_prompt(name) if name is not None else None
+        prompt = library.load(name)
+        prompt.render()
     except PromptError as error:
         raise InputError(str(error)) from None
+    return prompt
 
 
 def _staged(
-    looker: Model, planner: str | Model, base_url: str | None, plan: Prompt | None
+    looker: Model,
+    planner: str | Model,
+    base_url: str | None,
+    plan: str,
+    library: PromptLibrary,
 ) -> tuple[TwoStages, tuple[Prompt, ...]]:
     """Two models as one, and their prompts."""
     second = model_named(planner, base_url) if isinstance(planner, str) else planner
     blind = [m.name for m in (looker, second) if not getattr(m, "prompt", None)]
-    if blind or plan is None:
+    if blind:
         raise InputError(
-            f"{blind[0] if blind else second.name} reads no prompt and cannot share the work: "
+            f"{blind[0]} reads no prompt and cannot share the work: "
             "--model and --planner both take a language model, such as openai:NAME."
         )
-    look, repair = _prompt(None, "context"), _prompt(None, "repair")
-    assert look is not None and repair is not None
-    made = TwoStages(looker, second, look=look, plan=plan, repair=repair)
-    return made, (look, plan, repair)
+    look, made, repair = (_prompt(library, name) for name in ("context", plan, "repair"))
+    return TwoStages(looker, second, look=look, plan=made, repair=repair), (look, made, repair)
 
 
 def _noting(workspace: Workspace, writer: TraceWriter | None, show: Show | None) -> Show:

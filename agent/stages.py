@@ -5,6 +5,8 @@ PI, another model makes the formation of the edges and PI. Which of them is aske
 the history alone, so that a run can be resumed and replayed like any other.
 """
 
+import json
+
 from ..prompts import Prompt
 from ..tools.doors import TOOLS
 from ..tools.tool import Tool
@@ -26,7 +28,7 @@ class TwoStages:
 
     Args:
         looker: is given the picture.
-        planner: is given the same conversation without pictures.
+        planner: is given what the person said, the pattern, and what was measured; no pictures.
         look: the looker's prompt.
         plan: the planner's prompt.
         repair: the planner's prompt where what it proposed last is not certified.
@@ -49,11 +51,12 @@ class TwoStages:
             ModelError: it cannot.
         """
         messages, tools = request.messages, request.tools
-        if not measured(messages):
-            seen = Request(self._look.text, messages, offered(tools, self._look))
+        found = measuring(messages)
+        if found is None:
+            seen = Request(self._look.render(), messages, offered(tools, self._look))
             return await self._looker.reply(seen)
         prompt = self._repair if _uncertified(messages) else self._plan
-        told = Request(prompt.text, _without_pictures(messages), offered(tools, prompt))
+        told = Request(prompt.render(), _handed_over(messages, found), offered(tools, prompt))
         return await self._planner.reply(told)
 
     async def aclose(self) -> None:
@@ -64,18 +67,18 @@ class TwoStages:
                 await close()
 
 
-def measured(messages: History) -> bool:
-    """Whether all that some reply had segmented came out."""
+def measuring(messages: History) -> int | None:
+    """The place of the first reply all of whose things came out as segmented, if there is one."""
     failed: dict[str, bool] = {}
     for message in messages:
         if isinstance(message, Result) and message.name == "segment":
             failed[message.call_id] = message.error is not None
-    for message in messages:
+    for place, message in enumerate(messages):
         if isinstance(message, Reply):
             asked = [c.id for c in message.calls if c.name == "segment"]
             if asked and not any(failed.get(id, True) for id in asked):
-                return True
-    return False
+                return place
+    return None
 
 
 def _uncertified(messages: History) -> bool:
@@ -83,8 +86,23 @@ def _uncertified(messages: History) -> bool:
     return bool(proposals) and '"certified":true' not in proposals[-1].text
 
 
-def _without_pictures(messages: History) -> History:
-    return tuple(
-        m.model_copy(update={"images": ()}) if isinstance(m, User | Result) and m.images else m
-        for m in messages
-    )
+def _handed_over(messages: History, found: int) -> History:
+    """In place of what the looker said and did, what came of it, as one message of the person's.
+
+    A planner that read the pattern as its own words might go on as if it had seen the picture.
+    """
+    looked = messages[found]
+    assert isinstance(looked, Reply)
+    calls = {call.id for call in looked.calls}
+    answers = [m for m in messages[found:] if isinstance(m, Result) and m.call_id in calls]
+    facts = ", ".join(m.text for m in answers if m.name == "segment")
+    said = [m.text for m in messages[:found] if isinstance(m, User)]
+    pattern = json.dumps(looked.text, ensure_ascii=False)
+    first = User(text="\n".join([*said, f"Pattern: {pattern}", f"Measured: [{facts}]"]))
+    rest = messages[found + 1 + len(answers) :]
+    return (first, *(_without_pictures(m) for m in rest))
+
+
+def _without_pictures(message: User | Reply | Result) -> User | Reply | Result:
+    shown = not isinstance(message, Reply) and message.images
+    return message.model_copy(update={"images": ()}) if shown else message

@@ -222,8 +222,11 @@ def _history(lines: Sequence[dict[str, Any]], images: Sequence[Sequence[bytes]])
 
 
 def prompt_name(facts: Mapping[str, Any] | None) -> str | None:
-    """`id@vNNN` of a prompt as traces and reports have it."""
-    return None if facts is None else f"{facts['id']}@v{facts['version']:03d}"
+    """`id@vNNN`, or `id@draft-NAME`, of a prompt as traces and reports have it."""
+    if facts is None:
+        return None
+    version = facts["version"]
+    return f"{facts['id']}@{version if isinstance(version, str) else f'v{version:03d}'}"
 
 
 def message_facts(message: User | Reply | Result) -> dict[str, Any]:

@@ -1,9 +1,10 @@
-"""The command line: `formup run`, `resume`, `deploy`, `trace`, `tools`, `eval`."""
+"""The command line: `formup run`, `resume`, `deploy`, `trace`, `tools`, `eval`, `prompts`."""
 
 import sys
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -13,11 +14,12 @@ from ..agent.outcomes import Paused
 from ..agent.policy import Policy
 from ..agent.runs import load_run
 from ..agent.telemetry import environment_tracer
-from ..agent.trace import NAME, prompt_name, read_trace
+from ..agent.trace import prompt_name, read_trace
+from ..prompts import PromptLibrary
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
 from ..tools.workspace import Settings
-from . import eval_run, inputs, plans, tools, traces
+from . import eval_run, inputs, plans, prompts, tools, traces
 from . import options as o
 from .carry import Desk
 from .output import Folder
@@ -35,6 +37,7 @@ app = typer.Typer(
 )
 app.add_typer(tools.app, name="tools", help="The tools the model sees.")
 app.add_typer(eval_run.app, name="eval", help="How good it is.")
+app.add_typer(prompts.app, name="prompts", help="What models are told, in versions.")
 
 
 @app.command()
@@ -54,6 +57,7 @@ def run(
     base_url: o.BaseUrl = None,
     planner: o.PlannerName = None,
     prompt: o.PromptName = None,
+    prompts: o.PromptsFolder = None,
     numbered: o.Numbered = False,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
@@ -67,7 +71,7 @@ def run(
     seed: o.Seed = "0",
 ) -> None:
     """Carry out an instruction on a picture."""
-    settings = Settings(
+    fixed = Settings(
         robots=inputs.robots(robots),
         robot_radius=inputs.length("--robot-radius", robot_radius),
         clearance=inputs.length("--clearance", clearance),
@@ -80,14 +84,13 @@ def run(
         may_deploy=not plan_only,
         numbered=numbered,
     )
-    pointed = inputs.pointed(point or [], box or [], outline or [], target or [])
-    chosen = (model, base_url, planner, prompt)
+    things = inputs.pointed(point or [], box or [], outline or [], target or [])
+    chosen = (model, base_url, planner, prompt, PromptLibrary(prompts))
     with _agent(*chosen, inputs.limits(limit), inputs.policy(policy)) as agent:
         picture, keep = load_picture(image), inputs.recording(record)
-        with Folder(out) as folder:
-            trace = folder.path / NAME
-            made = agent.run(picture, instruction, pointed=pointed, settings=settings, trace=trace)
-            raise typer.Exit(Desk(agent, folder, as_json, keep).serve(made))
+        with Folder(out) as home:
+            made = agent.run(picture, instruction, pointed=things, settings=fixed, trace=home.trace)
+            raise typer.Exit(Desk(agent, home, as_json, keep).serve(made))
 
 
 @app.command()
@@ -110,10 +113,12 @@ def resume(
             base_url=base_url or (None if model else start["base_url"]),
             planner=None if model else start.get("planner"),
             prompt=prompt_name(start["prompt"]),
+            library=PromptLibrary(start.get("library") and Path(start["library"])),
             limits=inputs.limits(limit, start["limits"]),
             policy=inputs.policy(policy, start["policy"]),
             tracer=tracer,
         )
+        _unchanged(agent, start)
         desk = Desk(agent, home, as_json)
         if not (desk.can_ask and isinstance(left.outcome, Paused) and answer is approve is None):
             left = agent.resume(left, answer=answer, approve=approve)
@@ -124,12 +129,24 @@ app.command(name="deploy")(plans.deploy)
 app.command(name="trace")(traces.show_trace)
 
 
+def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
+    """A draft may have changed since a run was begun with it."""
+    was = {prompt_name(p): p["sha256"] for p in start.get("prompts", ())}
+    for prompt in agent.prompts:
+        if was.get(prompt.name, prompt.sha256) != prompt.sha256:
+            raise InputError(
+                f"{prompt.name} is not what this run was begun with; put its text back, or run "
+                "again."
+            )
+
+
 @contextmanager
 def _agent(
     model: str,
     base_url: str | None,
     planner: str | None,
     prompt: str | None,
+    library: PromptLibrary,
     limits: Limits,
     policy: Policy,
 ) -> Generator[Agent, None, None]:
@@ -139,6 +156,7 @@ def _agent(
             base_url=base_url,
             planner=planner,
             prompt=prompt,
+            library=library,
             limits=limits,
             policy=policy,
             tracer=tracer,

@@ -13,9 +13,11 @@ from rich.progress import Progress, track
 from rich.table import Table
 
 from ..agent.agent import Agent
+from ..evals.descriptors import descriptor_costs
 from ..evals.pointed import JITTERED, Mode, Row, as_json, evaluate, mode_named, one_target, summary
 from ..evals.scenes.build import write_scenes
 from ..evals.suite import Task, load_tasks
+from ..prompts import PromptLibrary
 from ..tools.store import write_whole
 from . import compare, inputs
 from . import options as o
@@ -28,7 +30,7 @@ COLUMNS = {
     "success_of_placed": "success,\nif placed",
     "iou": "mean IoU",
 }
-DIRECT = "former-direct@v001"
+DIRECT = "former-direct@v002"
 """What a model alone is told: to write coordinates."""
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
@@ -48,6 +50,7 @@ def photos(
     base_url: o.BaseUrl = None,
     planner: o.PlannerName = None,
     prompt: o.PromptName = None,
+    prompts: o.PromptsFolder = None,
     alone: o.Alone = False,
     record: o.RecordFolder = None,
     out: o.JsonFile = Path("photos-eval.json"),
@@ -58,7 +61,7 @@ def photos(
     and point. --model replay:FOLDER replays what --record FOLDER has kept, as far as it goes.
     """
     chosen, tasks = mode_named(mode), inputs.tasks(task, load_tasks(data))
-    jitters = inputs.whole("--seeds", seeds, least=1)
+    jitters, library = inputs.whole("--seeds", seeds, least=1), PromptLibrary(prompts)
     recorded = recordings(model)
     if recorded is not None:
         tasks = [t for t in tasks if t.id in recorded]
@@ -66,8 +69,9 @@ def photos(
     def agent(task: Task) -> Agent:
         name = model if recorded is None else f"replay:{recorded[task.id]}"
         if alone:
-            return Agent(name, base_url=base_url, prompt=prompt or DIRECT, tools=())
-        return Agent(name, base_url=base_url, planner=planner, prompt=prompt)
+            told = prompt or DIRECT
+            return Agent(name, base_url=base_url, prompt=told, library=library, tools=())
+        return Agent(name, base_url=base_url, planner=planner, prompt=prompt, library=library)
 
     if tasks:
         agent(tasks[0])  # what cannot be asked is found before the work
@@ -99,6 +103,18 @@ def scenes(
         write_scenes(bar, folder)
         rows = _run(load_tasks(folder), chosen, 1)
     _show(rows, chosen, {"seeds": f"{first}-{last}", "data": "drawn scenes"}, out)
+
+
+@app.command()
+def descriptors(data: o.DataFolder = None) -> None:
+    """Tokens that each way of putting a shape into text costs, over the photographs' things."""
+    table = Table(title="describe_shape", header_style="cyan", box=None)
+    for name in ("descriptor", "median tokens", "most", "beyond edges"):
+        table.add_column(name, justify="left" if name == "descriptor" else "right")
+    for cost in descriptor_costs(load_tasks(data)):
+        numbers = (f"{cost.median:,.0f}", f"{cost.most:,}", f"{cost.overhead:+.0%}")
+        table.add_row(cost.descriptor, *numbers)
+    Console(highlight=False).print(table)
 
 
 app.command(name="compare")(compare.compare)
@@ -151,7 +167,7 @@ def _print_costs(rows: list[Row]) -> None:
     table = Table(title="what each took", header_style="cyan", box=None)
     for name in ("task", "requests", "tokens in", "tokens out", "outcome", "strict"):
         number = name.startswith(("requests", "tokens"))
-        table.add_column(name, justify="right" if number else "left")
+        table.add_column(name, justify="right" if number else "left", no_wrap=name == "task")
     spent = [(r.requests, r.input_tokens, r.output_tokens) for r in rows]
     for row, counts in zip(rows, spent, strict=True):
         numbers = [f"{n:,}" for n in counts]
@@ -182,5 +198,5 @@ def _print(
     for row in rows:
         if not row.strict:
             kind = "not strict" if row.success else row.status if row.failures else "failed"
-            why = "; ".join(row.failures) if row.status == "deployed" else row.message
+            why = "; ".join(row.failures) if row.placed else row.message
             console.print(f"{row.task} seed {row.seed}: {kind}: {why[:150]}", soft_wrap=True)

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from ..agent.limits import Limits
 from ..agent.policy import Policy
 from ..evals.suite import Task
+from ..prompts.inputs import Input
 from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_ROBOTS
 from ..tools.geometry.outline import FARTHEST, FloatArray
@@ -239,6 +240,37 @@ def policy(given: list[str] | None, before: Sequence[Sequence[str]] = ()) -> Pol
             )
     rules: list[Any] = [*(text.rpartition("=")[::2] for text in given or []), *before]
     return Policy(tuple((glob, decision) for glob, decision in rules))
+
+
+def variables(given: list[str] | None, declared: Mapping[str, Input]) -> dict[str, object]:
+    """Values for the inputs of a prompt from NAME=VALUE; whether they will do is for it to say.
+
+    Raises:
+        InputError: no NAME=VALUE, or a name given twice.
+    """
+    found: dict[str, object] = {}
+    for text in given or []:
+        name, equals, written = text.partition("=")
+        if not equals or name in found:
+            why = "is given twice" if equals else "has no ="
+            raise InputError(f"--var {text!r} {why}; give NAME=VALUE, each name once.")
+        found[name] = declared[name].read(written) if name in declared else written
+    return found
+
+
+def scores(path: Path | None) -> dict[str, dict[str, float]]:
+    """Scores of prompts by suite, from JSON; none without a file.
+
+    Raises:
+        InputError: it cannot be read, or is something else.
+    """
+    if path is None:
+        return {}
+    try:
+        return TypeAdapter(dict[str, dict[str, float]]).validate_json(read_text(path))
+    except ValidationError as error:
+        form = '{"ID@VERSION": {"SUITE": NUMBER}}'
+        raise InputError(f"--baselines {path} must hold {form}: {violations(error)}") from None
 
 
 def recording(path: Path | None) -> Path | None:

@@ -46,6 +46,7 @@ def _leave(code: int) -> None:
 def _run() -> int:
     import typer
 
+    from ..prompts import PromptError
     from ..tools.errors import FleetError, FormupError, ModelError
     from .cli import app
     from .screen import say_failed
@@ -60,7 +61,7 @@ def _run() -> int:
         return 2
     except typer.Abort:
         raise KeyboardInterrupt from None
-    except FormupError as error:
+    except (FormupError, PromptError) as error:
         say_failed(str(error))
         return 4 if isinstance(error, (ModelError, FleetError)) else 2
     except BrokenPipeError:

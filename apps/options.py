@@ -46,7 +46,41 @@ PlannerName = Annotated[
     ),
 ]
 PromptName = Annotated[
-    str | None, typer.Option("--prompt", help="ID@VERSION; the offline rules read none.")
+    str | None,
+    typer.Option(
+        "--prompt", help="ID@VERSION, or ID for its current one; the offline rules read none."
+    ),
+]
+PromptsFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--prompts",
+        envvar="FORMUP_PROMPTS",
+        help="A folder of prompts of your own, on top of the shipped ones.",
+    ),
+]
+PromptArgument = Annotated[
+    str, typer.Argument(metavar="NAME", help="ID@VERSION, or ID for its current one.")
+]
+PromptNames = Annotated[
+    list[str] | None, typer.Argument(metavar="[NAME]...", help="Only these; default: all.")
+]
+PromptId = Annotated[str, typer.Argument(metavar="ID", help="Of a prompt, such as former.")]
+DraftName = Annotated[str, typer.Argument(metavar="ID@draft-NAME", help="Of the draft.")]
+ParentName = Annotated[
+    str | None, typer.Option("--from", help="ID@VERSION to begin with, if not the current one.")
+]
+Variables = Annotated[
+    list[str] | None, typer.Option("--var", help="NAME=VALUE of an input; repeatable.")
+]
+Why = Annotated[str, typer.Option("--why", help="The reason, for the changelog.")]
+ComparisonFile = Annotated[
+    Path | None, typer.Option("--report", help="What `formup eval compare` wrote.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Without a comparison; say --why.")]
+Baselines = Annotated[
+    Path | None,
+    typer.Option("--baselines", help='JSON with scores: {"ID@VERSION": {"SUITE": NUMBER}}.'),
 ]
 Numbered = Annotated[
     bool,

@@ -41,6 +41,11 @@ class Folder:
                 f"The output folder {self.path} cannot be written: {why}; give another with --out."
             ) from None
 
+    @property
+    def trace(self) -> Path:
+        """Where the run is written down."""
+        return self.path / NAME
+
     def draw(self, name: str, image: Any) -> str:
         """Write a picture and return its name."""
         buffer = io.BytesIO()

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from ..agent.report import Report
 from ..tools.formation.contract import Group
+from ..tools.formation.verdict import Measure
 
 LONGEST = 600
 """Characters of an error message; a value given may be vast."""
@@ -122,17 +123,19 @@ def _group(group: Group) -> str:
         words.append(f"at least {group.clearance[0]:.1f} px from its edge")
     elif group.clearance is not None and group.relation != "corners":
         words.append(f"{group.clearance[0]:.1f} to {group.clearance[1]:.1f} px away")
-    if group.spacing == "even" and group.relation not in ("corners", "centre"):
+    escape_proof = group.closure == "escape-proof"
+    if group.spacing == "even" and group.relation not in ("corners", "centre") and not escape_proof:
         words.append("evenly spaced")
     if group.closure:
-        words.append(f"in a closed {group.closure}")
+        words.append("escape-proof" if escape_proof else f"in a closed {group.closure}")
     return " ".join(word for word in words if word)
 
 
-def _measures(measures: dict[str, float]) -> str:
+def _measures(measures: dict[str, Measure]) -> str:
     """Measures as words, those in pixels with their unit behind the number."""
     return ", ".join(
-        f"{name.removesuffix('_px').replace('_', ' ')} {value:g}"
+        f"{name.removesuffix('_px').replace('_', ' ')} "
+        + (value if isinstance(value, str) else f"{value:g}")
         + (" px" if name.endswith("_px") else "")
         for name, value in measures.items()
     )

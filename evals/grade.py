@@ -69,6 +69,13 @@ def _limit(result: Grade, bad: bool, strict_bad: bool, text: str) -> None:
         result.strict_failures.append(text)
 
 
+def _at_most(result: Grade, value: float, most: float, share: float, text: str) -> None:
+    """At most so much and, strictly, at most this share of it."""
+    strict = "" if value > most else f", {most * share:.1f} strictly"
+    text = f"{value:.1f} px {text}, {most} allowed{strict}"
+    _limit(result, value > most, value > share * most, text)
+
+
 def _truth(task: Task) -> Polygon:
     return Polygon(task.target.polygon, task.target.holes)
 
@@ -119,14 +126,19 @@ def _inside(task: Task, points: FloatArray, result: Grade) -> None:
         shapely.contains_xy(target, points), 1.0, -1.0
     )
     least = rule["min_clearance_px"]
-    _limit(result, depth.min() < least, False, f"{depth.min():.1f} px inside, {least} needed")
+    _limit(
+        result,
+        depth.min() < least,
+        False,
+        f"{depth.min():.1f} px inwards, {least} needed",
+    )
     apart = min_spacing(points)
     floor = rule["min_spacing_px"]
     _limit(
         result,
         apart < floor,
         apart < STRICT_SPREAD * floor,
-        f"two robots {apart:.0f} px apart, {floor} needed",
+        f"two robots {apart:.1f} px apart, {floor} needed, {STRICT_SPREAD * floor:.1f} strictly",
     )
     x0, y0, x1, y1 = target.bounds
     step = task.target.outline.size / 80
@@ -134,12 +146,7 @@ def _inside(task: Task, points: FloatArray, result: Grade) -> None:
     cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
     bare = float(nearest(points, cells[shapely.contains_xy(target, cells)], 1)[0].max())
     most = rule["max_uncovered_px"]
-    _limit(
-        result,
-        bare > most,
-        STRICT_SPREAD * bare > most,
-        f"a part {bare:.0f} px from the nearest robot, {most} allowed",
-    )
+    _at_most(result, bare, most, 1 / STRICT_SPREAD, "from the nearest robot to some part")
 
 
 def _corners(task: Task, points: FloatArray, result: Grade) -> None:
@@ -147,12 +154,7 @@ def _corners(task: Task, points: FloatArray, result: Grade) -> None:
     distance = np.linalg.norm(points[:, None] - np.asarray(rule["points"])[None], axis=2)
     worst = float(distance[linear_sum_assignment(np.maximum(distance, 1e-9) ** 4)].max())
     most = rule["tolerance_px"]
-    _limit(
-        result,
-        worst > most,
-        worst > STRICT_SHARE * most,
-        f"{worst:.1f} px from its corner, {most} allowed",
-    )
+    _at_most(result, worst, most, STRICT_SHARE, "from its corner")
     near = float(distances(_truth(task), points).min())
     low = rule.get("min_clearance_px", 0)
     _limit(result, near <= 0 or near < low, near < 1, f"{near:.1f} px from the target")
@@ -192,12 +194,7 @@ def _line_between(task: Task, points: FloatArray, result: Grade) -> None:
     along = (points - a) @ (b - a) / float((b - a) @ (b - a))
     off = distances(LineString([a, b]), points)
     most = rule["tolerance_px"]
-    _limit(
-        result,
-        off.max() > most,
-        off.max() > STRICT_SHARE * most,
-        f"{off.max():.1f} px off the line, {most} allowed",
-    )
+    _at_most(result, float(off.max()), most, STRICT_SHARE, "off the line")
     if len(points) > 2:
         _even(np.diff(np.sort(along)), result)
 
@@ -205,12 +202,7 @@ def _line_between(task: Task, points: FloatArray, result: Grade) -> None:
 def _center(task: Task, points: FloatArray, result: Grade) -> None:
     most = task.success["tolerance_px"]
     off = float(np.linalg.norm(points - np.asarray(task.success["points"][0]), axis=1).max())
-    _limit(
-        result,
-        off > most,
-        off > STRICT_SHARE * most,
-        f"{off:.1f} px from the centre, {most} allowed",
-    )
+    _at_most(result, off, most, STRICT_SHARE, "from the centre")
 
 
 _RULES: dict[str, Callable[[Task, FloatArray, Grade], None]] = {

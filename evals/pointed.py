@@ -165,7 +165,7 @@ def _row(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) ->
         setup=task.setup,
         referring=task.referring,
         wording=task.wording,
-        status=report.status,
+        status="answered" if not agent.tools and placed is not None else report.status,
         placed=placed is not None,
         right=None
         if placed is None or not targets
@@ -173,7 +173,7 @@ def _row(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) ->
         success=graded.success,
         strict=graded.strict,
         certified=report.verdict is not None and report.verdict.certified,
-        iou=None if target is None else round(_iou(target.outline.polygon, task.target), 4),
+        iou=max((round(_iou(t.outline.polygon, task.target), 4) for t in targets), default=None),
         confidence=None if target is None else target.confidence,
         failures=graded.failures + graded.strict_failures,
         message=report.message,

@@ -30,6 +30,7 @@ class Target:
         outline: measured, holes kept.
         prompt: what it was found from: point, box, outline or points.
         parts: what alpha was made of.
+        missed: vertices of the rough outline it was found from that lie well outside of `outline`.
     """
 
     id: str
@@ -39,6 +40,7 @@ class Target:
     outline: Outline
     prompt: str
     parts: tuple[tuple[str, float], ...] = ()
+    missed: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)

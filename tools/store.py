@@ -40,6 +40,7 @@ class StoredTarget(_Value):
     confidence: float
     prompt: str
     parts: dict[str, float]
+    missed: tuple[Point, ...] = ()
     outline: tuple[Point, ...]
     holes: tuple[tuple[Point, ...], ...]
 
@@ -218,6 +219,7 @@ def _stored_target(target: Target) -> StoredTarget:
         confidence=target.confidence,
         prompt=target.prompt,
         parts=dict(target.parts),
+        missed=target.missed,
         outline=tuple((float(x), float(y)) for x, y in polygon.exterior.coords[:-1]),
         holes=tuple(
             tuple((float(x), float(y)) for x, y in ring.coords[:-1]) for ring in polygon.interiors
@@ -234,4 +236,5 @@ def _target(stored: StoredTarget) -> Target:
         outline=make_outline(stored.outline, stored.holes),
         prompt=stored.prompt,
         parts=tuple(stored.parts.items()),
+        missed=stored.missed,
     )

@@ -10,6 +10,8 @@ from copy import copy
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from .errors import InputError, ToolError
 from .fleet.deploy import Arrival, Fleet
 from .fleet.simulated import MAX_ROBOTS, SimulatedFleet, checked_starts, spread_starts
@@ -17,16 +19,18 @@ from .formation.contract import Contract
 from .formation.motion import obstacles
 from .formation.place import Site
 from .formation.plan import Plan
-from .geometry.outline import FloatArray, Outline
+from .geometry.outline import FloatArray, Outline, distances
 from .perception.attributes import Candidate
 from .perception.candidates import find_candidates, segment_candidate
 from .perception.contours import outline_of_mask
-from .perception.prompts import TargetPrompt
+from .perception.prompts import Point, TargetPrompt
 from .perception.segmenters import segmenter_named
 from .scene import Scene, Target
 
 Descriptor = Literal["edges", "edges+vertices", "matrix"]
 FLEETS = ("simulated",)
+MISSED = 0.06
+"""Rough outlines are off by up to this share of the thing's size."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,7 @@ class Workspace:
             outline=outline,
             prompt=prompt.how,
             parts=tuple((name, round(value, 3)) for name, value in parts.items()),
+            missed=_missed(outline, prompt),
         )
         if confidence < threshold:
             self.doubted = target
@@ -240,3 +245,10 @@ def _insufficient(confidence: float, threshold: float, how: str) -> str:
         f"Insufficient segmentation accuracy. The mask's confidence is {shown:.2f}, below the "
         f"threshold {threshold:.2f}. {ADVICE[how]}"
     )
+
+
+def _missed(outline: Outline, prompt: TargetPrompt) -> tuple[Point, ...]:
+    """Vertices drawn that what was measured leaves out by more than a rough outline is off."""
+    drawn = np.asarray(prompt.outline or (), dtype=float).reshape(-1, 2)
+    away = distances(outline.filled, drawn) > MISSED * outline.size
+    return tuple((float(x), float(y)) for x, y in drawn[away])

@@ -131,8 +131,8 @@ def entry_of(story: Story) -> dict[str, Any]:
     arrangement = fitting[random.integers(len(fitting))]
     robots = robots_for(random, story.target, arrangement)
     side = str(random.choice(["left", "right", "upper", "lower"]))
-    fresh = random.random() < FRESH and len(_wordings()) > 1
-    instruction = _words(random, story, arrangement, robots, side, _wordings()[int(fresh)])
+    fresh = random.random() < FRESH and len(wordings()) > 1
+    instruction = _words(random, story, arrangement, robots, side, wordings()[int(fresh)])
     name = f"scene_{story.scene.seed:06d}"
     things = {
         id(t): f"{t.sort.noun.replace(' ', '_')}_{i}" for i, t in enumerate(story.scene.things)
@@ -195,7 +195,7 @@ def named(random: Generator, story: Story, words: dict[str, Any] | None = None) 
 
 
 @cache
-def _wordings() -> list[dict[str, Any]]:
+def wordings() -> list[dict[str, Any]]:
     """The known wordings, and the fresh ones where there are any."""
     here = Path(__file__).parent
     paths = [here / "wordings.yaml", here / "fresh.yaml"]

@@ -64,14 +64,18 @@ def test_the_looker_sees_and_the_planner_is_told(picture: Picture) -> None:
     looker.assert_complete()
     planner.assert_complete()
     (looked,), (planned,) = looker.requests, planner.requests
-    assert looked.system == load_prompt("context@v001").text
-    assert planned.system == load_prompt("former@v002").text
+    assert looked.system == load_prompt("context").text
+    assert planned.system == load_prompt("planner").text
     assert pictures(looked) == 1
     assert pictures(planned) == 0
-    assert PI in texts(planned)
-    assert {t.name for t in looked.tools} == set(load_prompt("context@v001").tools)
-    assert {t.name for t in planned.tools} == set(load_prompt("former@v002").tools)
-    assert [p["id"] for p in report.prompts] == ["context", "former", "repair"]
+    (told,) = planned.messages
+    assert isinstance(told, User)
+    assert told.text.startswith('Instruction: "Put six around the odd one"')
+    assert f'Pattern: "{PI}"' in told.text
+    assert 'Measured: [{"id":"t1","label":"the box"' in told.text
+    assert {t.name for t in looked.tools} == set(load_prompt("context").tools)
+    assert {t.name for t in planned.tools} == set(load_prompt("planner").tools)
+    assert [p["id"] for p in report.prompts] == ["context", "planner", "repair"]
     assert report.prompt == report.prompts[1]
 
 
@@ -96,7 +100,7 @@ def test_what_is_not_certified_is_repaired_under_a_prompt_of_its_own(picture: Pi
     planner = Seer(script)
     agent = Agent(Seer([SEGMENT]), planner=planner, prompt="former-direct@v001")
     assert agent.run(picture, "Six around it").report.status == "deployed"
-    direct, repair = load_prompt("former-direct@v001").text, load_prompt("repair@v001").text
+    direct, repair = load_prompt("former-direct@v001").text, load_prompt("repair").text
     assert [r.system for r in planner.requests] == [direct, repair, repair]
 
 
@@ -110,7 +114,7 @@ def test_a_question_of_the_looker_is_answered_in_another_process(
     assert isinstance(asked.outcome, Paused)
     left = load_run(tmp_path)
     assert left.report.model == "scripted+scripted"
-    assert [p["id"] for p in left.report.prompts] == ["context", "former", "repair"]
+    assert [p["id"] for p in left.report.prompts] == ["context", "planner", "repair"]
     agent = Agent(Seer([SEGMENT]), planner=Seer([PLACE]))
     assert agent.resume(left, answer="the red one").report.status == "deployed"
     start = read_trace(tmp_path).start

@@ -51,6 +51,19 @@ def test_deploy_takes_the_plan_proposed_last_and_tells_what_was_observed() -> No
     assert observed.startswith("All 6 robots")
 
 
+def test_how_robots_were_assigned_is_told_only_where_it_is_approximate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    work = workspace()
+    propose(work)
+    assert "assignment" not in answer(work, "deploy").data
+    monkeypatch.setattr("formup.tools.formation.assignment.EXACT", 3)
+    again = workspace()
+    propose(again)
+    told = answer(again, "deploy").data["assignment"]
+    assert told.startswith("approximate: another could have saved 0.00% of")
+
+
 def test_without_words_for_the_person_the_run_goes_on() -> None:
     work = workspace()
     propose(work)

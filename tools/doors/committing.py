@@ -11,10 +11,12 @@ from ..fleet.simulated import SimulatedFleet
 from ..formation.contract import Contract, Group
 from ..formation.plan import Plan, make_plan
 from ..formation.wording import doubts
+from ..geometry.outline import distances
 from ..perception.prompts import Point, TargetPrompt
+from ..scene import Target
 from ..tool import ToolResult, tool
 from ..workspace import Settings, Workspace
-from .seeing import CLEAR, FRAME, measured, overlays, sighting, summary
+from .seeing import FRAME, doubtful, measured, overlays, sighting, summary
 
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
@@ -36,10 +38,10 @@ def propose_formation(
     Every violation comes back with numbers; what is not certified cannot be deployed.
 
     Args:
-        contract: what the instruction demands; its robots add up to those asked for.
-        targets: the things meant that are not segmented yet.
-        positions: (x, y) of every robot in the order of the groups, px; rarely needed.
-        samples: names of samples (s1, ...) to use as positions, in the order of the groups.
+        contract: what the instruction demands; its robots add up to Robots, or to the words'.
+        targets: the things meant that are not measured yet.
+        positions: (x, y) of every robot in the order of the groups, px; usually left out.
+        samples: names that sample tools gave (s1, ...), to use as positions instead.
     """
     if positions is not None and samples is not None:
         raise ToolError("propose_formation: give positions or samples, not both.")
@@ -100,6 +102,9 @@ async def deploy(
         "worst_robot": worst + 1,
         "tolerance_px": arrival.tolerance_px,
     }
+    if arrival.assignment_gap is not None:
+        most = f"{arrival.assignment_gap:.2%} of the summed squared ways"
+        data["assignment"] = f"approximate: another could have saved {most} at most"
     return ToolResult(data, told=_told(tell, arrival) if arrival.arrived else None)
 
 
@@ -109,7 +114,7 @@ def ask_user(workspace: Workspace, question: str, candidates: tuple[str, ...] = 
 
     Args:
         question: one clear question.
-        candidates: ids the person may choose from: candidates (c3) or targets (t1).
+        candidates: ids of numbered things (c3) or targets (t1) to choose from, if there are any.
     """
     listed = [
         sighting(workspace.candidate(c))
@@ -141,13 +146,23 @@ def _check_clear(workspace: Workspace, plan: Plan) -> None:
     """A plan nobody has looked at may be deployed only about things that were measured clearly."""
     for name in plan.formation.contract.target_ids:
         target = workspace.scene.target(name)
-        if target.confidence < CLEAR:
+        if doubtful(target):
             raise ToolError(
-                f"{name} was measured with confidence {target.confidence:.2f}; look whether the "
-                f"outline shown is the thing meant. If so deploy {plan.id} by its id, else "
-                "propose again with a closer outline, or with negative points on what is not part "
-                "of it."
+                f"Not deployed yet: {name} {_doubt(target)}. If the outline shown follows the "
+                f"thing meant, deploy plan_id {plan.id} (with tell): what it leaves out has less "
+                "clearance. Else propose again with a closer outline, with points on what is left "
+                "out beside it, or with negative points on what is not part of it."
             )
+
+
+def _doubt(target: Target) -> str:
+    """Why a target has to be looked at."""
+    if not target.missed:
+        return f"was measured with confidence {target.confidence:.2f}"
+    away = distances(target.outline.filled, np.asarray(target.missed))
+    places = zip(target.missed, away, strict=True)
+    left = ", ".join(f"({x:g}, {y:g}) by {px:.0f} px" for (x, y), px in places)
+    return f"as measured leaves out your {left}"
 
 
 def _told(tell: str | None, arrival: Arrival) -> str | None:
@@ -168,7 +183,7 @@ def _held_to(contract: Contract, settings: Settings) -> Contract:
 
 
 def _with_clearance(group: Group, clearance: float | None) -> Group:
-    if clearance is None or group.relation in ("between", "shape", "centre"):
+    if clearance is None or not group.keeps_clearance:
         return group
     slack = max(EXACT_PX, EXACT_SHARE * clearance)
     greatest = 100_000.0 if group.relation == "inside" else clearance + slack

@@ -29,7 +29,7 @@ LEAST_SHARE = 0.1
 
 def summary(target: Target) -> dict[str, Any]:
     """What a reply says of a target."""
-    return {
+    data = {
         "id": target.id,
         "label": target.label,
         "box": [round(v, 1) for v in target.box],
@@ -38,6 +38,7 @@ def summary(target: Target) -> dict[str, Any]:
         "kind": target.outline.kind,
         "corners": len(target.outline.corners),
     }
+    return data | ({"leaves_out_your_vertices": target.missed} if target.missed else {})
 
 
 def sighting(candidate: Candidate, reasons: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -75,7 +76,7 @@ def look(
     Args:
         region: x0, y0, x1, y1 of the part to see closer, px.
         plan_id: a plan whose robots to draw in.
-        candidates: whether to number what stands out; 3 is candidate c3.
+        candidates: whether to number what stands out; the thing numbered 3 is then c3.
     """
     scene = workspace.scene
     plan = None if plan_id is None else workspace.current_plan(plan_id)
@@ -88,13 +89,19 @@ def look(
     data: dict[str, Any] = {
         "width": scene.picture.width,
         "height": scene.picture.height,
-        "shown_at_scale": round(view_scale(scene.picture), 3) if region is None else "see rulers",
+        **_part_shown(scene, region),
         "frame": FRAME,
         "targets": [summary(t) for t in scene.targets],
         "candidates": [sighting(c) for c in shown],
         "notes": list(scene.picture.notes),
     }
     return ToolResult(data, (image,))
+
+
+def _part_shown(scene: Scene, region: Box | None) -> dict[str, Any]:
+    if region is None:
+        return {"shown_at_scale": round(view_scale(scene.picture), 3)}
+    return {"region": [round(v) for v in region], "note": "enlarged: read the rulers"}
 
 
 @tool("read")
@@ -202,7 +209,12 @@ def measured(workspace: Workspace, prompt: TargetPrompt) -> Target:
 
 def overlays(workspace: Workspace, targets: Iterable[Target]) -> tuple[bytes, ...]:
     """Pictures of those targets whose masks a model should look at before it trusts them."""
-    return tuple(_closer(workspace.scene, t) for t in targets if t.confidence < CLEAR)
+    return tuple(_closer(workspace.scene, t) for t in targets if doubtful(t))
+
+
+def doubtful(target: Target) -> bool:
+    """Whether a mask has to be looked at before robots are sent there."""
+    return target.confidence < CLEAR or bool(target.missed)
 
 
 def _closer(scene: Scene, target: Target) -> bytes:

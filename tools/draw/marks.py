@@ -245,7 +245,7 @@ def _guides(part: Part) -> list[FloatArray]:
 
 
 def _is_free(part: Part) -> bool:
-    return part.group.relation == "shape" and part.group.line is None
+    return part.group.relation == "shape" and part.group.line is part.group.shape is None
 
 
 def _opening(part: Part) -> Opening | None:

@@ -18,6 +18,7 @@ from ..perception.attributes import Candidate
 from ..perception.image import Picture
 from ..scene import Box, Scene
 from .canvas import CERTIFIED, FINDING, INK, Canvas, Colour, Labels
+from .escape import draw_escape
 from .marks import (
     directions,
     draw_areas,
@@ -51,6 +52,11 @@ MEASURES = (
     ("min_spacing_px", "closest pair {:.1f} px"),
 )
 """What the footer tells: of those measured the first three."""
+CAGED = {
+    "certified": "cannot get out",
+    "not certified": "may get out",
+    "gets out": "can get out",
+}
 NEAR = 2.0
 """Robots more than so many long sides of the picture away are not led lines to."""
 
@@ -59,7 +65,8 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
     """The photograph with the contract, the robots and the verdict.
 
     Areas where robots' centres may stand are tinted; what a ring leaves open, a side, a line
-    and the ways to corners are dashed. Robots with a finding are red with a cross.
+    and the ways to corners are dashed. Robots with a finding are red with a cross. Where a target
+    was found to get out of a cage, its way is shown.
 
     Args:
         scene: what the plan was made in.
@@ -81,6 +88,8 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
     drivable = len(points) == contract.robots and _near(points, site).all()
     if drivable:
         draw_guides(canvas, contract, site, points)
+    if plan.verdict.escape is not None:
+        draw_escape(canvas, plan.verdict.escape, site)
     labels = Labels(canvas.photo)
     _draw_robots(canvas, plan, site, labels)
     if drivable:
@@ -180,6 +189,8 @@ def _facts(plan: Plan) -> list[str]:
     measured = plan.verdict.measures
     count = len(plan.formation.positions)
     told = [form.format(measured[key]) for key, form in MEASURES if key in measured]
+    if "escape_proof" in measured:
+        told.insert(0, CAGED[str(measured["escape_proof"])])
     if "widest_opening_px" in measured:
         told = [fact for fact in told if not fact.startswith("widest gap")]
     return [plan.id, f"{count} robot{'s' * (count != 1)}", *told[:3]]

@@ -39,8 +39,10 @@ def _draw_tick(canvas: Canvas, axis: int, value: int, *, labelled: bool) -> None
         low, high = sorted((edge, edge + out * reach))
         tick = (along - half, low, along + half, high)
         canvas.box(tick if axis == 0 else (tick[1], tick[0], tick[3], tick[2]), INK)
-        if labelled:
-            where = np.array([along - 0.5, edge + out * middle])
+        if labelled:  # whole: half a number is another number
+            half_label = canvas.text_size(str(value), TEXT)[axis] / 2
+            whole = min(max(along - 0.5, half_label), canvas.size[axis] - 1 - half_label)
+            where = np.array([whole, edge + out * middle])
             canvas.text(where if axis == 0 else where[::-1], str(value), TEXT, INK)
 
 

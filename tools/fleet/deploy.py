@@ -6,9 +6,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from ..errors import FleetError, ToolError
+from ..formation.assignment import assign
 from ..formation.check import certify
 from ..formation.contract import with_defaults
-from ..formation.motion import assign, obstacles, routes
+from ..formation.motion import obstacles, routes
 from ..formation.place import Site
 from ..formation.plan import Plan, Point
 from ..geometry.outline import FloatArray, distances
@@ -37,6 +38,8 @@ class Arrival(BaseModel):
         robots: which robot of the fleet (from 1) took each place.
         residual_px: distance of observed to requested.
         corrections: how many times robots were sent again after the first move.
+        assignment_gap: share of the summed squared ways another assignment could have saved at
+            most; None where there was none better.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -47,6 +50,7 @@ class Arrival(BaseModel):
     residual_px: tuple[float, ...]
     tolerance_px: float
     corrections: int
+    assignment_gap: float | None = None
 
 
 async def deploy(plan: Plan, site: Site, fleet: Fleet) -> Arrival:
@@ -69,7 +73,8 @@ async def deploy(plan: Plan, site: Site, fleet: Fleet) -> Arrival:
     if not solid.is_empty and distances(solid, poses).min() <= contract.robot_radius:
         robot = int(np.argmin(distances(solid, poses))) + 1
         raise FleetError(f"Robot {robot} stands on the target; move it off before deploying.")
-    takes = assign(poses, goals)
+    assignment = assign(poses, goals)
+    takes = assignment.robots
     tolerance = max(ARRIVED_PX, ARRIVED_SHARE * float(np.hypot(*site.room)))
     corrections = -1
     residual = np.full(len(goals), np.inf)
@@ -89,4 +94,5 @@ async def deploy(plan: Plan, site: Site, fleet: Fleet) -> Arrival:
         residual_px=tuple(round(float(r), 3) for r in residual),
         tolerance_px=round(tolerance, 3),
         corrections=corrections,
+        assignment_gap=assignment.gap if assignment.method == "approximate" else None,
     )

@@ -11,8 +11,9 @@ from ..formation.contract import MIN_SPACING
 from ..formation.motion import along
 from ..formation.place import Site
 from ..geometry.curves import Curve, Frame
+from ..geometry.interior import inside
 from ..geometry.outline import FloatArray, distances, largest_part, outline_of
-from ..geometry.sampling import along_curve, inside
+from ..geometry.sampling import along_curve
 
 MAX_ROBOTS = 1_000
 """Above this, motion and its animation are not simulated yet."""

@@ -12,10 +12,16 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..geometry.curves import ROUND_JOIN_DIP, Curve
+from ..geometry.interior import coverage_radius, yardstick
+from ..geometry.lloyd import cells_of
 from ..geometry.outline import FARTHEST, FloatArray, distances
-from ..geometry.sampling import coverage_radius, inside, min_spacing, nearest
+from ..geometry.sampling import min_spacing, nearest
 from . import spacing
+from .caging import escape_proof
+from .closure import judge
 from .contract import CENTRE_SHARE, Contract
+from .drawn import on_figure
+from .figure import figure_of
 from .place import Site, reference_curve, side_direction
 from .verdict import TOLERANCE, Audit, Part, Verdict, parts_of
 
@@ -90,9 +96,11 @@ def _keep_out(points: FloatArray, contract: Contract, site: Site, audit: Audit) 
     """No robot stands on what is kept out of, or on what another group stands around."""
     groups = np.repeat(np.arange(len(contract.groups)), [g.robots for g in contract.groups])
     for name in contract.solid_targets:
-        distance = distances(site.outlines[name].filled, points)
         owners = [k for k, g in enumerate(contract.groups) if name in g.targets]
         foreign = ~np.isin(groups, owners)  # a group's own rule speaks of its own target
+        if not foreign.any():
+            continue
+        distance = distances(site.outlines[name].filled, points)
         for i in np.flatnonzero(foreign & (distance <= contract.robot_radius)):
             text = f"stands on {name}, which is to be kept free"
             audit.robot("keep_out", int(i), distance[i], contract.robot_radius, text)
@@ -106,7 +114,7 @@ def _outside(part: Part, audit: Audit) -> None:
     distance = distances(part.outline.filled, part.points)
     clearance = distance - part.radius
     beyond = clearance  # a line beside a side passes its recesses by
-    if part.group.side is not None:
+    if part.group.relation == "along" and part.group.edges is None:
         beyond = distances(part.outline.envelope, part.points) - part.radius
     least, greatest = part.clearance
     audit.least("min_clearance_px", clearance.min())
@@ -146,7 +154,8 @@ def _around(part: Part, audit: Audit) -> None:
         )
     if part.group.relation == "cage":
         spacing.enclosure(part, curve, audit)
-    if part.group.spacing == "even":
+        judge(part, curve, audit)
+    if part.group.spacing == "even" and not escape_proof(part.group):
         spacing.evenness(part, curve, audit)
 
 
@@ -177,11 +186,34 @@ def _along(part: Part, audit: Audit) -> None:
         spacing.evenness(part, curve, audit)
 
 
-def _line(part: Part, audit: Audit) -> None:
+def _shape(part: Part, audit: Audit) -> None:
+    shape = part.group.shape
+    if shape is None:
+        _line(part, audit)
+        return
+    if not part.group.enters:
+        _off_targets(part, audit)
+    if shape.where == "inside":
+        _within(part, audit)
+    elif part.group.clearance is not None:
+        clearance = distances(part.outline.filled, part.points) - part.radius
+        least, name = part.clearance[0], part.group.targets[0]
+        audit.least("min_clearance_px", clearance.min())
+        for i in np.flatnonzero(clearance < least - TOLERANCE):
+            text = f"is {clearance[i]:.1f} px from {name}; {least:.1f} px or more are needed"
+            audit.robot("too_near", part.first + int(i), clearance[i], least, text)
+    on_figure(part, figure_of(part.group, shape, part.site, part.radius), audit)
+
+
+def _off_targets(part: Part, audit: Audit) -> None:
     for name in part.group.targets:
         distance = distances(part.site.outlines[name].filled, part.points)
         for i in np.flatnonzero(distance <= part.radius):
             audit.robot("on_target", part.first + int(i), 0.0, part.radius, f"stands on {name}")
+
+
+def _line(part: Part, audit: Audit) -> None:
+    _off_targets(part, audit)
     if part.group.relation == "shape" and part.group.line is None:
         audit.notes.append("A free shape: bounds, spacing and named targets were checked.")
         return
@@ -199,6 +231,13 @@ def _corners(part: Part, audit: Audit) -> None:
 
 
 def _inside(part: Part, audit: Audit) -> None:
+    _within(part, audit)
+    if part.group.spacing == "even" and len(part.points) > 1:
+        _evenly_inside(part, audit)
+
+
+def _within(part: Part, audit: Audit) -> None:
+    """Every robot as deep inside the target as it must and may be."""
     polygon, name = part.outline.polygon, part.group.targets[0]
     sign = np.where(shapely.intersects_xy(polygon, part.points), 1.0, -1.0)
     depth = sign * distances(polygon.boundary, part.points) - part.radius
@@ -216,22 +255,20 @@ def _inside(part: Part, audit: Audit) -> None:
     for i in np.flatnonzero(depth > greatest + TOLERANCE):
         text = f"is {depth[i]:.1f} px inside {name}; {greatest:.1f} px at most are allowed"
         audit.robot("too_deep", part.first + int(i), depth[i], greatest, text)
-    if part.group.spacing == "even" and len(part.points) > 1:
-        _evenly_inside(part, audit)
 
 
 def _evenly_inside(part: Part, audit: Audit) -> None:
     margin, depth = (bound + part.radius for bound in part.clearance)
     floor = part.group.min_spacing or 0.0
     region = part.site.visible(part.group.targets[0])
-    ideal = inside(region, part.group.robots, margin, depth, floor)
-    apart, cover = min_spacing(part.points), coverage_radius(region, part.points)
-    ideal_apart = min_spacing(ideal) if len(ideal) > 1 else 0.0
+    ideal_apart, ideal = yardstick(region, part.group.robots, margin, depth, floor)
+    cells = cells_of(region.polygon, part.group.robots)
+    apart, cover = min_spacing(part.points), coverage_radius(region, part.points, cells)
     audit.greatest("coverage_radius_px", cover)
     if ideal_apart:
         audit.least("spacing_ratio", apart / ideal_apart)
     least = SPACING_SHARE * ideal_apart
-    most = COVER_SHARE * coverage_radius(region, ideal) if len(ideal) else np.inf
+    most = COVER_SHARE * coverage_radius(region, ideal, cells) if len(ideal) else np.inf
     if apart < least - TOLERANCE:
         audit.whole(
             "uneven",
@@ -272,6 +309,6 @@ _RULES: dict[str, Callable[[Part, Audit], None]] = {
     "corners": _corners,
     "inside": _inside,
     "between": _line,
-    "shape": _line,
+    "shape": _shape,
     "centre": _centre,
 }

@@ -7,18 +7,29 @@ outline to the robot's edge, so a robot of radius r keeps its centre r further a
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
 
+from ..errors import InputError
+from ..geometry.letters import letter_strokes
 from ..geometry.outline import Outline
+from ..geometry.shapes import Kind
 
 MAX_ROBOTS = 10_000
 MIN_SPACING = 2.0
 """Centres of point robots nearer than this, px, are the same place."""
 CLEARANCE_SHARE, MIN_CLEARANCE = 0.16, 6.0
 """Default clearance: this share of the target's size (square root of its area), at least 6 px."""
-CORNER_SHARE, MIN_STANDOFF = 0.045, 3.0
+CORNER_SHARE, MIN_STANDOFF = 0.06, 3.0
 INSIDE_SHARE = 0.05
 CENTRE_SHARE = 0.2
 
@@ -44,24 +55,91 @@ class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+Pair = Annotated[tuple[Coordinate, Coordinate], _numbers(2)]
+Four = Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], _numbers(4)]
+Where = Literal["around", "inside", "on", "left", "right", "above", "below"]
+ENCLOSING: frozenset[Kind] = frozenset({"arc", "circle", "polygon", "star"})
+
+
+class ShapeSpec(_Frozen):
+    """What robots draw, and where: in a box, by a target, or through points of their own."""
+
+    kind: Kind
+    text: str | None = Field(default=None, max_length=40, description="letters: A-Z, 0-9, blanks.")
+    points: tuple[Pair, ...] | None = Field(
+        default=None, min_length=2, max_length=500, description="line, polyline: (x, y) in turn."
+    )
+    rows: int | None = Field(default=None, ge=1, description="grid.")
+    corners: int | None = Field(default=None, ge=3, le=100, description="polygon, star: tips.")
+    angles: Pair | None = Field(
+        default=None, description="arc: from, to in degrees, clockwise from the right."
+    )
+    box: Four | None = Field(default=None, description="x0, y0, x1, y1 to fit it into; or where.")
+    where: Where | None = Field(default=None, description="By the target.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        problems = [*self._misplaced(), *self._placeless()]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
+
+    def _misplaced(self) -> Iterator[str]:
+        for name, kinds in _FIELD_OF.items():
+            if getattr(self, name) is not None and self.kind not in kinds:
+                yield f"{name} belongs to {' or '.join(kinds)}, not to {self.kind}"
+        if self.kind == "letters":
+            try:
+                letter_strokes(self.text or "")
+            except InputError as error:
+                yield str(error).rstrip(".")
+        if self.kind == "polyline" and self.points is None:
+            yield "a polyline takes points"
+        if self.points is not None and len(set(self.points)) < 2:
+            yield "points must differ"
+
+    def _placeless(self) -> Iterator[str]:
+        given = (self.box is not None) + (self.where is not None)
+        if given > 1 or (not given and self.points is None):
+            yield f"a {self.kind} takes either a box, or where with a target"
+        if self.where == "around" and self.kind not in ENCLOSING:
+            yield f"only {', '.join(sorted(ENCLOSING))} go around a target, not {self.kind}"
+        if self.box is not None and not (self.box[0] <= self.box[2] and self.box[1] <= self.box[3]):
+            yield f"box {self.box} must be x0 <= x1, y0 <= y1"
+
+
+_FIELD_OF: dict[str, tuple[Kind, ...]] = {
+    "text": ("letters",),
+    "points": ("line", "polyline"),
+    "rows": ("grid",),
+    "corners": ("polygon", "star"),
+    "angles": ("arc",),
+}
+
+
 class Group(_Frozen):
     """One arrangement."""
 
     relation: Relation = Field(
-        description="around: even ring; cage: closed ring, nothing gets out; corners: one at each "
-        "corner; along: beside one side or chosen edges; inside: spread evenly over it; between: "
-        "two targets; centre: gathered at its centre; shape: a line, or free positions."
+        description="around: even ring (surround, guard); cage: closed ring, nothing gets out; "
+        "corners: one at each corner; along: beside one side or chosen edges; inside: spread "
+        "evenly over it (in or on it); between: two targets; centre: gathered at its centre, if "
+        "that is said; shape: a line, or free positions."
     )
     targets: tuple[str, ...] = Field(
-        default=(), max_length=2, description="Ids such as t1; two for between, else one."
+        default=(), max_length=2, description="Ids such as t1: two for between, else one."
     )
     robots: int = Field(ge=1, le=MAX_ROBOTS, description="How many of the robots.")
     clearance: Annotated[tuple[Length, Length], _numbers(2)] | None = Field(
         default=None,
         description="Least and greatest distance from the outline to a robot's edge, px; only "
-        "where the person named a length.",
+        "where the person named a length: 15 px away is [15, 15], at least 15 is [15, 1000].",
     )
-    fit: Fit = Field(default="normal", description="How close, where no length was named.")
+    fit: Fit = Field(
+        default="normal",
+        description="How close, where no length was named. tight: snug; normal: also for 'just "
+        "off' and 'next to'; wide: well away.",
+    )
     spacing: Literal["even", "free"] = Field(
         default="even", description="free: neighbours need not be evenly spaced."
     )
@@ -84,10 +162,27 @@ class Group(_Frozen):
         default="line",
         description="between: a line that joins them, or a divider that parts them.",
     )
-    line: Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], _numbers(4)] | None = (
-        Field(default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free.")
+    line: Four | None = Field(
+        default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free."
     )
-    closure: Literal["ring"] | None = Field(default=None, description="cage: ring, the default.")
+    closure: Literal["ring", "escape-proof"] | None = Field(
+        default=None,
+        description="cage: ring, the default; escape-proof: certified that it cannot get out "
+        "however it moves and turns, evenly spaced or not; only if asked for.",
+    )
+    walls: bool | None = Field(
+        default=None, description="cage, escape-proof: the picture's border is a wall; if said."
+    )
+    facing: str | None = Field(
+        default=None, description="along: the side that faces this target, instead of a side."
+    )
+    shape: ShapeSpec | None = Field(default=None, description="shape: a form drawn by the robots.")
+
+    @model_serializer(mode="wrap")
+    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without what later versions added and is not used: the hash of a plan stays the same."""
+        written = standard(self)
+        return {k: v for k, v in written.items() if v is not None or k not in _LATER}
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -96,35 +191,61 @@ class Group(_Frozen):
             raise ValueError("; ".join(problems))
         return self
 
+    @property
+    def keeps_clearance(self) -> bool:
+        """Whether a clearance says anything: of a shape, where a target gives it its place."""
+        if self.shape is not None:
+            return self.shape.where not in (None, "on")
+        return self.relation not in ("between", "centre", "shape")
+
+    @property
+    def enters(self) -> bool:
+        """Whether its robots are meant to stand on its target."""
+        within = self.shape is not None and self.shape.where in ("inside", "on")
+        return within or self.relation in ("inside", "centre")
+
     def _missing(self) -> Iterator[str]:
         wanted = {"between": 2, "shape": 0}.get(self.relation, 1)
         if self.relation != "shape" and len(self.targets) != wanted:
             yield f"{self.relation} takes {wanted} target(s), got {len(self.targets)}"
         if len(set(self.targets)) < len(self.targets):
             yield f"targets {self.targets} must differ"
-        if self.relation == "along" and (self.side is None) == (self.edges is None):
-            yield "along takes either a side or edges"
+        ways = [self.side, self.edges, self.facing]
+        if self.relation == "along" and sum(way is not None for way in ways) != 1:
+            yield "along takes either a side or edges, or facing: one of them"
+        if self.shape is not None and self.shape.where is not None and len(self.targets) != 1:
+            yield f"a shape {self.shape.where} a target takes 1 target, got {len(self.targets)}"
         if self.relation == "cage" and self.robots < 3:
             yield f"a cage takes 3 or more robots, got {self.robots}"
         if self.clearance is not None and not self.clearance[0] <= self.clearance[1] > 0:
             yield f"clearance {self.clearance} must be (least, greatest > 0)"
 
     def _misplaced(self) -> Iterator[str]:
-        if self.clearance is not None and self.relation in ("between", "centre", "shape"):
+        if self.clearance is not None and not self.keeps_clearance:
             yield f"clearance does not apply to {self.relation}"
+        if self.facing is not None and self.facing in self.targets:
+            yield f"{self.facing} cannot face itself"
+        if self.shape is not None and self.line is not None:
+            yield "a shape is either a line or a form"
         if self.relation == "cage" and self.spacing != "even":
             yield "a cage is evenly spaced"
+        if self.walls and self.closure != "escape-proof":
+            yield "walls belong to the closure escape-proof"
         for name, only in _ONLY_IN.items():
             if getattr(self, name) is not None and self.relation != only:
                 yield f"{name} belongs to {only}, not to {self.relation}"
 
 
+_LATER = frozenset({"facing", "shape", "walls"})
 _ONLY_IN = {
     "side": "along",
     "edges": "along",
     "max_gap": "cage",
     "closure": "cage",
+    "walls": "cage",
     "line": "shape",
+    "facing": "along",
+    "shape": "shape",
 }
 
 
@@ -133,7 +254,10 @@ class Contract(_Frozen):
 
     groups: tuple[Group, ...] = Field(min_length=1, max_length=50)
     robot_radius: Length = Field(default=0.0, description="Radius of a robot, px; 0 is a point.")
-    keep_out: tuple[str, ...] = Field(default=(), description="Further targets no robot may touch.")
+    keep_out: tuple[str, ...] = Field(
+        default=(),
+        description="Further targets no robot may touch; other things are not avoided.",
+    )
     reading: str = Field(
         default="",
         max_length=300,
@@ -149,12 +273,13 @@ class Contract(_Frozen):
     def target_ids(self) -> tuple[str, ...]:
         """Every target named, once, in order."""
         named = [t for group in self.groups for t in group.targets] + list(self.keep_out)
-        return tuple(dict.fromkeys(named))
+        faced = [group.facing for group in self.groups if group.facing is not None]
+        return tuple(dict.fromkeys(named + faced))
 
     @property
     def solid_targets(self) -> tuple[str, ...]:
         """Targets no robot may stand on or drive over: those that no group is to enter."""
-        entered = {t for g in self.groups if g.relation in ("inside", "centre") for t in g.targets}
+        entered = {t for g in self.groups if g.enters for t in g.targets}
         return tuple(t for t in self.target_ids if t in self.keep_out or t not in entered)
 
     @property
@@ -213,11 +338,13 @@ def _defaults(
 def _default_range(
     group: Group, outline: Outline, room: tuple[float, float], radius: float
 ) -> tuple[float, float] | None:
-    if group.relation in ("around", "cage", "along"):
+    if group.shape is not None and group.shape.where == "inside":
+        return (INSIDE_SHARE * outline.size, outline.size)
+    if group.relation in ("around", "cage", "along") or (group.shape and group.keeps_clearance):
         aim = default_clearance(outline, room, radius) * FIT_FACTOR[group.fit]
         return (aim / 2, aim * 2)
     if group.relation == "corners":
-        aim = max(CORNER_SHARE * outline.size, MIN_STANDOFF) * FIT_FACTOR[group.fit]
+        aim = max(CORNER_SHARE * outline.size * FIT_FACTOR[group.fit], MIN_STANDOFF)
         return (aim / 3, aim * 3)
     if group.relation == "inside":
         least = min(INSIDE_SHARE * outline.size, 0.15 * outline.min_width)

@@ -1,7 +1,6 @@
-"""From where robots are to where they shall stand: who goes where, and on which path.
+"""From where robots are to where they shall stand: on which path.
 
-Assignment is least sum of squared distances (the condition of CAPT, Turpin et al. 2014); paths
-are shortest ones around the targets on a visibility graph (Lozano-Perez and Wesley 1979).
+Paths are shortest ones around the targets on a visibility graph (Lozano-Perez and Wesley 1979).
 Frame: image pixels. Robots do not yet avoid each other.
 """
 
@@ -10,7 +9,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -27,22 +25,6 @@ BEND_SEGMENTS = 2
 ROOM_SHARES = (0.7, 0.3, 0.03)
 """How much of the smallest clearance at starts and goals paths keep: well away where there is
 room, squeezing past where not."""
-
-
-def assign(starts: FloatArray, goals: FloatArray) -> NDArray[np.intp]:
-    """For each goal the index of the robot that takes it, by least sum of squared distances.
-
-    Args:
-        starts: (n, 2).
-        goals: (n, 2).
-    """
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
-    # The optimum does not change when all goals move together; aligned sets solve faster.
-    shift = starts.mean(axis=0) - goals.mean(axis=0)
-    goal, robot = linear_sum_assignment(cdist(goals + shift, starts, "sqeuclidean"))
-    return np.asarray(robot[np.argsort(goal)], dtype=np.intp)
 
 
 def obstacles(contract: Contract, site: Site) -> BaseGeometry:

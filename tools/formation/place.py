@@ -4,26 +4,26 @@ Each relation has one reference (a curve, corners, a region, a point) that the c
 measures against. Frame: image pixels, x right, y down.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import numpy as np
 import shapely
-from shapely.geometry import LineString
+from shapely.geometry import LineString, MultiLineString
 
 from ..errors import ToolError
 from ..geometry.curves import Curve, Frame, edge_curve, ring, segment, side
-from ..geometry.outline import MIN_AREA, FloatArray, Outline, distances, largest_part, outline_of
+from ..geometry.interior import inside
+from ..geometry.outline import FloatArray, Outline, distances
 from ..geometry.sampling import (
     along_curve,
     around_point,
     at_corners,
     corner_points,
-    inside,
     min_spacing,
     spread_subset,
 )
+from .caging import caged_places, escape_proof
 from .contract import CENTRE_SHARE, Contract, Group, nominal
+from .figure import figure_of, place_figure
+from .site import CapacityError, Site
 
 TOUCH = 1.0
 """Robots between two targets keep this far off them, px."""
@@ -31,49 +31,6 @@ REFLEX = 1.5
 """A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
 square root of 2 in a right-angled reflex one."""
 DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
-
-
-@dataclass(frozen=True)
-class Site:
-    """What positions are judged in: the targets' outlines and the picture's size, px."""
-
-    outlines: Mapping[str, Outline]
-    width: float
-    height: float
-
-    @property
-    def room(self) -> tuple[float, float]:
-        """Width and height, px."""
-        return self.width, self.height
-
-    def visible(self, name: str) -> Outline:
-        """The part of a target inside the picture.
-
-        Raises:
-            ToolError: there is none.
-        """
-        outline = self.outlines[name]
-        picture = shapely.box(-0.5, -0.5, self.width - 0.5, self.height - 0.5)  # whole pixels
-        if picture.covers(outline.polygon):
-            return outline
-        seen = largest_part(outline.polygon.intersection(picture))
-        if seen is None or seen.area < MIN_AREA:
-            raise ToolError(f"{name} lies outside the picture.")
-        return outline_of(seen)
-
-    def frame(self, radius: float) -> Frame:
-        """Where robots of a radius stand wholly inside the picture."""
-        return Frame(self.width, self.height, radius)
-
-
-class CapacityError(ToolError):
-    """A group has more robots than its place holds."""
-
-    def __init__(self, group: Group, fits: int, why: str) -> None:
-        noun = "robot fits" if fits == 1 else "robots fit"
-        super().__init__(f"{group.robots} robots were asked for but only {fits} {noun}: {why}.")
-        self.fits = fits
-        self.group = group
 
 
 def place(contract: Contract, site: Site) -> FloatArray:
@@ -85,15 +42,26 @@ def place(contract: Contract, site: Site) -> FloatArray:
 
     Raises:
         CapacityError: a group has more robots than fit; its `fits` says how many do.
+        CageError: its robots cannot be placed escape-proof; `needed` says how many would do.
         ToolError: the contract leaves positions to the caller (a free shape).
     """
     parts = [_place_group(group, site, contract.robot_radius) for group in contract.groups]
     return np.concatenate(parts)
 
 
-def reference_curve(group: Group, site: Site, radius: float) -> Curve:
-    """The curve a ring, side, line or between group stands on."""
+def reference_curve(group: Group, site: Site, radius: float, offset: float | None = None) -> Curve:
+    """The curve a ring, side, line, shape or between group stands on.
+
+    Args:
+        group: with its defaults written out.
+        site: outlines and picture.
+        radius: of a robot, px.
+        offset: of robots' centres from the outline, px; None for the one the clearance aims at.
+    """
     frame = site.frame(radius)
+    if group.shape is not None:
+        lines = figure_of(group, group.shape, site, radius).lines
+        return Curve(lines, False, MultiLineString([LineString(x) for x in lines]).length)
     if group.relation == "shape":
         ends = np.asarray(group.line or (0, 0, 0, 0), dtype=float).reshape(2, 2)
         return segment(ends[0], ends[1], frame)
@@ -101,10 +69,10 @@ def reference_curve(group: Group, site: Site, radius: float) -> Curve:
         return _between(group, site, frame)
     outline = site.outlines[group.targets[0]]
     assert group.clearance is not None
-    offset = nominal(group.clearance) + radius
+    offset = nominal(group.clearance) + radius if offset is None else offset
     if group.relation != "along":
         least, greatest = (bound + radius for bound in group.clearance)
-        return ring(outline, offset, greatest, frame, keep=least)
+        return ring(outline, offset, max(greatest, offset), frame, keep=min(least, offset))
     if group.edges is not None:
         last = len(outline.edges) - 1
         if max(group.edges) > last:
@@ -116,6 +84,8 @@ def reference_curve(group: Group, site: Site, radius: float) -> Curve:
 
 def side_direction(group: Group, outline: Outline, site: Site) -> tuple[float, float]:
     """Outward vector of a group's side; of the two long (short) sides the one with more room."""
+    if group.facing is not None:
+        return _facing(outline, site.outlines[group.facing])
     name = group.side or "bottom"
     if name in DIRECTIONS:
         return DIRECTIONS[name]
@@ -132,6 +102,25 @@ def side_direction(group: Group, outline: Outline, site: Site) -> tuple[float, f
     return float(best[0]), float(best[1])
 
 
+def _facing(outline: Outline, other: Outline) -> tuple[float, float]:
+    """Outward vector of the side that faces another target.
+
+    Towards the place of the other that is nearest; of a polygonal outline the side whose own
+    direction is nearest to that, so that a line does not run around a corner.
+    """
+    link = shapely.get_coordinates(shapely.shortest_line(outline.filled, other.filled))
+    towards = link[-1] - link[0]
+    if np.linalg.norm(towards) < TOUCH:
+        centres = [shapely.get_coordinates(o.filled.centroid)[0] for o in (outline, other)]
+        towards = centres[1] - centres[0]
+    if outline.kind == "polygonal":
+        along = np.diff(outline.bulk_rectangle, axis=0)[:2]
+        unit = along / np.linalg.norm(along, axis=1, keepdims=True)
+        normals = np.concatenate([unit, -unit])
+        towards = normals[int(np.argmax(normals @ towards))]
+    return float(towards[0]), float(towards[1])
+
+
 def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
     """How far from each corner a robot may stand, (k,), px.
 
@@ -144,12 +133,17 @@ def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
 
 def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
     n, spacing = group.robots, group.min_spacing or 0.0
+    if group.shape is not None:
+        return place_figure(group, group.shape, site, radius)
     if group.relation == "shape" and group.line is None:
         raise ToolError("A free shape has no places of its own: give the positions.")
     if group.relation in ("corners", "inside", "centre"):
         points, why = _place_at_target(group, site, radius)
     else:
         curve = reference_curve(group, site, radius)
+        if escape_proof(group):
+            outline = site.outlines[group.targets[0]]
+            return caged_places(group, outline, radius, site.frame(radius), curve)
         points = _fit(curve, n, spacing)
         why = f"the {curve.length:.0f} px that are left to stand on allow no more at {spacing:g} px"
     if len(points) < n:

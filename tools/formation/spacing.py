@@ -9,9 +9,10 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
-from ..geometry.curves import FACING, Curve
+from ..geometry.curves import FACING, Curve, locate
 from ..geometry.outline import FloatArray, distances
 from ..geometry.sampling import corner_points
+from .caging import escape_proof
 from .place import corner_reach
 from .verdict import TOLERANCE, Audit, Part
 
@@ -30,7 +31,7 @@ def evenness(part: Part, curve: Curve, audit: Audit) -> None:
     if len(part.points) < 2:
         return
     spread = _spread(part, curve)
-    mean = float(np.mean(spread.gaps or [curve.length]))
+    mean = float(np.mean(spread.gaps or [curve.length / len(part.points)]))
     if spread.gaps:
         audit.least("spacing_ratio", min(spread.gaps) / mean if mean > 0 else 0.0)
         audit.greatest("worst_gap_px", max(spread.gaps))
@@ -98,19 +99,23 @@ def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
 
 
 def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
-    """A closed ring: the robots' polygon holds the target, no opening wider than allowed."""
+    """A closed ring: the robots' polygon holds the target, no opening wider than allowed.
+
+    What is to be escape-proof is judged by its certificate, openings only where one is named.
+    """
     points = part.points[_order(part.points, curve)]
     opening = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) - 2 * part.radius
     allowed = part.group.max_gap
     if allowed is None:
-        allowed = WIDEST * curve.whole_length / len(points)
+        even = WIDEST * curve.whole_length / len(points)
+        allowed = np.inf if escape_proof(part.group) else even
     audit.greatest("widest_opening_px", opening.max())
     audit.measures["min_width_px"] = round(part.outline.min_width, 2)
     encloses = len(points) > 2 and shapely.make_valid(Polygon(points)).contains(
         shapely.Point(part.outline.centre)
     )
     name = part.group.targets[0]
-    if not encloses:
+    if not encloses and not escape_proof(part.group):
         audit.whole(
             "not_enclosed",
             len(points),
@@ -171,11 +176,12 @@ def _order(points: FloatArray, curve: Curve) -> NDArray[np.intp]:
 
 def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
     """Arc length of each point's foot on the curve, pieces laid end to end, and its piece."""
+    if len(curve.lines) == 1:
+        return locate(curve.lines[0], points), np.zeros(len(points), dtype=np.intp)
     lines = [LineString(line) for line in curve.lines]
-    places = shapely.points(points)
     piece = np.argmin(np.stack([distances(line, points) for line in lines]), axis=0)
     starts = np.concatenate([[0.0], np.cumsum([line.length for line in lines])])
-    along = np.stack([shapely.line_locate_point(line, places) for line in lines])
+    along = np.stack([locate(line, points) for line in curve.lines])
     return starts[piece] + along[piece, np.arange(len(points))], piece
 
 

@@ -25,6 +25,25 @@ class Finding(BaseModel):
     sentence: str
 
 
+class Escape(BaseModel):
+    """A way out of a cage that was checked all along.
+
+    Attributes:
+        target: what gets out.
+        poses: x, y of the point it turns about, px, and the turn, radians from x to y; the first
+            is where it is.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    target: str
+    poses: tuple[tuple[float, float, float], ...]
+
+
+Measure = float | str
+"""A number, or a word such as the state of a cage."""
+
+
 class Verdict(BaseModel):
     """`certified` means every demand of the contract holds; `measures` say by how much."""
 
@@ -32,8 +51,9 @@ class Verdict(BaseModel):
 
     certified: bool
     findings: tuple[Finding, ...] = ()
-    measures: dict[str, float] = {}
+    measures: dict[str, Measure] = {}
     notes: tuple[str, ...] = ()
+    escape: Escape | None = None
 
 
 @dataclass(frozen=True)
@@ -68,8 +88,9 @@ class Audit:
     """Gathers what the rules find, over all groups of one contract."""
 
     findings: list[Finding] = field(default_factory=list[Finding])
-    measures: dict[str, float] = field(default_factory=dict[str, float])
+    measures: dict[str, Measure] = field(default_factory=dict[str, Measure])
     notes: list[str] = field(default_factory=list[str])
+    escape: Escape | None = None
 
     def robot(self, code: str, index: int, value: float, limit: float, text: str) -> None:
         """Record a violation by the robot with this index from 0; text follows its name."""
@@ -97,11 +118,11 @@ class Audit:
 
     def least(self, key: str, value: float) -> None:
         """Keep the smallest value of a measure over the groups."""
-        self.measures[key] = round(min(float(value), self.measures.get(key, float("inf"))), 2)
+        self.measures[key] = round(min(float(value), float(self.measures.get(key, "inf"))), 2)
 
     def greatest(self, key: str, value: float) -> None:
         """Keep the greatest value of a measure over the groups."""
-        self.measures[key] = round(max(float(value), self.measures.get(key, float("-inf"))), 2)
+        self.measures[key] = round(max(float(value), float(self.measures.get(key, "-inf"))), 2)
 
     def verdict(self) -> Verdict:
         """What was gathered, as a value."""
@@ -110,6 +131,7 @@ class Audit:
             findings=tuple(self.findings),
             measures=dict(self.measures),
             notes=tuple(dict.fromkeys(self.notes)),
+            escape=self.escape,
         )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiLineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from .outline import FloatArray, Outline, distances, largest_part
+from .outline import WALKED, FloatArray, Outline, distances, largest_part, nearest_segments
 
 QUAD_SEGMENTS = 24
 ROUND_JOIN_DIP = 1 / math.cos(1.5 * math.pi / (4 * QUAD_SEGMENTS))
@@ -187,6 +187,42 @@ def segment(
     line = LineString([start, end])
     free = _lines(line if solid is None else line.difference(solid))
     return _clip(list(free), frame)
+
+
+def interpolate(line: FloatArray, stations: FloatArray) -> FloatArray:
+    """The places at given arc lengths of a polyline, to the last bit those that GEOS finds.
+
+    GEOS walks along the line for each of them; here one search serves all.
+
+    Args:
+        line: (m, 2), image pixels.
+        stations: (n,) arc lengths, px; those beyond an end mean the end.
+
+    Returns:
+        (n, 2), image pixels.
+    """
+    steps = np.diff(line, axis=0)
+    lengths = np.sqrt(steps[:, 0] * steps[:, 0] + steps[:, 1] * steps[:, 1])
+    ends = np.cumsum(lengths)
+    i = np.minimum(np.searchsorted(ends, stations, side="right"), len(steps) - 1)
+    starts = np.where(i > 0, ends[i - 1], 0.0)
+    share = np.clip((stations - starts) / np.where(lengths[i] > 0, lengths[i], 1.0), 0.0, 1.0)
+    share[stations >= ends[-1]] = 1.0
+    return np.where((share < 1)[:, None], steps[i] * share[:, None] + line[i], line[i + 1])
+
+
+def locate(line: FloatArray, points: FloatArray) -> FloatArray:
+    """Arc length of the place on a polyline (m, 2) that is nearest to each of (n, 2) points, px."""
+    places = np.asarray(shapely.points(points), dtype=object)
+    whole = LineString(line)
+    if len(points) * len(line) < WALKED:
+        return np.asarray(shapely.line_locate_point(whole, places), dtype=float)
+    index = nearest_segments(whole, places)[0]
+    steps = np.diff(line, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    along = ((points - line[index]) * steps[index]).sum(axis=1)
+    share = np.clip(along / np.maximum(lengths[index] ** 2, 1e-300), 0.0, 1.0)
+    return (np.cumsum(lengths) - lengths)[index] + share * lengths[index]
 
 
 def _runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:

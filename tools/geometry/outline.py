@@ -34,6 +34,10 @@ RECESS_SHARE = 0.5
 """Recesses narrower than twice this share of the size are bridged where sides are meant."""
 KNOB_SHARE, BULK_SHARE = 0.05, 0.93
 """What an opening by this share of the size removes is a knob, if this share of the area stays."""
+WALKED = 200_000
+"""Points times vertices up to which walking along a geometry for each point is quick."""
+HALF_SPAN, SPAN_STEPS = 0.5, 100
+"""A side of the bulk lies where the region spans this share of its widest; looked for in steps."""
 MIN_AREA = 4.0
 """Square pixels below which an outline has no usable shape."""
 
@@ -101,11 +105,16 @@ class Outline:
 
     @cached_property
     def bulk_rectangle(self) -> FloatArray:
-        """The rectangle of the bulk alone, without thin things that stick out: a car's mirrors."""
+        """The rectangle of the bulk alone, without what sticks out of a side: mirrors, a porch.
+
+        Its sides lie where the region still spans half of what it does at its widest, as seen
+        along the side; corners, (4, 2), in the exterior's direction.
+        """
         reach = KNOB_SHARE * self.size
         bulk = self.filled.buffer(-reach, join_style="mitre").buffer(reach, join_style="mitre")
         kept = bulk.intersection(self.filled)
-        return rectangle_of(kept if kept.area >= BULK_SHARE * self.filled.area else self.polygon)
+        bulk = kept if kept.area >= BULK_SHARE * self.filled.area else self.filled
+        return _half_spanned(bulk, rectangle_of(bulk))
 
     @property
     def min_width(self) -> float:
@@ -145,7 +154,7 @@ class Outline:
         """The corners robots can be sent to, (k, 2).
 
         Of a polygonal outline the vertices that turn by more than 25 degrees, where they
-        rebuild the region; else the corners of the bulk's minimum-area rectangle.
+        rebuild the region; else the corners of the bulk's rectangle.
         """
         if self.kind == "polygonal":
             turning = [
@@ -214,7 +223,38 @@ def outline_of(polygon: BaseGeometry) -> Outline:
 
 def distances(geometry: BaseGeometry, points: FloatArray) -> FloatArray:
     """Distance of each of (n, 2) points to a geometry, 0 inside a polygon, (n,), px."""
-    return np.asarray(shapely.distance(geometry, shapely.points(points)), dtype=float)
+    places = np.asarray(shapely.points(points), dtype=object)
+    if len(places) * shapely.get_num_coordinates(geometry) < WALKED:
+        return np.asarray(shapely.distance(geometry, places), dtype=float)
+    found = nearest_segments(geometry, places)[1]
+    if shapely.area(geometry) > 0:
+        shapely.prepare(geometry)
+        found[shapely.intersects_xy(geometry, points)] = 0.0
+    return found
+
+
+def nearest_segments(
+    geometry: BaseGeometry, places: NDArray[np.object_]
+) -> tuple[NDArray[np.intp], FloatArray]:
+    """The nearest segment of lines or boundaries to each of (n,) places, and its distance, px.
+
+    Segments count through all lines in their order. A tree answers where GEOS, asked for a
+    distance, walks along the whole of the geometry for each place.
+    """
+    points, line = shapely.get_coordinates(
+        shapely.get_parts(_lines_of(geometry)), return_index=True
+    )
+    joined = np.flatnonzero(line[1:] == line[:-1])
+    segments = shapely.linestrings(np.stack([points[joined], points[joined + 1]], axis=1))
+    index, distance = shapely.STRtree(np.asarray(segments, dtype=object)).query_nearest(
+        places, return_distance=True, all_matches=False
+    )
+    return np.asarray(index[1], dtype=np.intp), np.asarray(distance, dtype=float)
+
+
+def _lines_of(geometry: BaseGeometry) -> BaseGeometry:
+    """The boundary of what has an area, else the lines themselves."""
+    return geometry.boundary if shapely.area(geometry) > 0 else geometry
 
 
 def largest_part(geometry: shapely.Geometry) -> Polygon | None:
@@ -264,6 +304,22 @@ def rectangle_of(geometry: BaseGeometry) -> FloatArray:
     high = np.array([u[:, best].max(), v[:, best].max()])
     corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
     return corners @ np.stack([along[best], across[best]])
+
+
+def _half_spanned(region: BaseGeometry, rectangle: FloatArray) -> FloatArray:
+    """The rectangle with each side moved in to where the region spans half its widest, (4, 2)."""
+    corner, sides = rectangle[0], (rectangle[1] - rectangle[0], rectangle[3] - rectangle[0])
+    steps = (np.arange(SPAN_STEPS) + 0.5) / SPAN_STEPS
+    bounds: list[tuple[float, float]] = []
+    for along, across in (sides, sides[::-1]):
+        starts = corner + steps[:, None] * along
+        cuts = shapely.linestrings(np.stack([starts, starts + across], axis=1))
+        spans = shapely.length(shapely.intersection(cuts, region))
+        wide = np.flatnonzero(spans >= HALF_SPAN * spans.max())
+        bounds.append((float(wide[0]) / SPAN_STEPS, float(wide[-1] + 1) / SPAN_STEPS))
+    (low, high), (near, far) = bounds
+    places = np.array([(low, near), (high, near), (high, far), (low, far)])
+    return corner + places @ np.stack(sides)
 
 
 def _noise(closed: FloatArray) -> float:

@@ -49,8 +49,8 @@ def test_a_model_on_another_server(cli: Cli, server: Any, dialect: Any, http: An
     data = json.loads(out)
     assert (data["status"], data["message"]) == ("planned", "Six robots have a place.")
     assert data["model"] == f"{dialect.name}:m"
-    former = load_prompt("former@v002")
-    assert data["prompt"] == {"id": "former", "version": 2, "sha256": former.sha256}
+    former = load_prompt("former")
+    assert data["prompt"] == former.facts
     assert data["usage"]["input_tokens"] == 200
     assert data["usage"]["cost_usd"] == 0
 

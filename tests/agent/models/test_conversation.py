@@ -54,8 +54,8 @@ def test_from_instruction_to_certified_plan(
     assert report.model == f"{dialect.name}:m"
     assert (report.usage.requests, report.usage.tool_calls) == (2, 1)
     assert (report.usage.input_tokens, report.usage.output_tokens) == (200, 40)
-    former = load_prompt("former@v002")
-    assert report.prompt == {"id": "former", "version": 2, "sha256": former.sha256}
+    former = load_prompt("former")
+    assert report.prompt == former.facts
     assert report.prompts == (report.prompt,)
     assert former.text in str(json.dumps(server.requests[0])).encode().decode("unicode_escape")
     assert server.connections == 1

@@ -1,5 +1,6 @@
 """What is sent and what the tests' server says, held against the providers' own types."""
 
+import json
 import warnings
 from collections.abc import Iterable
 from typing import Any, cast
@@ -125,9 +126,9 @@ def test_the_default_prompt_its_tools_and_the_picture_are_sent(
     Agent(server.model(dialect.name)).run(PICTURE, "Surround it with 4 robots")
     (sent,) = server.requests
     tools = sent["tools"][0].get("functionDeclarations") or sent["tools"]
-    former = load_prompt("former@v002")
+    former = load_prompt("former")
     named = [tool.get("function", tool)["name"] for tool in tools]
     assert named == [t.name for t in TOOLS if t.name in former.tools]
     assert sorted(named) == sorted(former.tools)
-    assert "You place a team of robots" in str(sent)
+    assert json.dumps(former.text)[1:-1] in json.dumps(sent)
     assert "/9j/" in str(sent)  # how every JPEG begins in base64

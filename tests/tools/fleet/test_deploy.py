@@ -75,6 +75,17 @@ def test_what_happens_is_fixed_by_the_seed_and_only_by_it() -> None:
     assert third.arrived
 
 
+def test_an_assignment_says_what_it_may_have_left_to_save_only_if_it_is_approximate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    arrival, _ = driven(planned(GROUPS[0]))
+    assert arrival.assignment_gap is None
+    monkeypatch.setattr("formup.tools.formation.assignment.EXACT", 5)
+    again, _ = driven(planned(GROUPS[0]))
+    assert again.assignment_gap == pytest.approx(0, abs=1e-9)  # found the optimum all the same
+    assert again.robots == arrival.robots
+
+
 def test_robots_that_slip_are_sent_again() -> None:
     arrival, _ = driven(planned(GROUPS[0]))
     assert arrival.corrections >= 1

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 import shapely
 from formup.tools.geometry.curves import Curve, Frame, ring, segment
+from formup.tools.geometry.interior import coverage_radius, inside
 from formup.tools.geometry.outline import FloatArray, Outline, make_outline
 from formup.tools.geometry.sampling import (
     along_curve,
     around_point,
     at_corners,
     corner_points,
-    coverage_radius,
-    inside,
     min_spacing,
     spread_subset,
 )

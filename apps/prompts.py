@@ -1,0 +1,209 @@
+"""`formup prompts`: look at prompts, try them, make new ones, release and promote them."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from datetime import date, datetime
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+from rich.tree import Tree
+
+from ..evals.leaks import leaks
+from ..evals.promotion import passed
+from ..evals.tool_versions import retooled, tool_hashes
+from ..prompts import Prompt, PromptError, PromptLibrary
+from ..prompts.history import diff, lineage, log
+from ..prompts.lint import Finding, lint
+from ..prompts.release import new_draft, promote, release
+from ..tools.errors import InputError
+from . import inputs
+from . import options as o
+
+ADDED, REMOVED, PLACE = "green", "red", "cyan"
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+
+
+@app.command("list")
+def list_prompts(prompts: o.PromptsFolder = None, as_json: o.Json = False) -> None:
+    """All prompts; an asterisk marks the version that an id alone stands for."""
+    rows = _rows(PromptLibrary(prompts))
+    if as_json:
+        print(json.dumps(rows, indent=2, ensure_ascii=False))  # noqa: T201
+        return
+    table = Table(box=None, header_style="cyan", padding=(0, 2), pad_edge=False)
+    for title in ("", "prompt", "text", "summary"):
+        table.add_column(title, no_wrap=title != "summary")
+    for row in rows:
+        said = Text(row["error"], "red") if row["error"] else Text(row["summary"])
+        mark = "*" if row["current"] else ""
+        table.add_row(mark, row["name"], (row["sha256"] or "")[:12], said)
+    _console().print(table)
+
+
+@app.command()
+def show(name: o.PromptArgument, prompts: o.PromptsFolder = None) -> None:
+    """A prompt's file, with its name and hashes above it."""
+    prompt = PromptLibrary(prompts).load(name)
+    print(f"{prompt.name}\ntext {prompt.sha256}\nfile {prompt.file_sha256}\n")  # noqa: T201
+    print(prompt.source, end="")  # noqa: T201
+
+
+@app.command()
+def render(
+    name: o.PromptArgument, var: o.Variables = None, prompts: o.PromptsFolder = None
+) -> None:
+    """The text as a model is told it, with values in the place of its inputs."""
+    prompt = PromptLibrary(prompts).load(name)
+    print(prompt.render(inputs.variables(var, prompt.front.inputs)), end="")  # noqa: T201
+
+
+@app.command()
+def new(name: o.DraftName, parent: o.ParentName = None, prompts: o.PromptsFolder = None) -> None:
+    """Begin a draft, from the current version or another."""
+    print(new_draft(PromptLibrary(prompts), name, parent))  # noqa: T201
+
+
+@app.command("diff")
+def show_diff(
+    old: o.PromptArgument, new: o.PromptArgument, prompts: o.PromptsFolder = None
+) -> None:
+    """How two prompts differ, in front matter and text."""
+    library = PromptLibrary(prompts)
+    styles = {"+": ADDED, "-": REMOVED, "@": PLACE}
+    for line in diff(library.load(old), library.load(new)):
+        head = "bold" if line.startswith(("+++ ", "--- ")) else None
+        _console().print(Text(line, head or styles.get(line[:1], "")), soft_wrap=True)
+
+
+@app.command("lint")
+def lint_prompts(
+    names: o.PromptNames = None, prompts: o.PromptsFolder = None, as_json: o.Json = False
+) -> None:
+    """What is wrong with prompts, all of it; exit code 1 if any of it is an error."""
+    found = _findings(PromptLibrary(prompts), names)
+    if as_json:
+        print(json.dumps([asdict(f) for f in found], indent=2, ensure_ascii=False))  # noqa: T201
+    for finding in () if as_json else found:
+        style = "red" if finding.severity == "error" else "yellow"
+        where = f"{finding.prompt}: {finding.sentence}"
+        line = Text.assemble((f"{finding.severity:>7}  ", style), where)
+        _console().print(line, soft_wrap=True)
+    errors = sum(f.severity == "error" for f in found)
+    if not as_json:
+        print(f"{errors} errors, {len(found) - errors} warnings")  # noqa: T201
+    raise typer.Exit(1 if errors else 0)
+
+
+@app.command("log")
+def show_log(id: o.PromptId, prompts: o.PromptsFolder = None) -> None:
+    """When and why versions were released and became current."""
+    for entry in log(PromptLibrary(prompts), id):
+        line = Text.assemble((f"{entry.on}  {entry.name} ", "cyan"), f"{entry.what}: {entry.why}")
+        _console().print(line, soft_wrap=True)
+
+
+@app.command()
+def tree(prompts: o.PromptsFolder = None, baselines: o.Baselines = None) -> None:
+    """Which version was made from which, with scores if there are any."""
+    library, scores = PromptLibrary(prompts), inputs.scores(baselines)
+    rows = [row for row in _rows(library) if not row["error"]]
+    children = lineage([library.load(row["name"]) for row in rows])
+    labels = {row["name"]: _label(row, scores.get(row["name"], {})) for row in rows}
+    root = Tree("prompts", hide_root=True)
+    waiting = [(root, name) for name in reversed(children.get(None, []))]
+    while waiting:
+        above, name = waiting.pop()
+        branch = above.add(labels[name])
+        waiting += [(branch, child) for child in reversed(children.get(name, []))]
+    _console().print(root)
+
+
+@app.command("release")
+def release_draft(name: o.DraftName, why: o.Why = "", prompts: o.PromptsFolder = None) -> None:
+    """Freeze a draft as the next version; lint must find no error in it."""
+    library = PromptLibrary(prompts)
+    errors = [f for f in _findings(library, [name]) if f.severity == "error"]
+    if errors:
+        found = " ".join(f.sentence for f in errors)
+        raise InputError(f"{name} is not released, for lint finds: {found}")
+    tools = tool_hashes(library.load(name))
+    print(release(library, name, why, _today(), tools))  # noqa: T201
+
+
+@app.command("promote")
+def promote_version(
+    name: o.PromptArgument,
+    report: o.ComparisonFile = None,
+    force: o.Force = False,
+    why: o.Why = "",
+    prompts: o.PromptsFolder = None,
+) -> None:
+    """Make a version the current one, on a comparison that it passed."""
+    library = PromptLibrary(prompts)
+    prompt = library.load(name)
+    if force == (report is not None):
+        raise InputError(
+            "A promotion takes a comparison that passed, --report FILE, or --force --why TEXT."
+        )
+    if report is None:
+        if not why.strip():
+            raise InputError('--force takes a reason for the changelog: --why "...".')
+        promote(library, prompt.name, f"forced: {why}", _today(), None)
+    else:
+        current = library.load(prompt.id)
+        because = "; ".join(filter(None, [passed(report, current, prompt), why]))
+        promote(library, prompt.name, because, _today(), current.name)
+    print(f"{prompt.id} is now {prompt.name}")  # noqa: T201
+
+
+def _rows(library: PromptLibrary) -> list[dict[str, Any]]:
+    """All prompts as data; of those that cannot be used, why."""
+    current: set[str] = set()
+    for id in library.ids():
+        try:
+            current.add(library.current(id))
+        except PromptError:
+            continue  # an id of drafts alone
+    rows: list[dict[str, Any]] = []
+    for name in library.names():
+        row = {"name": name, "current": name in current, "path": str(library.path(name))}
+        try:
+            rows.append(row | _facts(library.load(name)))
+        except PromptError as error:
+            rows.append(row | {"sha256": None, "summary": None, "error": str(error)})
+    return rows
+
+
+def _facts(prompt: Prompt) -> dict[str, Any]:
+    front = prompt.front.model_dump(mode="json", exclude={"id", "version"})
+    return {**prompt.facts, **front, "error": None}
+
+
+def _findings(library: PromptLibrary, names: Sequence[str] | None) -> list[Finding]:
+    """What lint finds, what was copied from a suite, and tools that are not what they were."""
+    found = lint(library, names or None)
+    broken = {f.prompt for f in found if f.rule == "unusable"}
+    chosen = [n if "@" in n else library.current(n) for n in names or library.names()]
+    for prompt in (library.load(name) for name in chosen if name not in broken):
+        found += [*leaks(prompt), *retooled(library, prompt)]
+    return found
+
+
+def _label(row: dict[str, Any], scores: dict[str, float]) -> Text:
+    mark = " *" if row["current"] else ""
+    known = "".join(f"  {suite} {score:.3f}" for suite, score in scores.items())
+    return Text.assemble(
+        (f"{row['name']}{mark}", "bold" if mark else ""), f"  {row['summary']}", (known, "cyan")
+    )
+
+
+def _console() -> Console:
+    return Console(highlight=False)
+
+
+def _today() -> date:
+    return datetime.now().astimezone().date()

@@ -1,0 +1,72 @@
+"""Writes recordings anew after texts or tools have changed: the replies stay, the results are new.
+
+python renew.py TRACES FOLDER: gives the replies of every TRACES/*.jsonl again, whatever is said to
+them, and keeps the new recordings in FOLDER, without the states of workspaces. It prints how each
+ended before and now: replies that no longer fit have to be given anew by somebody who looks.
+"""
+
+import json
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from formup.agent.agent import Agent
+from formup.agent.messages import Reply
+from formup.agent.model import Request
+from formup.agent.models.replay import ReplayModel
+from formup.agent.trace import Trace, read_trace
+from formup.evals.suite import load_tasks, photos_folder
+from formup.tools.perception.image import load_picture
+from formup.tools.workspace import Settings
+
+DRAWN = Path(__file__).parent / "injected" / "images"
+TASKS = {t.id: t for t in (*load_tasks(), *load_tasks(photos_folder() / "many.json"))}
+
+
+class Spoken(ReplayModel):
+    """The recorded replies in turn, without a look at what is said in between."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        lines = read_trace(path).of_type("message")
+        fields = set(Reply.model_fields)
+        self._replies = iter(
+            Reply.model_validate({k: v for k, v in line.items() if k in fields})
+            for line in lines
+            if line["role"] == "assistant"
+        )
+
+    async def reply(self, request: Request) -> Reply:
+        """The next one."""
+        return next(self._replies)
+
+
+def renewed(path: Path, written: Path) -> Trace:
+    """The run of a recording once more, written to a file."""
+    start = read_trace(path).start
+    facts = {k: start["settings"][k] for k in ("robots", "descriptor", "may_deploy", "seed")}
+    task = TASKS.get(path.stem)
+    picture = load_picture(DRAWN / f"{path.stem}.png" if task is None else task.image)
+    Agent(Spoken(path)).run(
+        picture, start["instruction"], settings=Settings(**facts), trace=written
+    )
+    return read_trace(written)
+
+
+def main() -> None:
+    """All of a folder."""
+    source, goal = (Path(name) for name in sys.argv[1:])
+    goal.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as scratch:
+        for path in sorted(source.glob("*.jsonl")):
+            before, now = read_trace(path), renewed(path, Path(scratch) / path.name)
+            ends = [str(trace.end and trace.end["message"]) for trace in (before, now)]
+            print(path.stem, "same" if ends[0] == ends[1] else " -> ".join(ends))  # noqa: T201
+            kept = [line for line in now.lines if line["type"] != "state"]
+            kept[0]["base_url"] = None
+            text = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in kept)
+            (goal / path.name).write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    main()

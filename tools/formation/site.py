@@ -1,0 +1,54 @@
+"""Where positions are judged: the targets' outlines and the picture; what does not fit there."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import shapely
+
+from ..errors import ToolError
+from ..geometry.curves import Frame
+from ..geometry.outline import MIN_AREA, Outline, largest_part, outline_of
+from .contract import Group
+
+
+@dataclass(frozen=True)
+class Site:
+    """What positions are judged in: the targets' outlines and the picture's size, px."""
+
+    outlines: Mapping[str, Outline]
+    width: float
+    height: float
+
+    @property
+    def room(self) -> tuple[float, float]:
+        """Width and height, px."""
+        return self.width, self.height
+
+    def visible(self, name: str) -> Outline:
+        """The part of a target inside the picture.
+
+        Raises:
+            ToolError: there is none.
+        """
+        outline = self.outlines[name]
+        picture = shapely.box(-0.5, -0.5, self.width - 0.5, self.height - 0.5)  # whole pixels
+        if picture.covers(outline.polygon):
+            return outline
+        seen = largest_part(outline.polygon.intersection(picture))
+        if seen is None or seen.area < MIN_AREA:
+            raise ToolError(f"{name} lies outside the picture.")
+        return outline_of(seen)
+
+    def frame(self, radius: float) -> Frame:
+        """Where robots of a radius stand wholly inside the picture."""
+        return Frame(self.width, self.height, radius)
+
+
+class CapacityError(ToolError):
+    """A group has more robots than its place holds."""
+
+    def __init__(self, group: Group, fits: int, why: str) -> None:
+        noun = "robot fits" if fits == 1 else "robots fit"
+        super().__init__(f"{group.robots} robots were asked for but only {fits} {noun}: {why}.")
+        self.fits = fits
+        self.group = group

@@ -1,0 +1,193 @@
+"""Is a rigid object caged, so that it cannot get out between robots that stand still?
+
+Two sufficient tests, a disc inside it and a flood of its configuration space, and one that shows
+the contrary: a way out checked move by move. Between them the answer is "not certified". No rule
+that compares gaps with the object's least width is used: it is wrong for shapes with recesses.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from .configuration import flood
+from .outline import FloatArray
+from .rigid import Obstacles, body_of, overlaps
+
+State = Literal["caged", "not certified", "escape"]
+Test = Literal["disc", "configuration space"]
+QUICK, THOROUGH = 2, 4
+"""Levels of the flood: about 10 to 60 ms for ten robots, and up to a second."""
+MOST_FLOODED = 300
+"""With more robots than this only the disc is tried: a flood costs time for every robot."""
+MARGIN = 1e-9
+"""Relative slack of comparisons, so that rounding certifies nothing."""
+
+
+@dataclass(frozen=True)
+class Cage:
+    """What is known of a cage.
+
+    Attributes:
+        state: caged is proved, escape is shown by a path, not certified is neither.
+        test: which proof, where caged.
+        inscribed_diameter: of a greatest disc in the object, px; gaps below it certify.
+        widest_gap: between robots' edges, px, in the ring about that disc whose widest gap is
+            least; None where the robots form no ring about it.
+        widest_between: indices of the robots on either side of that gap.
+        path: poses (k, 3) of a verified escape: x, y of the pivot, px, and the turn about it,
+            radians from x to y; the first is where the object is.
+    """
+
+    state: State
+    test: Test | None
+    inscribed_diameter: float
+    widest_gap: float | None = None
+    widest_between: tuple[int, int] | None = None
+    path: FloatArray | None = None
+
+
+def cage(
+    region: Polygon,
+    robots: ArrayLike,
+    radius: float = 0.0,
+    *,
+    walls: BaseGeometry | None = None,
+    levels: int = THOROUGH,
+    escapes: bool = True,
+) -> Cage:
+    """Whether robots that stand still hold an object that may move and turn in the plane.
+
+    Args:
+        region: the object; its holes do not matter. Image pixels.
+        robots: their centres, (n, 2), image pixels.
+        radius: of each, px; 0 is a point.
+        walls: what else the object cannot pass. With walls, caged means that it cannot leave the
+            hull of the robots and itself, and only the configuration space is tried.
+        levels: of the flood, QUICK to THOROUGH; 0 for the disc alone.
+        escapes: whether to look for a way out, which takes longer than proving that there is none.
+    """
+    points = np.asarray(robots, dtype=float).reshape(-1, 2)
+    filled = Polygon(region.exterior)
+    centre, depth = _inscribed_disc(filled)
+    between = widest_link(points, centre) if walls is None else None
+    gap = None
+    if between is not None:
+        gap = float(np.linalg.norm(points[between[0]] - points[between[1]])) - 2 * radius
+    known = (2 * depth, gap, between)
+    if not len(points):
+        return Cage("not certified", None, *known)
+    apart = shapely.distance(filled, shapely.points(points)) - radius
+    if (apart <= 0).any():
+        return Cage("not certified", None, *known)
+    if gap is not None and gap < 2 * depth * (1 - MARGIN):
+        return Cage("caged", "disc", *known)
+    body, obstacles = body_of(filled), Obstacles(points, radius, walls)
+    if len(points) > MOST_FLOODED or not levels or overlaps(body, obstacles):
+        return Cage("not certified", None, *known)
+    found = flood(body, obstacles, levels, escapes=escapes)
+    if found.enclosed:
+        return Cage("caged", "configuration space", *known)
+    return Cage("not certified" if found.path is None else "escape", None, *known, found.path)
+
+
+def _inscribed_disc(region: Polygon) -> tuple[FloatArray, float]:
+    """Centre and radius of a greatest inscribed disc; the radius holds for that very centre."""
+    with np.errstate(all="ignore"):  # GEOS on denormal coordinates
+        middle = shapely.get_point(shapely.maximum_inscribed_circle(region), 0)
+    inside = region.contains(middle)
+    return shapely.get_coordinates(middle)[0], float(region.boundary.distance(middle)) * inside
+
+
+def widest_link(points: FloatArray, centre: FloatArray) -> tuple[int, int] | None:
+    """The widest link of the ring of points about a centre whose widest link is least.
+
+    Proof of the disc test: the object holds a disc of radius rho about c, so c stays out of the
+    open discs of radius r + rho about the robots. A link shorter than 2 (r + rho) is covered by
+    those at its ends. If c lies in a closed simple polygon of such links it cannot leave it.
+    Links are sought among the edges of the Delaunay triangulation, which hold such a ring
+    wherever discs of that radius leave c no way out (Edelsbrunner 1995). They are added by length
+    until one closes a loop that winds about c; the loop is then checked as a polygon.
+
+    Args:
+        points: (n, 2).
+        centre: (2,).
+
+    Returns:
+        Indices of the points at its ends; None where no ring of the points holds the centre.
+    """
+    links = _links(points)
+    if not len(links):
+        return None
+    (xi, yi), (xj, yj) = (points[links] - centre).transpose(1, 2, 0)
+    angles = np.arctan2(xi * yj - yi * xj, xi * xj + yi * yj).tolist()
+    forest = _Forest(len(points))
+    near: list[list[int]] = [[] for _ in points]
+    for (i, j), angle in zip(links.tolist(), angles, strict=True):
+        if abs(forest.join(i, j, angle)) > math.pi:
+            loop = Polygon(points[_way(near, i, j)])
+            if loop.is_valid and shapely.contains_xy(loop, *centre):
+                return i, j
+        near[i].append(j)
+        near[j].append(i)
+    return None
+
+
+class _Forest:
+    """Trees of points with the angle each is seen at from the first of its tree (union-find)."""
+
+    def __init__(self, count: int) -> None:
+        self._parent = list(range(count))
+        self._angle = [0.0] * count  # from the parent
+        self._size = [1] * count
+
+    def _root(self, i: int) -> tuple[int, float]:
+        angle = 0.0
+        while self._parent[i] != i:
+            angle += self._angle[i]
+            i = self._parent[i]
+        return i, angle
+
+    def join(self, i: int, j: int, angle: float) -> float:
+        """Link j, seen at an angle from i; returns by how much that winds if they were linked."""
+        (a, to_i), (b, to_j) = self._root(i), self._root(j)
+        across = to_i + angle - to_j
+        if a == b:
+            return across
+        if self._size[a] < self._size[b]:
+            a, b, across = b, a, -across
+        self._parent[b], self._angle[b] = a, across
+        self._size[a] += self._size[b]
+        return 0.0
+
+
+def _links(points: FloatArray) -> NDArray[np.intp]:
+    """Edges of the Delaunay triangulation, shortest first, pairs of indices (m, 2)."""
+    edges = shapely.delaunay_triangles(shapely.multipoints(points), only_edges=True)
+    ends = shapely.get_coordinates(edges)
+    index = {(x, y): i for i, (x, y) in enumerate(points.tolist())}
+    links = np.array([index[x, y] for x, y in ends.tolist()], dtype=np.intp).reshape(-1, 2)
+    length = np.linalg.norm(points[links[:, 1]] - points[links[:, 0]], axis=1)
+    return links[np.argsort(length, kind="stable")]
+
+
+def _way(near: list[list[int]], start: int, end: int) -> list[int]:
+    """A way with the fewest links from one point to another."""
+    before = {start: start}
+    queue = deque([start])
+    while end not in before:
+        here = queue.popleft()
+        for other in near[here]:
+            if other not in before:
+                before[other] = here
+                queue.append(other)
+    way = [end]
+    while way[-1] != start:
+        way.append(before[way[-1]])
+    return way

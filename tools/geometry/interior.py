@@ -1,0 +1,167 @@
+"""N robots inside a region: evenly over it, or as far apart as it allows.
+
+Even is a centroidal Voronoi tessellation, relaxed from hexagonal lattices; where robots would
+come nearer than allowed they stand on the widest lattice itself. Frame: image pixels, y down.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
+
+from .curves import interpolate
+from .lattice import ALL_PHASES, Lattice, ideal_pitch, lattice_points, most, widest
+from .lloyd import MAX_CELLS, cells_of, grid, relax
+from .outline import FloatArray, Outline, largest_part, rectangle_of
+from .sampling import min_spacing, nearest, open_points, spread_subset
+
+FEW, MANY = 50, 2_000
+"""Up to FEW robots several starts are relaxed to the end; past MANY one lattice is laid one way."""
+LLOYD_STEPS = 40
+BRISK_STEPS, STRETCH = 12, 1.7
+BRISK_CELLS, CELLS_EACH = 75_000, 60
+"""Past FEW: fewer steps that go further; so many cells, or at least so many for each robot."""
+SOME = 100
+"""Up to so many robots, four starts are tried; up to MANY, two."""
+SURELY = 1.2
+"""Discs about robots take up no more of the ground they reach than hexagons do; this is slack."""
+RELAXED = 0.7
+"""The closest pair after relaxing a lattice of thousands, as a share of its pitch; measured."""
+THIN = 0.25
+"""Area over boundary length, px, below which a region is treated as a line."""
+TURNS = (0.0, math.pi / 12, math.pi / 6)
+
+
+def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float) -> FloatArray:
+    """N points spread evenly over a region, holes and concavities respected.
+
+    Lloyd's iteration to a centroidal Voronoi tessellation, best of a few lattice starts;
+    where two robots would come nearer than `spacing`, a hexagonal lattice instead.
+
+    Args:
+        outline: the region.
+        n: how many.
+        margin: distance kept from the region's boundary, px.
+        depth: greatest distance from it, px; beyond the region's half-width it means nothing.
+        spacing: smallest distance allowed between two robots, px.
+
+    Returns:
+        (k, 2), k < n when no more fit.
+    """
+    region = _region(outline, margin, depth)
+    if region.is_empty:
+        return np.empty((0, 2))
+    if region.area < THIN * region.length:
+        return _on_axis(region, n, spacing)
+    reached = region.buffer(spacing / 2).area
+    if n * spacing**2 * math.sqrt(3) / 2 < SURELY * reached:  # else they cannot all fit
+        even = _even(region, _region(outline, 0, depth), n)
+        if min_spacing(even) >= spacing:
+            return even.copy()
+    turns = (_long_angle(region), *TURNS)
+    lies = [Lattice(t, p) for t in turns for p in (ALL_PHASES if n <= MANY else ALL_PHASES[:1])]
+    packed = most(region, spacing, lies)
+    return widest(region, n, lies, spacing) if len(packed) > n else packed
+
+
+def yardstick(
+    outline: Outline, n: int, margin: float, depth: float, spacing: float
+) -> tuple[float, FloatArray]:
+    """What to judge N points inside a region by: how near they may be, and places as even.
+
+    Up to MANY the points of `inside` themselves. Past it the lattice they would be relaxed from,
+    which leaves less bare than it does, and the share of its pitch that relaxing leaves.
+
+    Args:
+        outline, n, margin, depth, spacing: as for `inside`.
+
+    Returns:
+        The distance of the closest pair, px, and (k, 2); k = 0 where nothing fits.
+    """
+    region = _region(outline, margin, depth)
+    if n > MANY and region.area >= THIN * region.length:
+        lattice = widest(region, n, [Lattice(_long_angle(region))])
+        if len(lattice) == n:
+            return max(RELAXED * min_spacing(lattice), spacing), lattice
+    points = inside(outline, n, margin, depth, spacing)
+    return (min_spacing(points) if len(points) > 1 else 0.0), points
+
+
+def coverage_radius(outline: Outline, points: FloatArray, cells: FloatArray | None = None) -> float:
+    """Greatest distance from a point of the region to its nearest robot, px (sampled).
+
+    Args:
+        outline: the region.
+        points: (n, 2) robots.
+        cells: its samples, see `cells_of`, where they are at hand.
+    """
+    sampled = cells_of(outline.polygon, len(points)) if cells is None else cells
+    return float(nearest(points, sampled, 1)[0].max())
+
+
+def _region(outline: Outline, margin: float, depth: float) -> BaseGeometry:
+    """Where robots may stand: as deep inside as they must and no deeper than they may."""
+    deepest = outline.polygon.buffer(-min(depth, outline.perimeter))
+    return outline.polygon.buffer(-margin).difference(deepest)
+
+
+@lru_cache(maxsize=4)  # whoever places robots has them checked next
+def _even(region: BaseGeometry, covered: BaseGeometry, n: int) -> FloatArray:
+    """N points of a region spread evenly over a wider one, however near to each other.
+
+    What lies within the margin is to be covered like the rest, though no robot stands there.
+    """
+    long = _long_angle(region)
+    if n <= FEW:
+        cells = cells_of(covered, n)
+        starts = [_thinned(region, n, turn) for turn in (long, *TURNS)]
+        return max((relax(cells, region, s, LLOYD_STEPS) for s in starts), key=min_spacing)
+    cells = cells_of(covered, n, max(BRISK_CELLS, min(CELLS_EACH * n, MAX_CELLS)))
+    turns = (long, *TURNS) if n <= SOME else (long, long + math.pi / 6) if n <= MANY else (long,)
+    starts = [widest(region, n, [Lattice(turn)]) for turn in turns]
+    full = [s if len(s) == n else _thinned(region, n, long) for s in starts]
+    relaxed = [relax(cells, region, s, BRISK_STEPS, STRETCH) for s in full]
+    return max(relaxed, key=min_spacing)
+
+
+def _thinned(region: BaseGeometry, n: int, turn: float) -> FloatArray:
+    """Exactly n starting points: the finest lattice with n or more, thinned out evenly."""
+    shapely.prepare(region)
+    pitch = ideal_pitch(region.area, n)
+    for _ in range(60):
+        points = lattice_points(region, pitch, Lattice(turn))
+        if len(points) >= n:
+            return points[spread_subset(points, n)]
+        pitch *= 0.97
+    return grid(region, pitch)[:n]
+
+
+def _long_angle(region: BaseGeometry) -> float:
+    """Direction of the longer side of the minimum-area rectangle, radians."""
+    sides = np.diff(rectangle_of(region), axis=0)
+    x, y = sides[int(np.argmax(np.linalg.norm(sides, axis=1)))]
+    return math.atan2(y, x)
+
+
+def _on_axis(region: BaseGeometry, n: int, spacing: float) -> FloatArray:
+    """Up to n points along a region that is little more than a line, straight or closed."""
+    band = largest_part(region)
+    if band is not None and band.interiors:
+        loop = LineString(band.exterior.coords)
+        fits = n if spacing <= 0 else min(n, int(loop.length / spacing))
+        return interpolate(
+            shapely.get_coordinates(loop), np.arange(fits, dtype=float) * loop.length / max(fits, 1)
+        )
+    a, b, c, d = rectangle_of(region)
+    wide = np.linalg.norm(b - a) > np.linalg.norm(c - b)
+    ends = [(d + a) / 2, (b + c) / 2] if wide else [(a + b) / 2, (c + d) / 2]
+    inner = LineString(ends).intersection(region)
+    lines = [g for g in shapely.get_parts(inner) if isinstance(g, LineString) and g.length > 0]
+    if not lines:
+        return shapely.get_coordinates(region.representative_point())
+    line = max(lines, key=lambda g: g.length)
+    fits = n if spacing <= 0 else min(n, int(line.length / spacing) + 1)
+    return open_points(shapely.get_coordinates(line), fits)

@@ -1,0 +1,112 @@
+"""Hexagonal lattices, the densest packings of discs, in a region: as wide as n points allow.
+
+Frame: image pixels, x right, y down; turns are radians.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from .outline import FloatArray, distances
+from .sampling import spread_subset
+
+HALVINGS = 12
+"""Steps of the search for the widest pitch: it is found to 1 part in 10,000 or so."""
+NARROWEST = 0.55
+"""The search for a pitch begins at this share of the one that open ground would have."""
+ALL_PHASES = tuple((i / 4, j / 4) for i in range(4) for j in range(4))
+"""Where the lattice lies, as shares of its two steps."""
+
+
+class Lattice(NamedTuple):
+    """How a lattice lies: its turn and its phase as shares of its two steps."""
+
+    turn: float
+    phase: tuple[float, float] = (0.0, 0.0)
+
+
+def ideal_pitch(area: float, n: int) -> float:
+    """The pitch at which n points of a hexagonal lattice take up an area, px."""
+    return math.sqrt(2 * area / (math.sqrt(3) * n))
+
+
+def lattice_points(region: BaseGeometry, pitch: float, lie: Lattice) -> FloatArray:
+    """The points of a lattice inside a region, row by row, (k, 2)."""
+    cx, cy = region.envelope.centroid.x, region.envelope.centroid.y
+    x0, y0, x1, y1 = region.bounds
+    c, s = math.cos(lie.turn), math.sin(lie.turn)
+    width, height = (x1 - x0) / 2, (y1 - y0) / 2
+    along, across = width * abs(c) + height * abs(s), width * abs(s) + height * abs(c)
+    columns = math.ceil(along / pitch) + 2
+    rows = math.ceil(across / (pitch * math.sqrt(3) / 2)) + 1
+    i, j = np.meshgrid(np.arange(-columns, columns + 1), np.arange(-rows, rows + 1))
+    x, y = i + (j % 2) / 2 + lie.phase[0] + lie.phase[1] / 2, j + lie.phase[1]
+    flat = np.stack([x, y * math.sqrt(3) / 2], axis=-1).reshape(-1, 2) * pitch
+    points = flat @ np.array([[c, s], [-s, c]]) + (cx, cy)
+    return points[shapely.intersects_xy(region, points)]
+
+
+def most(region: BaseGeometry, pitch: float, lies: Sequence[Lattice]) -> FloatArray:
+    """As many points as a lattice of a pitch has in a region, lying the best of some ways."""
+    shapely.prepare(region)
+    best = max((lattice_points(region, pitch, lie) for lie in lies), key=len)
+    return best if len(best) else shapely.get_coordinates(region.representative_point())
+
+
+def widest(region: BaseGeometry, n: int, lies: Sequence[Lattice], least: float = 0.0) -> FloatArray:
+    """Exactly n points of the widest lattice that has n in a region; none is missing inside.
+
+    Args:
+        region: a polygon or several.
+        n: how many.
+        lies: the turns and phases tried.
+        least: a pitch known to give n or more, px; 0 where none is known.
+
+    Returns:
+        (n, 2); fewer only where the region is too thin for a lattice.
+    """
+    shapely.prepare(region)
+    low = max(least, NARROWEST * ideal_pitch(region.area, n))
+    best, pitch = np.empty((0, 2)), low
+    for lie in lies:
+        if len(best) < n or len(lattice_points(region, pitch * 1.0005, lie)) >= n:
+            points, wider = _widen(region, n, lie, low if len(best) < n else pitch)
+            if (len(best) < n) or (len(points) >= n and wider > pitch):
+                best, pitch = points, wider
+    return _without(region, best, len(best) - n, pitch) if len(best) > n else best
+
+
+def _widen(region: BaseGeometry, n: int, lie: Lattice, low: float) -> tuple[FloatArray, float]:
+    """The widest pitch with n points or more, by halving between one that has and one that has not.
+
+    The count does not fall steadily with the pitch; the points kept are those of the last that had.
+    """
+    kept = lattice_points(region, low, lie)
+    for _ in range(20):
+        if len(kept) >= n:
+            break
+        low *= 0.9
+        kept = lattice_points(region, low, lie)
+    high = max(1.25 * ideal_pitch(region.area, n), low * 1.3)
+    for _ in range(HALVINGS):
+        pitch = (low + high) / 2
+        points = lattice_points(region, pitch, lie)
+        if len(points) >= n:
+            kept, low = points, pitch
+        else:
+            high = pitch
+    return kept, low
+
+
+def _without(region: BaseGeometry, points: FloatArray, surplus: int, pitch: float) -> FloatArray:
+    """The points less some that lie next to the boundary, far apart from each other."""
+    depth = distances(region.boundary, points)
+    outermost = np.argsort(depth, kind="stable")
+    count = max(int((depth < pitch / 2).sum()), surplus)
+    edge = outermost[: min(count, max(4 * surplus, 8))]
+    gone = edge[spread_subset(points[edge], surplus)] if surplus < len(edge) else edge
+    return np.delete(points, gone, axis=0)

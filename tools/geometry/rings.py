@@ -1,0 +1,133 @@
+"""Rings of robots: at equal straight distances, several one behind the other, or in the holes.
+
+Pure functions from outlines to points, built on the offset curves of `curves`. Frame: image
+pixels, x right, y down.
+"""
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from .curves import QUAD_SEGMENTS, ROUND_JOIN_DIP, Curve, Frame, interpolate, ring
+from .outline import FloatArray, Outline
+from .sampling import PHASES, along_curve, nearest, split
+
+CHORD_STEPS = 200
+EQUAL = 0.999
+"""Shortest by longest chord at which the relaxation has come far enough."""
+DAMPING = 0.5
+
+
+def equal_chords(curve: Curve, n: int) -> FloatArray:
+    """N points on a curve in one piece, neighbours at equal straight distances.
+
+    Equal arc lengths cut corners short; here each point moves along the curve until the chords to
+    its two neighbours are as long. Points that are no neighbours may still come near each other
+    across a neck: see `min_spacing`. A curve in several pieces keeps equal arc lengths.
+
+    Args:
+        curve: closed or open; on an open one the end robots stay at its ends.
+        n: how many.
+
+    Returns:
+        (n, 2), in order along the curve.
+    """
+    points = along_curve(curve, n)
+    if len(curve.lines) != 1 or n < 3:
+        return points
+    line = curve.lines[0]
+    at = _arc_lengths(curve, points)
+    best, evenest = points, 0.0
+    for _ in range(CHORD_STEPS):
+        ends = np.append(at, at[0] + curve.length) if curve.closed else at
+        places = interpolate(line, ends % curve.length if curve.closed else ends)
+        chords = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        even = float(chords.min() / max(chords.max(), 1e-12))
+        if even > evenest:
+            best, evenest = places[:n], even
+        if even >= EQUAL:
+            break
+        steps = np.diff(ends)
+        ideal = steps * (chords.mean() / np.maximum(chords, 1e-9)) ** DAMPING
+        ideal *= (ends[-1] - ends[0]) / ideal.sum()
+        at = at[0] + np.concatenate([[0.0], np.cumsum(ideal)])[:n]
+    return best
+
+
+def nested_rings(
+    outline: Outline, n: int, offset: float, step: float, count: int, frame: Frame | None = None
+) -> tuple[FloatArray, ...]:
+    """N robots over several rings of an outline, shared by length, each ring further out.
+
+    Every second ring stands in the gaps of the one before it, as far as their counts allow.
+
+    Args:
+        outline: what to go around.
+        n: how many over all rings.
+        offset: distance of the first ring, px.
+        step: from one ring to the next, px.
+        count: how many rings.
+        frame: where robots may stand; None for the whole plane.
+
+    Returns:
+        Per ring (k, 2), the innermost first; the k sum to n unless the picture leaves no room.
+    """
+    curves = [ring(outline, offset + k * step, offset + k * step, frame) for k in range(count)]
+    curves = [curve for curve in curves if curve.length > 0]
+    if not curves:
+        return ()
+    shares = split(np.array([curve.length for curve in curves]), n)
+    placed: list[FloatArray] = []
+    for curve, share in zip(curves, shares, strict=True):
+        points = along_curve(curve, share) if share else np.empty((0, 2))
+        if curve.closed and share and placed and len(placed[-1]):
+            points = _staggered(curve, points, placed[-1])
+        placed.append(points)
+    return tuple(placed)
+
+
+def hole_rings(outline: Outline, n: int, offset: float) -> tuple[FloatArray, ...]:
+    """N robots inside the holes of an outline, along their edges, shared by length.
+
+    Args:
+        outline: with holes; without any there is nowhere to stand.
+        n: how many over all holes.
+        offset: distance kept from the hole's edge, px.
+
+    Returns:
+        Per hole with room (k, 2); none where there is no hole that wide.
+    """
+    reach = offset * ROUND_JOIN_DIP
+    holes = [Polygon(hole) for hole in outline.polygon.interiors]
+    rooms = shapely.buffer(np.asarray(holes, dtype=object), -reach, quad_segs=QUAD_SEGMENTS)
+    parts = [part for part in shapely.get_parts(rooms) if isinstance(part, Polygon) and part.area]
+    if not parts:
+        return ()
+    loops = [shapely.get_coordinates(part.exterior) for part in parts]
+    curves = [Curve((loop,), True, float(LineString(loop).length)) for loop in loops]
+    shares = split(np.array([curve.length for curve in curves]), n)
+    return tuple(along_curve(c, k) for c, k in zip(curves, shares, strict=True) if k)
+
+
+def _staggered(curve: Curve, points: FloatArray, before: FloatArray) -> FloatArray:
+    """The same ring turned to where its robots are furthest from those of the ring before."""
+    line, gap = curve.lines[0], curve.length / len(points)
+    first = _first(line, points)
+    stations = first + gap * (np.arange(len(points)) + np.arange(PHASES)[:, None] / PHASES)
+    turned = interpolate(line, stations.ravel() % curve.length)
+    apart = nearest(before, turned, 1)[0].reshape(PHASES, -1).min(axis=1)
+    return turned.reshape(PHASES, -1, 2)[int(np.argmax(apart))]
+
+
+def _first(line: FloatArray, points: FloatArray) -> float:
+    """Arc length of the first of some points that lie on a polyline, px."""
+    return float(shapely.line_locate_point(LineString(line), shapely.Point(points[0])))
+
+
+def _arc_lengths(curve: Curve, points: FloatArray) -> FloatArray:
+    """Where `along_curve` put its points on a curve in one piece, px; past a loop's end too."""
+    count: FloatArray = np.arange(len(points), dtype=float)
+    cut = 0.0 if curve.closed else curve.cut(len(points))
+    if cut is None:
+        return count * curve.length / (len(points) - 1)
+    return _first(curve.lines[0], points) + count * (curve.length + cut) / len(points)
