@@ -12,9 +12,10 @@ from ..compare import compare
 from ..comparison import Comparison, Difference
 from ..journal import Arm
 from ..trials import TrialRow
-from .markup import Content, Html, tag
+from .markup import Content, Html, joined, tag
 from .read import Side
 
+SPENT = ("tokens a trial", "USD", "median s")
 STEPS = 5
 """Shades of a cell, by the share of successes."""
 
@@ -37,15 +38,14 @@ def matrix(sides: Sequence[Side]) -> Html:
     if len(sides) == 2:
         body.append(_difference(sides[0].rows, sides[1].rows, names))
     chance = [tag("td", f"{levels[name].sr:.2f}") for name in names]
-    body.append(
-        tag("tr", tag("th", "chance", scope="row"), chance, [tag("td")] * 3, class_="chance")
-    )
-    head = [tag("th", name, scope="col") for name in ("who", *names, "tokens a trial", "USD", "s")]
+    blank = ["", "", ""]
+    body.append(tag("tr", tag("th", "chance", scope="row"), _with(chance, blank), class_="chance"))
+    titles = ("who", names[0], *SPENT, *names[1:])
+    head = [tag("th", title, scope="col") for title in titles]
     return tag(
         "div",
         tag(
             "table",
-            tag("caption", "Successes of trials; below them the interval at 95 %."),
             tag("thead", tag("tr", head)),
             tag("tbody", body),
         ),
@@ -88,9 +88,7 @@ def _row(called: str, arm: Arm, rows: Sequence[TrialRow], found: Sequence[Cell |
     seconds = median(row.seconds for row in scored) if scored else 0.0
     cost = sum(row.cost_usd for row in rows)
     spent = [f"{tokens:,.0f}", f"{cost:.4f}" if cost else "0", f"{seconds:.1f}"]
-    return tag(
-        "tr", named(called, arm), [_cell(c) for c in found], [tag("td", text) for text in spent]
-    )
+    return tag("tr", named(called, arm), _with([_cell(c) for c in found], spent))
 
 
 def named(called: str, arm: Arm) -> Html:
@@ -103,6 +101,11 @@ def named(called: str, arm: Arm) -> Html:
         [tag("span", fact) for fact in facts],
         scope="row",
     )
+
+
+def _with(slices: Sequence[Html], spent: Sequence[str]) -> Html:
+    """The cells of a row: the total, what was spent, the other slices."""
+    return joined(slices[0], [tag("td", text) for text in spent], slices[1:])
 
 
 def _cell(cell: Cell | None) -> Html:
@@ -139,8 +142,7 @@ def _difference(a: Sequence[TrialRow], b: Sequence[TrialRow], names: Sequence[st
     return tag(
         "tr",
         tag("th", tag("b", "B − A"), tag("span", "points"), scope="row"),
-        [_gap(d, name in told) for name, d in zip(names, found, strict=True)],
-        [tag("td", text) for text in spent],
+        _with([_gap(d, name in told) for name, d in zip(names, found, strict=True)], spent),
         class_="gap",
     )
 

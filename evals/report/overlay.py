@@ -37,9 +37,9 @@ def overlay(task: KeptTask, kept: Kept | None, picture: Shown, title: str) -> Ht
     radius = MARK * max(width, height)
     if kept is not None and len(kept.observed or kept.planned or ()) > CROWD:
         radius *= 0.65
-    drawn = [_truth(goal, kept) for goal in task.goals]
-    if kept is not None:
-        drawn += [_found(kept), _robots(kept, picture.size, radius)]
+    drawn = [_found(kept)] if kept is not None else []
+    drawn += [_truth(goal, kept) for goal in task.goals]
+    drawn += [_robots(kept, picture.size, radius)] if kept is not None else []
     box = f"-0.5 -0.5 {width} {height}"
     base = tag("use", href=f"#{picture.id}") if picture.id else None
     return tag(

@@ -67,9 +67,10 @@ def _intro(sides: Sequence[Side]) -> Html:
 def _results(sides: Sequence[Side]) -> Html:
     told = verdict(compared(sides)) if len(sides) == 2 else None
     notes = (
-        "Intervals of counts are Wilson's and speak of these tasks alone. Chance is the best of "
-        "five policies that know where the thing is and nothing else. Invalid output is the model's "
-        "failure and counts as one; lost trials are those a provider failed in and are not scored."
+        "Cells: successes of trials, and the interval at 95 % (Wilson's), which speaks of these "
+        "tasks alone. Chance is the best of five policies that know where the thing is and nothing "
+        "else. Invalid output is the model's failure and counts as one; lost trials are those a "
+        "provider failed in and are not scored."
     )
     return tag("section", tag("h2", "Results"), told, matrix(sides), tag("p", notes, class_="note"))
 
@@ -111,29 +112,23 @@ def _filter(side: Side) -> Html:
 
 
 def _legend() -> Html:
-    def mark(kind: str, *drawn: Html, text: str) -> Html:
-        picture = tag("svg", drawn, viewBox="0 0 24 16", aria_hidden="true", class_=f"key {kind}")
-        return tag("li", picture, text)
-
-    disc, cross = (
-        tag("circle", cx=12, cy=8, r=5),
-        tag("path", d="M9 5L15 11M9 11L15 5", class_="cross"),
-    )
-    line = {"x1": 2, "y1": 8, "x2": 22, "y2": 8}
-    items = [
-        mark("", tag("g", disc, class_="right"), text="robot, right"),
-        mark("", tag("g", disc, cross, class_="wrong"), text="robot, wrong"),
-        mark("", tag("circle", cx=12, cy=8, r=4, class_="planned"), text="planned"),
-        mark("", tag("line", **line, class_="truth"), text="true outline"),
-        mark("", tag("line", **line, class_="found"), text="outline it worked with"),
-        mark("", tag("line", **line, class_="band"), text="where robots may stand"),
-        mark("", tag("circle", cx=12, cy=8, r=6, class_="slot"), text="slot"),
-        mark(
-            "",
-            tag("circle", cx=12, cy=8, r=6, class_="slot empty"),
-            tag("path", d="M9 5L15 11M9 11L15 5", class_="slot empty"),
-            text="slot without a robot",
+    disc, slot = tag("circle", cx=12, cy=8, r=5), {"cx": 12, "cy": 8, "r": 6}
+    cross, line = "M9 5L15 11M9 11L15 5", {"x1": 2, "y1": 8, "x2": 22, "y2": 8}
+    marks = {
+        "robot, right": tag("g", disc, class_="right"),
+        "robot, wrong": tag("g", disc, tag("path", d=cross, class_="cross"), class_="wrong"),
+        "planned": tag("circle", cx=12, cy=8, r=4, class_="planned"),
+        "true outline": tag("line", **line, class_="truth"),
+        "outline it worked with": tag("line", **line, class_="found"),
+        "where robots may stand": tag("line", **line, class_="band"),
+        "slot": tag("circle", **slot, class_="slot"),
+        "slot without a robot": joined(
+            tag("circle", **slot, class_="slot empty"), tag("path", d=cross, class_="slot empty")
         ),
+    }
+    items = [
+        tag("li", tag("svg", drawn, viewBox="0 0 24 16", aria_hidden="true", class_="key"), text)
+        for text, drawn in marks.items()
     ]
     return tag("ul", items, class_="legend")
 

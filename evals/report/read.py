@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from ...agent.trace import read_trace
 from ...tools.errors import InputError
@@ -88,8 +88,11 @@ class Side:
     def kept(self, row: TrialRow) -> Kept | None:
         """What was kept of a trial; None for nothing that can be read."""
         try:
-            return Kept.model_validate_json(self._file(row, "json").read_bytes())
-        except (OSError, ValidationError):
+            content = json.loads(self._file(row, "json").read_bytes())
+            # A model may have written half of a surrogate pair, which is no text.
+            whole = json.dumps(content, ensure_ascii=False).encode("utf-8", "replace")
+            return Kept.model_validate_json(whole)
+        except (OSError, ValueError, RecursionError):
             return None
 
     def transcript(self, row: TrialRow) -> list[Said] | None:

@@ -47,9 +47,9 @@ def _card(task: KeptTask, trials: Sequence[tuple[Side, TrialRow]], picture: Show
     panels = [_trial(task, side, row, picture) for side, row in trials]
     more = None
     if len(panels) > OPEN:
-        count = tag("summary", f"{len(panels) - OPEN} more trials")
+        count = tag("summary", _counted(len(panels) - OPEN, "more trial"))
         more = tag("details", count, tag("div", panels[OPEN:], class_="trials"), class_="more")
-    robots = "" if task.robots is None else f" · {task.robots} robots"
+    robots = "" if task.robots is None else f" · {_counted(task.robots, 'robot')}"
     expects = "" if "deployed" in task.expects else f" · right: {' or '.join(task.expects)}"
     style = f" · {task.style}" if task.style else ""
     missing = None if picture.id else tag("p", "The picture is missing.", class_="note")
@@ -76,8 +76,12 @@ def _trial(task: KeptTask, side: Side, row: TrialRow, picture: Shown) -> Html:
     placed = kept is not None and bool(kept.observed or kept.planned)
     count = len(kept.observed or ()) if kept else 0
     wrong = count - sum(kept.right) if kept else 0
-    title = f"{task.id}, trial {row.trial}: {count} robots, {wrong} of them wrong"
-    who = " ".join(filter(None, [f"{side.called}:" if side.called else "", Arm.of(row).name]))
+    title = f"{task.id}, trial {row.trial}: {_counted(count, 'robot')}, {wrong} wrong"
+    who = " ".join(
+        filter(
+            None, [f"{side.called}:" if side.called else "", Arm.of(row).name.removesuffix(" none")]
+        )
+    )
     return tag(
         "section",
         overlay(task, kept, picture, title),
@@ -99,25 +103,31 @@ def _figures(row: TrialRow) -> str:
     graded = [] if row.gcr is None else [f"GCR {row.gcr:.2f}"]
     graded += ["strict"] if row.strict else []
     graded += ["wrong thing"] if row.object_correct is False else []
-    spent = [f"{row.input_tokens:,} + {row.output_tokens:,} tokens", f"{row.cost_usd:.4f} USD"]
+    tokens = row.input_tokens, row.output_tokens
+    spent = ["{:,} in, {:,} out".format(*tokens) + " tokens"] if any(tokens) else []
+    spent += [f"{row.cost_usd:.4f} USD"] if row.cost_usd else []
     return " · ".join([*graded, *spent, f"{row.seconds:.1f} s"])
 
 
 def _transcript(side: Side, row: TrialRow, said: str) -> Html | None:
     """What was said; of a trial without a trace, what the person was told."""
-    spoken = side.transcript(row)
+    spoken, title = side.transcript(row), "Transcript"
     if spoken is None:
-        spoken = [Said("told", "", said)] if said else []
+        spoken, title = [Said("told", "", said)] if said else [], "What the person was told"
     if not spoken:
         return None
     lines = [
         tag("div", tag("b", line.who, " ", line.tool), tag("pre", line.text, _rest(line)))
         for line in spoken
     ]
-    return tag("details", tag("summary", "Transcript"), lines, class_="transcript")
+    return tag("details", tag("summary", title), lines, class_="transcript")
 
 
 def _rest(line: Said) -> Html | None:
     if not line.left_out:
         return None
     return tag("i", f"\n{line.left_out:,} more characters are in the trace.")
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"
