@@ -11,6 +11,7 @@ from ..evals.compare import compare as compared
 from ..evals.comparison import Bounded, Comparison, Difference, Metric, Range, Settled
 from ..evals.gate import MARGIN
 from ..evals.journal import Arm, merge, read_rows
+from ..evals.suites.kept import join_kept
 from ..evals.trials import TrialRow
 from ..tools.errors import InputError
 from ..tools.store import write_whole
@@ -70,7 +71,9 @@ def gate(
 
 def merge_shards(shards: o.Shards, out: o.MergedFolder) -> None:
     """Put the trials of shards together in a new folder."""
-    print(f"{merge(shards, out):,} trials in {out}")  # noqa: T201
+    count = merge(shards, out)
+    join_kept(shards, out)
+    print(f"{count:,} trials in {out}")  # noqa: T201
 
 
 def _made(
@@ -83,7 +86,7 @@ def _made(
     measured, tolerated = _metric(metric), inputs.share("--margin", margin)
     if not tolerated:
         raise InputError("--margin 0 can never be passed; give a share above 0, such as 0.05.")
-    made = compared(_rows(*old, "--arm-a"), _rows(*new, "--arm-b"), measured, tolerated)
+    made = compared(arm_rows(*old, "--arm-a"), arm_rows(*new, "--arm-b"), measured, tolerated)
     if out is not None:
         write_whole(out, f"{made.model_dump_json(indent=1)}\n".encode())
     return made
@@ -96,7 +99,7 @@ def _metric(text: str) -> Metric:
     raise InputError(f"Unknown metric {text!r}. There are: sr, strict, gcr.")
 
 
-def _rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
+def arm_rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
     """The rows of one arm of a folder: the only one, or the one of which all the words are said."""
     rows = read_rows(folder)
     words = named.split() if named else []

@@ -1,4 +1,4 @@
-"""Options of `formup eval run`, `suites` and `add`, said once."""
+"""Options of `formup eval run`, `suites`, `add` and `report`, said once."""
 
 from pathlib import Path
 from typing import Annotated
@@ -37,4 +37,11 @@ NewFolder = Annotated[
 ]
 Name = Annotated[
     str | None, typer.Option("--name", help="Of the suite; the folder's name by default.")
+]
+ReportedRun = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder.")]
+Against = Annotated[
+    Path | None, typer.Option("--against", help="Another run's folder, or the same: B beside A.")
+]
+PageFile = Annotated[
+    Path | None, typer.Option("--out", help="The HTML file; report.html in RUN by default.")
 ]

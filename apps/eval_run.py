@@ -14,12 +14,13 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from ..evals.cells import Cell, cells, chances
+from ..evals.cells import Cell, Chance, cells, chances
 from ..evals.check_tasks import check_task
 from ..evals.executors import executor
 from ..evals.journal import Arm, read_rows
 from ..evals.methods import Method, SuiteWork, arm_key, method, trials_of
 from ..evals.suites.gallery import Hung, hang
+from ..evals.suites.kept import ATTEMPTS, PICTURES, keep_suite
 from ..evals.suites.ledger import NAME as LEDGER
 from ..evals.suites.ledger import look
 from ..evals.suites.load import described, load_suite, shipped, write_suite
@@ -35,7 +36,7 @@ from .evaluate import app
 from .sweep import sweep
 
 RUNS = Path("formup-runs")
-SUMMARY, PICTURES, ATTEMPTS = "summary.json", "pictures", "attempts"
+SUMMARY = "summary.json"
 
 
 @app.command("run")
@@ -65,7 +66,7 @@ def run_suite(
     workers = inputs.whole("--jobs", jobs, least=1)
     limit = inputs.dollars("--budget", budget)
     loaded = load_suite(suite, split)
-    folder = out or _fresh(loaded.name)
+    folder, levels = out or _fresh(loaded.name), chances(loaded.tasks)
     with ExitStack() as stack:
         pictures = folder / PICTURES
         if split == "test":
@@ -82,9 +83,10 @@ def run_suite(
             base_url=base_url,
             keep=None if split == "test" else _made(folder / ATTEMPTS),
         )
+        keep_suite(_made(folder), loaded, split, sha256, hung, levels)
         runs_on = executor("serial" if workers == 1 else "pool", workers)
         done = sweep(planned, work, folder, executor=runs_on, budget_usd=limit, shard=shard)
-    _show(loaded, folder, planned)
+    _show(loaded, folder, planned, levels)
     if done.stopped is not None:
         print(f"formup: stopped: {done.stopped}", file=sys.stderr)  # noqa: T201
         raise typer.Exit(4)
@@ -163,11 +165,11 @@ def _fresh(suite: str) -> Path:
     return RUNS / f"{suite}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
 
 
-def _show(suite: Suite, folder: Path, planned: Sequence[Trial]) -> None:
+def _show(suite: Suite, folder: Path, planned: Sequence[Trial], levels: dict[str, Chance]) -> None:
     """A table of each arm, and all of them as JSON."""
     keys = {trial.key for trial in planned}
     rows = [row for row in read_rows(folder) if row.key in keys]
-    levels, summary = chances(suite.tasks), dict[str, object]()
+    summary = dict[str, object]()
     for arm in sorted({Arm.of(row).name for row in rows}):
         found = cells([row for row in rows if Arm.of(row).name == arm], levels)
         summary[arm] = [asdict(cell) for cell in found]
@@ -177,7 +179,8 @@ def _show(suite: Suite, folder: Path, planned: Sequence[Trial]) -> None:
     Console(highlight=False, soft_wrap=True).print(
         "Success: k of n trials; the intervals are of these tasks alone. Thing: it was the one "
         "meant, of those known. Chance: the best of five policies that know where the thing is and "
-        f"nothing else.\n{folder}"
+        f"nothing else.\n{folder}\n"
+        f"To look at it: formup eval report {folder}"
     )
 
 

@@ -19,7 +19,7 @@ from ..evals.scenes.build import write_scenes
 from ..evals.suite import Task, load_tasks
 from ..prompts import PromptLibrary
 from ..tools.store import write_whole
-from . import compare, inputs
+from . import compare, inputs, report
 from . import options as o
 
 COLUMNS = {
@@ -120,6 +120,7 @@ def descriptors(data: o.DataFolder = None) -> None:
 app.command(name="compare")(compare.compare)
 app.command(name="gate")(compare.gate)
 app.command(name="merge")(compare.merge_shards)
+app.command(name="report")(report.report)
 
 
 def recordings(model: str) -> dict[str, Path] | None:

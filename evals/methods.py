@@ -6,6 +6,7 @@ model's failure, counted apart.
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +38,8 @@ DIRECT = "former-direct"
 """What a model alone is told: to write coordinates."""
 LONGEST = 400
 """Characters of feedback in a row."""
+NAMED = 80
+"""Characters of a task's id in the names of its files."""
 NO_MODEL = {"rules": "offline", **dict.fromkeys(POLICIES, "none")}
 OBEDIENT = "obedient"
 SHIPPED = PromptLibrary()
@@ -158,7 +161,7 @@ class SuiteWork:
         if run is not None and not graded.sr and _invalid(run, arm, attempt):
             status = "model_invalid"
         if self.keep is not None:
-            _write(self.keep / f"{task.id}-{trial.trial}-{trial.key[:12]}.json", attempt, graded)
+            _write(self.keep / f"{kept_as(trial)}.json", attempt, graded)
         return TrialRow.of(
             trial,
             status,
@@ -174,7 +177,7 @@ class SuiteWork:
         settings = Settings(robots=task.robots, descriptor=arm.descriptor, seed=trial.seed)
         trace = None
         if self.keep is not None and arm.model not in ("offline", OBEDIENT):
-            trace = self.keep / f"{task.id}-{trial.trial}-{trial.key[:12]}.jsonl"
+            trace = self.keep / f"{kept_as(trial)}.jsonl"
         picture = load_picture(self.pictures[task.id])
         return agent.run(picture, task.instruction, settings=settings, trace=trace)
 
@@ -182,6 +185,12 @@ class SuiteWork:
 def arm_key(trial: Trial) -> str:
     """What a trial says of its arm, as text."""
     return " ".join([trial.method, trial.prompt or "-", trial.model])
+
+
+def kept_as(trial: Trial) -> str:
+    """The name of what is kept of a trial: its positions (.json) and its trace (.jsonl)."""
+    task = re.sub(r"[^\w.-]+", "_", trial.task)[:NAMED]
+    return f"{task}-{trial.trial}-{trial.key[:12]}"
 
 
 def trials_of(
@@ -306,6 +315,7 @@ def _write(path: Path, attempt: Attempt, graded: Graded) -> None:
             "object_correct": graded.object_correct,
             "feedback": graded.feedback,
             "measures": dict(graded.measures),
+            "right": graded.right,
         },
     }
     write_whole(path, canonical(content))

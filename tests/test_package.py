@@ -66,9 +66,8 @@ def test_wheel_holds_every_package_and_data_file_and_no_tests(tmp_path: Path) ->
     inside = set(zipfile.ZipFile(wheel).namelist())
     rooms = ("agent", "apps", "evals", "prompts", "tools")
     kept = [n for n in listed if (ROOT / n).is_file() and (n.startswith(rooms) or "/" not in n)]
-    wanted = [
-        n for n in kept if n.endswith((".py", ".yaml", ".md", ".json", ".jpg", ".png", "CURRENT"))
-    ]
+    data = (".py", ".yaml", ".md", ".json", ".jpg", ".png", ".css", ".js", "CURRENT")
+    wanted = [n for n in kept if n.endswith(data)]
     missing = [n for n in wanted if f"formup/{n}" not in inside and n.startswith(rooms)]
     # Scripts that are run from a checkout, in environments of their own.
     assert not [n for n in missing if not n.startswith("evals/loop_bench/")]

@@ -57,6 +57,7 @@ class Graded:
         object_correct: whether it was about the thing meant; None where that is not known.
         feedback: what was wrong, in a sentence.
         measures: of all goals, named after them where there are several.
+        right: whether each robot graded stands right, in the order given.
     """
 
     sr: bool
@@ -65,6 +66,7 @@ class Graded:
     object_correct: bool | None = None
     feedback: str = ""
     measures: Mapping[str, float] = field(default_factory=dict[str, float])
+    right: tuple[bool, ...] = ()
 
 
 def distinct(points: FloatArray) -> NDArray[np.bool_]:

@@ -71,10 +71,14 @@ def grade_goals(goals: Sequence[Task], positions: ArrayLike | None) -> Graded:
     with np.errstate(invalid="ignore"):
         in_picture = ((points >= 0) & (points <= (width - 1, height - 1))).all(axis=1)
     free = in_picture & distinct(points)
+    owned = _shared(goals, points)
     parts = [
         (goal, RULES[str(goal.success["where"]).partition(":")[0]](goal, points[own], free[own]))
-        for goal, own in zip(goals, _shared(goals, points), strict=True)
+        for goal, own in zip(goals, owned, strict=True)
     ]
+    right = np.zeros(len(points), dtype=bool)
+    for own, (_, part) in zip(owned, parts, strict=True):
+        right[own] = part.right
     wrong = list[str]()
     if len(points) != robots:
         wrong.append(f"{len(points)} positions for {robots} robots")
@@ -91,6 +95,7 @@ def grade_goals(goals: Sequence[Task], positions: ArrayLike | None) -> Graded:
         strict=sr and not strict,
         feedback="; ".join([*wrong, *(p for _, part in parts for p in part.problems), *strict]),
         measures=_measures([part for _, part in parts]),
+        right=tuple(right.tolist()),
     )
 
 
@@ -118,6 +123,7 @@ def grade_attempt(goals: Sequence[Task], expects: Sequence[Status], attempt: Att
         object_correct=_meant(attempt.found, things) if attempt.found else None,
         feedback=feedback,
         measures={**graded.measures, "planned_gcr": planned.gcr},
+        right=graded.right,
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...tools.perception.image import load_picture
+from ...tools.perception.image import Picture, load_picture
 from .tasks import Drawing, SuiteTask
 
 
@@ -42,9 +42,13 @@ def hang(
                 part = path.with_suffix(".part")
                 task.picture.image().save(part, format="PNG", compress_level=1)
                 part.replace(path)
-            pixels = load_picture(path).pixels
-            digest = hashlib.sha256(repr(pixels.shape).encode() + pixels.tobytes())
-            found[path] = Hung(path, digest.hexdigest())
+            found[path] = Hung(path, hashed(load_picture(path)))
         hung[task.id] = found[path]
         told()
     return hung
+
+
+def hashed(picture: Picture) -> str:
+    """SHA-256 of a picture's size and pixels, however its file holds them."""
+    pixels = picture.pixels
+    return hashlib.sha256(repr(pixels.shape).encode() + pixels.tobytes()).hexdigest()

@@ -1,0 +1,87 @@
+"""Pictures for the page: each once, small, as JPEG inside the file."""
+
+import base64
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+from PIL import Image
+
+from ...tools.errors import ImageError
+from ...tools.perception.image import load_picture
+from ..suites.gallery import hashed
+from ..suites.kept import KeptSuite, KeptTask
+from .markup import Html, joined, tag
+
+LONG = 900
+"""Most pixels along the longer side."""
+QUALITY = 80
+MARGIN = 20
+"""px around true outlines where the picture is missing."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A picture that the page holds.
+
+    Attributes:
+        id: by which the page names it; nothing where the picture is missing.
+        size: of the original, (width, height) px, in which positions are.
+        data: the JPEG file.
+    """
+
+    id: str
+    size: tuple[int, int]
+    data: bytes = b""
+
+
+def pictures(folder: Path, suite: KeptSuite) -> dict[str, Shown]:
+    """The pictures of a suite's tasks by the hash of their pixels.
+
+    One that is missing, or is not what it was, is left blank.
+    """
+    found: dict[str, Shown] = {}
+    for task in suite.tasks:
+        if task.pixels not in found:
+            found[task.pixels] = _shown(folder, task, f"picture-{len(found) + 1}")
+    return found
+
+
+def sprite(shown: dict[str, Shown]) -> Html:
+    """All pictures, each once and not to be seen here: drawings name them."""
+    images = [
+        tag(
+            "image",
+            id=picture.id,
+            x=-0.5,
+            y=-0.5,
+            width=picture.size[0],
+            height=picture.size[1],
+            preserveAspectRatio="none",
+            href=f"data:image/jpeg;base64,{base64.b64encode(picture.data).decode()}",
+        )
+        for picture in shown.values()
+        if picture.id
+    ]
+    return tag("svg", tag("defs", joined(images)), class_="sprite", aria_hidden="true")
+
+
+def _shown(folder: Path, task: KeptTask, name: str) -> Shown:
+    try:
+        picture = load_picture(folder / task.picture)
+    except ImageError:
+        return Shown("", _extent(task))
+    if hashed(picture) != task.pixels:
+        return Shown("", picture.size)
+    image = Image.fromarray(picture.pixels)
+    image.thumbnail((LONG, LONG), Image.Resampling.LANCZOS)
+    file = io.BytesIO()
+    image.save(file, "JPEG", quality=QUALITY, optimize=True)
+    return Shown(name, picture.size, file.getvalue())
+
+
+def _extent(task: KeptTask) -> tuple[int, int]:
+    """As much as the true outlines take, where there is no picture to measure."""
+    points = [p for goal in task.goals for thing in goal.things for p in thing.outline]
+    right, low = (int(max((p[axis] for p in points), default=99.0)) for axis in (0, 1))
+    return right + MARGIN, low + MARGIN
