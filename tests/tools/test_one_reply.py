@@ -143,3 +143,31 @@ def test_a_reading_settles_the_doubt_and_stays_in_the_contract() -> None:
     assert made["certified"]
     kept = work.plans[made["plan_id"]].formation.contract
     assert kept.reading == contract["reading"]
+
+
+def test_where_a_distance_is_named_the_outline_is_seen_first() -> None:
+    work = workspace()
+    groups = [{"relation": "around", "targets": ["t1"], "robots": 6, "clearance": [9, 9]}]
+    made = answer(work, "propose_formation", contract={"groups": groups}, targets=[TARGET])
+    assert made.data["certified"]
+    assert len(made.images) == 1
+    with pytest.raises(ToolError, match="t1 is to be kept a named distance from") as held:
+        answer(work, "deploy", tell="They stand.")
+    assert made.data["plan_id"] in str(held.value)
+    assert work.arrivals == {}
+    assert answer(work, "deploy", plan_id=made.data["plan_id"], tell="They stand.").told
+
+
+def test_what_was_drawn_and_is_left_out_holds_a_deployment_back() -> None:
+    work = workspace()
+    drawn = [[60, 40], [119, 40], [119, 60], [150, 65], [119, 70], [119, 89], [60, 89]]
+    outlined = {"id": "t1", "outline": drawn}
+    made = propose(work, targets=[outlined])
+    assert made.data["targets"][0]["leaves_out_your_vertices"] == ((150.0, 65.0),)
+    assert len(made.images) == 1
+    with pytest.raises(ToolError, match=r"leaves out your \(150, 65\) by 1\d px"):
+        answer(work, "deploy")
+    assert answer(work, "deploy", plan_id=made.data["plan_id"]).data["arrived"]
+    clear = propose(workspace(), targets=[outlined | {"outline": drawn[:3] + drawn[4:]}])
+    assert "leaves_out_your_vertices" not in clear.data["targets"][0]
+    assert clear.images == ()
