@@ -6,7 +6,7 @@ measures against. Frame: image pixels, x right, y down.
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, MultiLineString
+from shapely.geometry import LineString, MultiLineString, Polygon
 
 from ..errors import ToolError
 from ..geometry.curves import Curve, Frame, edge_curve, ring, segment, side
@@ -164,9 +164,24 @@ def _place_at_target(group: Group, site: Site, radius: float) -> tuple[FloatArra
         points = inside(outline, n, least + radius, greatest + radius, spacing)
         return points, f"spaced {spacing:g} px and {least:.1f} px from the edge"
     pitch = max(spacing * 1.05, min(0.1 * outline.size, CENTRE_SHARE * outline.size / n**0.5))
-    points = around_point(outline.centre, n, pitch)
-    reach = np.linalg.norm(points - outline.centre, axis=1) <= CENTRE_SHARE * outline.size
-    return points[reach], f"within {CENTRE_SHARE * outline.size:.0f} px of the centre"
+    most = CENTRE_SHARE * outline.size
+
+    def near(points: FloatArray) -> FloatArray:
+        return points[np.linalg.norm(points - outline.centre, axis=1) <= most]
+
+    points = near(around_point(outline.centre, n, pitch))
+    points = near(_drawn_in(points, site.frame(radius).box))
+    return points, f"within {most:.0f} px of the centre"
+
+
+def _drawn_in(points: FloatArray, box: Polygon) -> FloatArray:
+    """All points moved together into a box as far as they can be, less those still out of it."""
+    if box.is_empty or not len(points):
+        return points[:0]
+    low, high = np.reshape(box.bounds, (2, 2))
+    short, over = low - points.min(axis=0), points.max(axis=0) - high
+    moved = points + np.clip(short, 0, None) - np.clip(over, 0, None)
+    return moved[((moved >= low) & (moved <= high)).all(axis=1)]
 
 
 def _corners(group: Group, site: Site, radius: float) -> FloatArray:

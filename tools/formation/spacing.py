@@ -189,7 +189,8 @@ def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.
 class _Spread:
     """Robots along a curve: gaps and who is on either side, ends past the last, bare pieces.
 
-    `jumps` are straight distances from the last robot of a piece to the first of the next.
+    `jumps` are ways from the last robot of a piece to the first of the next: along both and
+    straight across the cut. Straight from robot to robot says nothing where a recess is bridged.
     """
 
     gaps: list[float]
@@ -214,14 +215,15 @@ def _spread(part: Part, curve: Curve) -> _Spread:
         mine = [(float(station[i]) - start, int(i) + part.first) for i in order if piece[i] == k]
         length = float(LineString(line).length)
         start += length
+        if last is not None:
+            last = (last[0] + float(np.linalg.norm(line[0] - curve.lines[k - 1][-1])), last[1])
         if not mine:
             spread.bare.append(length)
+            last = last and (last[0] + length, last[1])
             continue
         if last is not None:
-            pair = (last, mine[0][1])
-            ends = part.points[[pair[0] - part.first, pair[1] - part.first]]
-            spread.jumps.append((float(np.linalg.norm(ends[1] - ends[0])), pair))
-        last = mine[-1][1]
+            spread.jumps.append((last[0] + mine[0][0], (last[1], mine[0][1])))
+        last = (length - mine[-1][0], mine[-1][1])
         for (a, i), (b, j) in pairwise(mine):
             spread.gaps.append(b - a)
             spread.pairs.append((i, j))

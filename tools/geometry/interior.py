@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from .curves import interpolate
+from .curves import QUAD_SEGMENTS, ROUND_JOIN_DIP, interpolate
 from .lattice import ALL_PHASES, Lattice, ideal_pitch, lattice_points, most, widest
 from .lloyd import MAX_CELLS, cells_of, grid, relax
 from .outline import FloatArray, Outline, largest_part, rectangle_of
@@ -105,7 +105,7 @@ def coverage_radius(outline: Outline, points: FloatArray, cells: FloatArray | No
 def _region(outline: Outline, margin: float, depth: float) -> BaseGeometry:
     """Where robots may stand: as deep inside as they must and no deeper than they may."""
     deepest = outline.polygon.buffer(-min(depth, outline.perimeter))
-    return outline.polygon.buffer(-margin).difference(deepest)
+    return outline.polygon.buffer(-margin * ROUND_JOIN_DIP, QUAD_SEGMENTS).difference(deepest)
 
 
 @lru_cache(maxsize=4)  # whoever places robots has them checked next
