@@ -210,20 +210,19 @@ def _spread(part: Part, curve: Curve) -> _Spread:
         pairs = list(zip(names, names[1:] + names[:1], strict=True))
         return _Spread([float(g) for g in around], pairs, [], [], [])
     spread = _Spread([], [], [], [], [])
-    start, last = 0.0, None
+    start, last, since = 0.0, None, 0.0
     for k, line in enumerate(curve.lines):
         mine = [(float(station[i]) - start, int(i) + part.first) for i in order if piece[i] == k]
         length = float(LineString(line).length)
         start += length
-        if last is not None:
-            last = (last[0] + float(np.linalg.norm(line[0] - curve.lines[k - 1][-1])), last[1])
+        since += float(np.linalg.norm(line[0] - curve.lines[k - 1][-1]))
         if not mine:
             spread.bare.append(length)
-            last = last and (last[0] + length, last[1])
+            since += length
             continue
         if last is not None:
-            spread.jumps.append((last[0] + mine[0][0], (last[1], mine[0][1])))
-        last = (length - mine[-1][0], mine[-1][1])
+            spread.jumps.append((since + mine[0][0], (last, mine[0][1])))
+        last, since = mine[-1][1], length - mine[-1][0]
         for (a, i), (b, j) in pairwise(mine):
             spread.gaps.append(b - a)
             spread.pairs.append((i, j))

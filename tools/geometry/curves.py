@@ -158,7 +158,7 @@ def _along_loop(line: FloatArray, loop: BaseGeometry, offset: float) -> FloatArr
     """
     chords = np.linalg.norm(np.diff(line, axis=0), axis=1)
     leaps = np.flatnonzero(chords > 2 * np.median(chords))
-    exterior = shapely.get_exterior_ring(loop)
+    exterior = _filled_parts(loop).boundary
     off = distances(exterior, (line[leaps] + line[leaps + 1]) / 2)
     leaps = leaps[off > LEAP * offset]
     if not len(leaps):
