@@ -45,6 +45,7 @@ def call_tool(
     try:
         result = asyncio.run(tool.call(workspace, arguments))
     except ToolError as error:
+        _save(workspace, state)  # such as a partial plan that the error names
         raise InputError(str(error)) from None
     data = dict(result.data)
     folder = state.parent if state else Path()
@@ -52,9 +53,13 @@ def call_tool(
         written = folder / f"{name}-{number}.png"
         write_whole(written, png)
         data.setdefault("pictures", []).append(str(written))
+    _save(workspace, state)
+    print(json.dumps(data, indent=2, ensure_ascii=False))  # noqa: T201
+
+
+def _save(workspace: Workspace, state: Path | None) -> None:
     if state is not None:
         write_whole(state, store(workspace).model_dump_json(indent=1).encode())
-    print(json.dumps(data, indent=2, ensure_ascii=False))  # noqa: T201
 
 
 def _arguments(text: str) -> dict[str, Any]:

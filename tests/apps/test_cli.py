@@ -26,6 +26,7 @@ KEYS = [
     "plan_id",
     "positions",
     "verdict",
+    "partial",
     "arrival",
     "model",
     "prompt",
@@ -106,6 +107,28 @@ def test_plan_only_moves_nothing_and_deploy_moves_exactly_that_plan(tmp_path: Pa
     assert arrived["plan_id"] == data["plan_id"]
     assert arrived["positions"] == data["positions"]
     assert (tmp_path / "out/deploy.gif").exists()
+
+
+def test_more_robots_than_there_are_corners_leave_a_partial_plan_for_a_person(
+    tmp_path: Path,
+) -> None:
+    task = (PHOTOS / "cars_two.jpg", "Surround the car at the corners", "-n", 6, *CAR_BOX)
+    done = formup("run", *task, "--json", "--out", "out", cwd=tmp_path)
+    data = report(done)
+    assert (done.returncode, data["status"]) == (3, "impossible")
+    assert "only 4 robots fit" in data["message"]
+    assert data["plan_id"] in data["message"]
+    assert "report_impossible" not in data["message"]
+    assert (data["partial"]["asked"], data["partial"]["placed"]) == (6, 4)
+    assert len(data["positions"]) == 4
+    assert data["verdict"]["certified"] is True
+    assert data["arrival"] is None
+    assert (tmp_path / "out/plan.png").exists()
+    moved = formup("deploy", "out/plan.json", "--json", cwd=tmp_path)
+    assert moved.returncode == 0, moved.stderr
+    assert "a partial plan: 4 of the 6 robots" in moved.stderr
+    assert report(moved)["partial"] == data["partial"]
+    assert "partial" in report(moved)["message"]
 
 
 def test_terminal_output_names_what_a_person_needs(tmp_path: Path) -> None:
