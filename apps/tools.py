@@ -9,8 +9,10 @@ import typer
 
 from ..tools.doors import TOOLS
 from ..tools.errors import InputError, ToolError
+from ..tools.formation.contract import Contract
 from ..tools.perception.image import load_picture
 from ..tools.scene import Scene
+from ..tools.schema import compact_schema
 from ..tools.store import read_stored, restore, store, write_whole
 from ..tools.workspace import Settings, Workspace
 from . import options as o
@@ -30,6 +32,15 @@ def list_tools(as_json: o.Json = False) -> None:
         return
     for tool in TOOLS:
         print(f"{tool.name:20} {tool.kind:8} {tool.description.split('. ')[0].rstrip('.')}")  # noqa: T201
+
+
+@app.command("schema")
+def print_schema(name: str) -> None:
+    """The JSON Schema (draft 2020-12) of `contract`, or of a tool's arguments, alone."""
+    schemas = {"contract": compact_schema(Contract)} | {t.name: t.schema for t in TOOLS}
+    if name not in schemas:
+        raise InputError(f"There is no schema {name!r}. There are: {', '.join(schemas)}.")
+    print(json.dumps(schemas[name], indent=2))  # noqa: T201
 
 
 @app.command("call")

@@ -256,6 +256,20 @@ def test_starts_seed_radius_and_clearance_are_held_to(tmp_path: Path) -> None:
     assert 11 <= data["verdict"]["measures"]["min_clearance_px"] <= 13
 
 
+def test_the_schema_of_a_contract_is_what_the_tool_takes(tmp_path: Path) -> None:
+    schema = json.loads(formup("tools", "schema", "contract", cwd=tmp_path).stdout)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    group = {"relation": "around", "targets": ["t1"], "robots": 6}
+    jsonschema.validate({"groups": [group]}, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({"groups": [group | {"robots": 0}]}, schema)
+    listed = json.loads(formup("tools", "schema", "propose_formation", cwd=tmp_path).stdout)
+    given = listed["properties"]["contract"]
+    assert given["properties"]["groups"]["minItems"] == schema["properties"]["groups"]["minItems"]
+    unknown = formup("tools", "schema", "nothing", cwd=tmp_path)
+    assert (unknown.returncode, "contract, " in unknown.stderr) == (2, True)
+
+
 def test_tools_are_listed_with_valid_schemas(tmp_path: Path) -> None:
     listed = json.loads(formup("tools", "list", "--json", cwd=tmp_path).stdout)
     assert {t["name"] for t in listed} >= {"look", "segment", "propose_formation", "deploy"}
