@@ -105,7 +105,9 @@ def coverage_radius(outline: Outline, points: FloatArray, cells: FloatArray | No
 def _region(outline: Outline, margin: float, depth: float) -> BaseGeometry:
     """Where robots may stand: as deep inside as they must and no deeper than they may."""
     deepest = outline.polygon.buffer(-min(depth, outline.perimeter))
-    return outline.polygon.buffer(-margin * ROUND_JOIN_DIP, QUAD_SEGMENTS).difference(deepest)
+    return outline.polygon.buffer(-margin * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS).difference(
+        deepest
+    )
 
 
 @lru_cache(maxsize=4)  # whoever places robots has them checked next
