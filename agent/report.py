@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict
 
 from ..tools.fleet.deploy import Arrival
 from ..tools.formation.contract import Contract
-from ..tools.formation.plan import Plan
+from ..tools.formation.plan import Plan, Shortfall
 from ..tools.formation.verdict import Verdict
 from ..tools.perception.attributes import Candidate
 from ..tools.scene import Box, Target
@@ -62,6 +62,7 @@ class Report(BaseModel):
     plan_id: str | None = None
     positions: tuple[tuple[float, float], ...] | None = None
     verdict: Verdict | None = None
+    partial: Shortfall | None = None
     arrival: Arrival | None = None
     model: str
     prompt: dict[str, Any] | None = None
@@ -112,7 +113,7 @@ def make_report(
 ) -> Report:
     """What a run that ended so has come to, after so many seconds."""
     picture = workspace.scene.picture
-    plan = _last_plan(workspace)
+    plan = _plan(outcome, workspace)
     arrival = workspace.arrivals.get(plan.id) if plan else None
     status, message = _status(outcome, workspace, plan)
     return Report(
@@ -126,19 +127,34 @@ def make_report(
         plan_id=plan.id if plan else None,
         positions=plan.formation.positions if plan else None,
         verdict=plan.verdict if plan else None,
+        partial=plan.partial if plan else None,
         arrival=arrival,
         model=model,
         usage=_totals(outcome.messages, seconds),
     )
 
 
-def _last_plan(workspace: Workspace) -> Plan | None:
-    """The plan deployed last, else the one proposed last that is not void."""
+def _plan(outcome: Outcome, workspace: Workspace) -> Plan | None:
+    """The plan deployed last, else the one a report names, else the last proposed; none void.
+
+    A partial plan is shown only where it is named.
+    """
     if workspace.arrivals:
         return workspace.plans[list(workspace.arrivals)[-1]]
-    version = workspace.scene.version
+    version, named = workspace.scene.version, _named(outcome.messages)
     valid = [p for p in workspace.plans.values() if p.formation.scene_version == version]
-    return valid[-1] if valid else None
+    whole = [p for p in valid if p.partial is None]
+    meant = [p for p in valid if p.id == named] or whole
+    return meant[-1] if meant else None
+
+
+def _named(messages: History) -> str | None:
+    """The plan that the report which closed the run names."""
+    last = messages[-1]
+    if not isinstance(last, Result) or last.name != "report_impossible" or last.error:
+        return None
+    calls = [c for m in messages if isinstance(m, Reply) for c in m.calls]
+    return next(c.arguments.get("plan_id") for c in calls if c.id == last.call_id)
 
 
 def _status(outcome: Outcome, workspace: Workspace, plan: Plan | None) -> tuple[Status, str]:

@@ -20,13 +20,14 @@ from .screen import show_report
 
 def deploy(plan: o.PlanFile, fleet: o.FleetName = "simulated", as_json: o.Json = False) -> None:
     """Move robots to a certified plan; naming the file is the approval."""
-    settings = Settings(fleet=fleet)
-    settings.check()
+    Settings(fleet=fleet).check()
     stored = read_stored(plan)
     if stored.plan_id is None or stored.plan_id not in stored.plans:
         raise InputError(f"{plan} holds no plan to deploy; give a plan.json written by formup run.")
-    workspace = restore(stored, None, settings)
+    workspace = restore(stored, None, Settings(fleet=fleet, approved=stored.plan_id))
     chosen = stored.plans[stored.plan_id]
+    if chosen.partial is not None:
+        print(f"formup: a partial plan: {chosen.partial.sentence}", file=sys.stderr)  # noqa: T201
     try:
         asyncio.run(deploy_tool.call(workspace, {"plan_id": chosen.id}))
     except ToolError as error:
@@ -47,7 +48,8 @@ def _report(plan: Plan, workspace: Workspace, stored: Stored, animation: str | N
     state = "All arrived" if arrival.arrived else "Not all arrived"
     return Report(
         status="deployed" if arrival.arrived else "failed",
-        message=f"{state}; the furthest is {max(arrival.residual_px):.1f} px from its place.",
+        message=f"{state}; the furthest is {max(arrival.residual_px):.1f} px from its place."
+        + (f" The plan is partial: {plan.partial.sentence}" if plan.partial else ""),
         instruction=stored.instruction or "",
         image=json.loads(stored.image.model_dump_json(exclude={"path"})),
         targets=tuple(target_data(t) for t in workspace.scene.targets),
@@ -55,6 +57,7 @@ def _report(plan: Plan, workspace: Workspace, stored: Stored, animation: str | N
         plan_id=plan.id,
         positions=plan.formation.positions,
         verdict=plan.verdict,
+        partial=plan.partial,
         arrival=arrival,
         model="none",
         files={"plan": None, "picture": None, "animation": animation, "trace": None},

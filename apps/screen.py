@@ -145,6 +145,8 @@ def _certificate(console: Console, report: Report) -> None:
     verdict = report.verdict
     assert verdict is not None
     measures = _measures(verdict.measures)
+    if report.partial is not None:
+        _line(console, "partial", report.partial.sentence)
     if verdict.certified:
         _line(console, "certified", f"plan {report.plan_id}: {measures}")
     else:

@@ -9,8 +9,10 @@ import typer
 
 from ..tools.doors import TOOLS
 from ..tools.errors import InputError, ToolError
+from ..tools.formation.contract import Contract
 from ..tools.perception.image import load_picture
 from ..tools.scene import Scene
+from ..tools.schema import compact_schema
 from ..tools.store import read_stored, restore, store, write_whole
 from ..tools.workspace import Settings, Workspace
 from . import options as o
@@ -32,6 +34,15 @@ def list_tools(as_json: o.Json = False) -> None:
         print(f"{tool.name:20} {tool.kind:8} {tool.description.split('. ')[0].rstrip('.')}")  # noqa: T201
 
 
+@app.command("schema")
+def print_schema(name: str) -> None:
+    """The JSON Schema (draft 2020-12) of `contract`, or of a tool's arguments, alone."""
+    schemas = {"contract": compact_schema(Contract)} | {t.name: t.schema for t in TOOLS}
+    if name not in schemas:
+        raise InputError(f"There is no schema {name!r}. There are: {', '.join(schemas)}.")
+    print(json.dumps(schemas[name], indent=2))  # noqa: T201
+
+
 @app.command("call")
 def call_tool(
     name: str, image: o.PictureFile = None, args: o.Arguments = "{}", state: o.StateFile = None
@@ -45,6 +56,7 @@ def call_tool(
     try:
         result = asyncio.run(tool.call(workspace, arguments))
     except ToolError as error:
+        _save(workspace, state)  # such as a partial plan that the error names
         raise InputError(str(error)) from None
     data = dict(result.data)
     folder = state.parent if state else Path()
@@ -52,9 +64,13 @@ def call_tool(
         written = folder / f"{name}-{number}.png"
         write_whole(written, png)
         data.setdefault("pictures", []).append(str(written))
+    _save(workspace, state)
+    print(json.dumps(data, indent=2, ensure_ascii=False))  # noqa: T201
+
+
+def _save(workspace: Workspace, state: Path | None) -> None:
     if state is not None:
         write_whole(state, store(workspace).model_dump_json(indent=1).encode())
-    print(json.dumps(data, indent=2, ensure_ascii=False))  # noqa: T201
 
 
 def _arguments(text: str) -> dict[str, Any]:

@@ -4,6 +4,11 @@ from pathlib import Path
 
 import pytest
 from formup.prompts import library, release
+from hypothesis import settings
+
+# A busy machine pauses for longer than any example takes.
+settings.register_profile("formup", deadline=None)
+settings.load_profile("formup")
 
 
 @pytest.fixture

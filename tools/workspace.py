@@ -48,6 +48,7 @@ class Settings:
         starts: (n, 2) starting positions of simulated robots, px, or None to spread them.
         seed: of everything random in the simulator.
         may_deploy: whether robots may be moved at all in this run.
+        approved: id of the one plan a person has approved although it is partial.
         numbered: whether what stands out is numbered in the picture a model gets.
     """
 
@@ -61,6 +62,7 @@ class Settings:
     starts: FloatArray | None = None
     seed: int = 0
     may_deploy: bool = True
+    approved: str | None = None
     numbered: bool = False
 
     def check(self) -> None:

@@ -5,8 +5,10 @@ asks when the words do not settle what to do. It is no language model: it sees m
 """
 
 import json
+import re
 from typing import Any
 
+from ...tools.doors.committing import SHOW_PARTIAL
 from ...tools.formation.contract import MAX_ROBOTS
 from ..messages import Call, History, Reply, Result, User
 from ..model import Request
@@ -150,14 +152,23 @@ def _after_proposal(task: Task, result: Result, history: History) -> Reply:
     if result.error:
         if "Insufficient segmentation accuracy" in result.text:
             return _call(history, "ask_user", {"question": result.text})
-        return _call(history, "report_impossible", {"reason": result.text})
+        return _impossible(history, result.text)
     plan = json.loads(result.text)
     if not plan["certified"]:
-        arguments = {"reason": " ".join(plan["findings"]), "plan_id": plan["plan_id"]}
-        return _call(history, "report_impossible", arguments)
+        said = [*plan["findings"], plan.get("partial", "")]
+        return _impossible(history, " ".join(said).strip(), plan["plan_id"])
     if task.deploy:
         return _call(history, "deploy", {"plan_id": plan["plan_id"]})
     return Reply(text=f"{_planned(plan, history)} Nothing was moved.")
+
+
+def _impossible(history: History, said: str, plan_id: str | None = None) -> Reply:
+    """Give up, in the words of the tool, with the partial plan it made, else the plan proposed."""
+    reason = said.removesuffix(SHOW_PARTIAL).rstrip()
+    partial = re.findall(r"\bp-[0-9a-f]{10}\b", said) if reason != said else []
+    named = partial[-1] if partial else plan_id
+    arguments = {"reason": reason} | ({"plan_id": named} if named else {})
+    return _call(history, "report_impossible", arguments)
 
 
 def _after_deploy(task: Task, result: Result, history: History) -> str:

@@ -26,6 +26,7 @@ KEYS = [
     "plan_id",
     "positions",
     "verdict",
+    "partial",
     "arrival",
     "model",
     "prompt",
@@ -106,6 +107,28 @@ def test_plan_only_moves_nothing_and_deploy_moves_exactly_that_plan(tmp_path: Pa
     assert arrived["plan_id"] == data["plan_id"]
     assert arrived["positions"] == data["positions"]
     assert (tmp_path / "out/deploy.gif").exists()
+
+
+def test_more_robots_than_there_are_corners_leave_a_partial_plan_for_a_person(
+    tmp_path: Path,
+) -> None:
+    task = (PHOTOS / "cars_two.jpg", "Surround the car at the corners", "-n", 6, *CAR_BOX)
+    done = formup("run", *task, "--json", "--out", "out", cwd=tmp_path)
+    data = report(done)
+    assert (done.returncode, data["status"]) == (3, "impossible")
+    assert "only 4 robots fit" in data["message"]
+    assert data["plan_id"] in data["message"]
+    assert "report_impossible" not in data["message"]
+    assert (data["partial"]["asked"], data["partial"]["placed"]) == (6, 4)
+    assert len(data["positions"]) == 4
+    assert data["verdict"]["certified"] is True
+    assert data["arrival"] is None
+    assert (tmp_path / "out/plan.png").exists()
+    moved = formup("deploy", "out/plan.json", "--json", cwd=tmp_path)
+    assert moved.returncode == 0, moved.stderr
+    assert "a partial plan: 4 of the 6 robots" in moved.stderr
+    assert report(moved)["partial"] == data["partial"]
+    assert "partial" in report(moved)["message"]
 
 
 def test_terminal_output_names_what_a_person_needs(tmp_path: Path) -> None:
@@ -231,6 +254,20 @@ def test_starts_seed_radius_and_clearance_are_held_to(tmp_path: Path) -> None:
     assert data["contract"]["robot_radius"] == 5
     assert data["contract"]["groups"][0]["clearance"] == [11, 13]
     assert 11 <= data["verdict"]["measures"]["min_clearance_px"] <= 13
+
+
+def test_the_schema_of_a_contract_is_what_the_tool_takes(tmp_path: Path) -> None:
+    schema = json.loads(formup("tools", "schema", "contract", cwd=tmp_path).stdout)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    group = {"relation": "around", "targets": ["t1"], "robots": 6}
+    jsonschema.validate({"groups": [group]}, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({"groups": [group | {"robots": 0}]}, schema)
+    listed = json.loads(formup("tools", "schema", "propose_formation", cwd=tmp_path).stdout)
+    given = listed["properties"]["contract"]
+    assert given["properties"]["groups"]["minItems"] == schema["properties"]["groups"]["minItems"]
+    unknown = formup("tools", "schema", "nothing", cwd=tmp_path)
+    assert (unknown.returncode, "contract, " in unknown.stderr) == (2, True)
 
 
 def test_tools_are_listed_with_valid_schemas(tmp_path: Path) -> None:

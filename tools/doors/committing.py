@@ -8,7 +8,10 @@ from ..errors import ToolError
 from ..fleet.deploy import Arrival
 from ..fleet.deploy import deploy as drive
 from ..fleet.simulated import SimulatedFleet
+from ..formation.caging import CageError
 from ..formation.contract import Contract, Group
+from ..formation.partial import Refusal, best_partial
+from ..formation.place import CapacityError
 from ..formation.plan import Plan, make_plan
 from ..formation.wording import doubts
 from ..geometry.outline import distances
@@ -22,6 +25,8 @@ MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
 EXACT_SHARE, EXACT_PX = 0.05, 1.0
 """How exactly a clearance the person fixed is held."""
+SHOW_PARTIAL = "To show it to the person, pass its plan_id to report_impossible."
+"""Ends the answer to what cannot be met in full; for a model, not for the person."""
 
 
 @tool("commit")
@@ -61,15 +66,22 @@ def propose_formation(
         measured(workspace, prompt)
     held = _held_to(contract, workspace.settings)
     places = positions if samples is None else _sampled(workspace, samples)
-    plan = make_plan(held, workspace.scene.site(held), workspace.scene.version, places)
-    workspace.plans.pop(plan.id, None)  # proposed again, it is the latest again
-    workspace.plans[plan.id] = plan
+    try:
+        plan = make_plan(held, workspace.scene.site(held), workspace.scene.version, places)
+    except (CapacityError, CageError) as error:
+        raise ToolError(f"{error}{_partial(workspace, held, error)}") from None
+    _keep(workspace, plan)
     exact = {t for group in contract.groups if group.clearance is not None for t in group.targets}
     workspace.exact[plan.id] = tuple(sorted(exact))
+    data = _proposal(workspace, plan)
+    if places is None and not plan.verdict.certified:
+        found = _partial(workspace, held, None)
+        _keep(workspace, plan)
+        data |= {"partial": found.strip()} if found else {}
     shown = [
         t for t in map(workspace.scene.target, held.target_ids) if doubtful(t) or t.id in exact
     ]
-    return ToolResult(_proposal(workspace, plan), overlays(workspace, shown, plan))
+    return ToolResult(data, overlays(workspace, shown, plan))
 
 
 @tool("actuate")
@@ -86,6 +98,11 @@ async def deploy(
     plan = workspace.current_plan(plan_id)
     if not plan.verdict.certified:
         raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
+    if plan.partial is not None and workspace.settings.approved != plan.id:
+        raise ToolError(
+            f"Plan {plan.id} is partial ({plan.partial.short}): nothing of a task is done unasked. "
+            "A person may have exactly this plan driven, with formup deploy."
+        )
     if not workspace.settings.may_deploy:
         raise ToolError("The person asked for the plan only: nothing may be moved.")
     if plan_id is None:
@@ -144,6 +161,20 @@ def report_impossible(
         raise ToolError(f"There is no plan {plan_id!r}.")
     data = {"reason": reason, "robots_needed": robots_needed, "plan_id": plan_id}
     return ToolResult(data, told=reason)
+
+
+def _keep(workspace: Workspace, plan: Plan) -> None:
+    workspace.plans.pop(plan.id, None)  # proposed again, it is the latest again
+    workspace.plans[plan.id] = plan
+
+
+def _partial(workspace: Workspace, held: Contract, refusal: Refusal | None) -> str:
+    """Keep the best partial plan; what there is to say of it, nothing where there is none."""
+    plan = best_partial(held, workspace.scene.site(held), workspace.scene.version, refusal)
+    if plan is None or plan.partial is None:
+        return ""
+    _keep(workspace, plan)
+    return f" Plan {plan.id} is certified as partial: {plan.partial.sentence} {SHOW_PARTIAL}"
 
 
 def _check_clear(workspace: Workspace, plan: Plan) -> None:

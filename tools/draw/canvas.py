@@ -31,6 +31,7 @@ TARGET: Colour = (255, 209, 26)
 ALLOWED: Colour = (72, 190, 255)
 FORBIDDEN: Colour = (196, 52, 72)
 CERTIFIED: Colour = (0, 122, 90)
+PARTIAL: Colour = (176, 92, 0)
 MARKS: tuple[Colour, ...] = (
     (255, 209, 26),
     (86, 204, 255),

@@ -12,12 +12,11 @@ from PIL import Image
 
 from ..formation.place import Site
 from ..formation.plan import Plan
-from ..formation.verdict import Verdict
 from ..geometry.outline import FloatArray
 from ..perception.attributes import Candidate
 from ..perception.image import Picture
 from ..scene import Box, Scene
-from .canvas import CERTIFIED, FINDING, INK, Canvas, Colour, Labels
+from .canvas import CERTIFIED, FINDING, INK, PARTIAL, Canvas, Colour, Labels
 from .escape import draw_escape
 from .marks import (
     directions,
@@ -95,7 +94,7 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
     if drivable:
         label_openings(canvas, contract, site, points, labels)
     draw_bars(page)
-    draw_footer(canvas, *_verdict_badge(plan.verdict), _facts(plan))
+    draw_footer(canvas, *_badge(plan), _facts(plan))
     return canvas.finish()
 
 
@@ -177,10 +176,12 @@ def _draw_robots(canvas: Canvas, plan: Plan, site: Site, labels: Labels) -> None
     number_robots(canvas, shown, radius, labels, away, flagged)
 
 
-def _verdict_badge(verdict: Verdict) -> tuple[str, Colour]:
-    if verdict.certified:
+def _badge(plan: Plan) -> tuple[str, Colour]:
+    if plan.partial is not None:
+        return f"partial: {plan.partial.short}", PARTIAL
+    if plan.verdict.certified:
         return "certified", CERTIFIED
-    count = len(verdict.findings)
+    count = len(plan.verdict.findings)
     return f"NOT certified: {count} finding{'s' * (count != 1)}", FINDING
 
 

@@ -18,9 +18,11 @@ class CageError(ToolError):
 
     Attributes:
         needed: how many robots would do, or None where no number is known to.
+        group: the group.
+        fits: how many of the robots have room on the ring where that is fewer than all, else 0.
     """
 
-    def __init__(self, group: Group, needed: int | None) -> None:
+    def __init__(self, group: Group, needed: int | None, fits: int) -> None:
         assert group.clearance is not None
         least, greatest = group.clearance
         way = (
@@ -32,7 +34,7 @@ class CageError(ToolError):
             f"No places were found where {group.robots} robots, {least:.1f} to {greatest:.1f} px "
             f"from {group.targets[0]}, certainly cage it; {way}."
         )
-        self.needed = needed
+        self.needed, self.group, self.fits = needed, group, fits
 
 
 def escape_proof(group: Group) -> bool:
@@ -59,8 +61,11 @@ def caged_places(
     )
     points = caging_places(demand, group.robots, (curve,))
     if points is None:
-        enough = fewest_cage(demand, group.robots + 1)
-        raise CageError(group, None if enough is None else len(enough))
+        longest = max(c.length for c in (curve, *demand.curves))
+        crowded = longest < (group.robots + 1) * demand.spacing
+        enough = None if crowded else fewest_cage(demand, group.robots + 1)
+        fits = min(int(longest / demand.spacing), group.robots - 1) if crowded else 0
+        raise CageError(group, None if enough is None else len(enough), fits)
     return points
 
 

@@ -112,6 +112,11 @@ def edited(plan: Plan, edit: Edit, site: Site) -> Edited:
 
 def _parts(plan: Plan, site: Site) -> list[Part]:
     contract, points = plan.formation.contract, plan.formation.points
+    if plan.partial is not None:
+        raise ToolError(
+            f"Plan {plan.id} is partial ({plan.partial.short}); propose what is wanted instead "
+            "before changing it."
+        )
     if len(points) != contract.robots:
         raise ToolError(
             f"Plan {plan.id} has {len(points)} positions for {contract.robots} robots; propose it "

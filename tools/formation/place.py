@@ -4,9 +4,11 @@ Each relation has one reference (a curve, corners, a region, a point) that the c
 measures against. Frame: image pixels, x right, y down.
 """
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 import shapely
-from shapely.geometry import LineString, MultiLineString
+from shapely.geometry import LineString, MultiLineString, Polygon
 
 from ..errors import ToolError
 from ..geometry.curves import Curve, Frame, edge_curve, ring, segment, side
@@ -20,13 +22,16 @@ from ..geometry.sampling import (
     min_spacing,
     spread_subset,
 )
+from .apart import CrowdedError, Stand, clear, conflict, slid, without
 from .caging import caged_places, escape_proof
-from .contract import CENTRE_SHARE, Contract, Group, nominal
+from .contract import CENTRE_SHARE, OUTSIDE, Contract, Group, nominal
 from .figure import figure_of, place_figure
 from .site import CapacityError, Site
 
 TOUCH = 1.0
 """Robots between two targets keep this far off them, px."""
+MOST_AVOIDED = 20
+"""Further places at a centre that are looked at where other robots stand on some."""
 REFLEX = 1.5
 """A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
 square root of 2 in a right-angled reflex one."""
@@ -43,10 +48,15 @@ def place(contract: Contract, site: Site) -> FloatArray:
     Raises:
         CapacityError: a group has more robots than fit; its `fits` says how many do.
         CageError: its robots cannot be placed escape-proof; `needed` says how many would do.
+        CrowdedError: a group would stand in the way of one before it.
         ToolError: the contract leaves positions to the caller (a free shape).
     """
-    parts = [_place_group(group, site, contract.robot_radius) for group in contract.groups]
-    return np.concatenate(parts)
+    stands: list[Stand] = []
+    for group in contract.groups:
+        stand = Stand(group, _place_group(group, site, contract.robot_radius))
+        clash = conflict(stand, stands)
+        stands.append(stand if clash is None else _elsewhere(group, stands, clash, contract, site))
+    return np.concatenate([stand.points for stand in stands])
 
 
 def reference_curve(group: Group, site: Site, radius: float, offset: float | None = None) -> Curve:
@@ -131,6 +141,58 @@ def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
     return REFLEX * (group.clearance[1] + radius) + short
 
 
+def _elsewhere(
+    group: Group,
+    earlier: list[Stand],
+    clash: tuple[int, float, float],
+    contract: Contract,
+    site: Site,
+) -> Stand:
+    """The group's robots at other places, clear of those placed before.
+
+    Raises:
+        CrowdedError: none were found.
+    """
+    for points in _otherwise(group, earlier, site, contract.robot_radius):
+        stand = Stand(group, points)
+        if len(points) == group.robots and conflict(stand, earlier) is None:
+            return stand
+    index, apart, least = clash
+    raise CrowdedError(index + 1, len(earlier) + 1, apart, least)
+
+
+def _otherwise(
+    group: Group, earlier: list[Stand], site: Site, radius: float
+) -> Iterator[FloatArray]:
+    """Further places for a group that are as good in themselves, as far as there are any."""
+    n, spacing = group.robots, group.min_spacing or 0.0
+    if group.shape is not None or escape_proof(group) or not (group.targets or group.line):
+        return
+    if group.relation in ("corners", "centre"):
+        yield _place_at_target(group, site, radius, earlier)[0]
+    elif group.relation == "inside":
+        assert group.clearance is not None
+        least, greatest = (bound + radius for bound in group.clearance)
+        left = without(site.visible(group.targets[0]), group, earlier, least)
+        if left is not None:
+            yield inside(left, n, least, greatest, spacing)
+    else:
+        for offset in _offsets(group, radius):
+            for points in slid(reference_curve(group, site, radius, offset), n):
+                if min_spacing(points) >= spacing * (1 - 1e-6):
+                    yield points
+
+
+def _offsets(group: Group, radius: float) -> tuple[float | None, ...]:
+    """Distances from the outline that a curve may have, the one aimed at first, px."""
+    if group.clearance is None or group.relation not in OUTSIDE:
+        return (None,)
+    least, greatest = group.clearance
+    aim = nominal(group.clearance)
+    ends = [aim + share * (end - aim) for share in (0.45, 0.9) for end in (least, greatest)]
+    return (None, *(radius + max(end, 0.1) for end in ends if end <= 4 * aim))
+
+
 def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
     n, spacing = group.robots, group.min_spacing or 0.0
     if group.shape is not None:
@@ -151,25 +213,44 @@ def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
     return points
 
 
-def _place_at_target(group: Group, site: Site, radius: float) -> tuple[FloatArray, str]:
+def _place_at_target(
+    group: Group, site: Site, radius: float, earlier: Sequence[Stand] = ()
+) -> tuple[FloatArray, str]:
     outline = site.visible(group.targets[0])
     n, spacing = group.robots, group.min_spacing or 0.0
     if group.relation == "corners":
         count = len(corner_points(outline, n))
         why = f"{group.targets[0]} has {count} corners, less those without room in the picture"
-        return _corners(group, site, radius), why
+        return _corners(group, site, radius, earlier), why
     if group.relation == "inside":
         assert group.clearance is not None
         least, greatest = group.clearance
         points = inside(outline, n, least + radius, greatest + radius, spacing)
         return points, f"spaced {spacing:g} px and {least:.1f} px from the edge"
     pitch = max(spacing * 1.05, min(0.1 * outline.size, CENTRE_SHARE * outline.size / n**0.5))
-    points = around_point(outline.centre, n, pitch)
-    reach = np.linalg.norm(points - outline.centre, axis=1) <= CENTRE_SHARE * outline.size
-    return points[reach], f"within {CENTRE_SHARE * outline.size:.0f} px of the centre"
+    most = CENTRE_SHARE * outline.size
+
+    def near(points: FloatArray) -> FloatArray:
+        return points[np.linalg.norm(points - outline.centre, axis=1) <= most]
+
+    crowd = sum(len(other.points) for other in earlier)
+    points = near(around_point(outline.centre, n + min(crowd, n + MOST_AVOIDED), pitch))
+    points = near(_drawn_in(points, site.frame(radius).box))
+    points = points[clear(points, group, earlier)][:n]
+    return points, f"within {most:.0f} px of the centre"
 
 
-def _corners(group: Group, site: Site, radius: float) -> FloatArray:
+def _drawn_in(points: FloatArray, box: Polygon) -> FloatArray:
+    """All points moved together into a box as far as they can be, less those still out of it."""
+    if box.is_empty or not len(points):
+        return points[:0]
+    low, high = np.reshape(box.bounds, (2, 2))
+    short, over = low - points.min(axis=0), points.max(axis=0) - high
+    moved = points + np.clip(short, 0, None) - np.clip(over, 0, None)
+    return moved[((moved >= low) & (moved <= high)).all(axis=1)]
+
+
+def _corners(group: Group, site: Site, radius: float, earlier: Sequence[Stand] = ()) -> FloatArray:
     """Places at the corners, drawn in from the picture's border, less those without room."""
     assert group.clearance is not None
     outline, box = site.outlines[group.targets[0]], site.frame(radius).box
@@ -181,6 +262,7 @@ def _corners(group: Group, site: Site, radius: float) -> FloatArray:
     corners = corner_points(outline, group.robots)
     near = np.linalg.norm(points - corners, axis=1) <= corner_reach(group, outline, radius)
     free = points[near & (distances(outline.filled, points) >= group.clearance[0] + radius)]
+    free = free[clear(free, group, earlier)]
     if len(free) > group.robots:
         free = free[spread_subset(free, group.robots)]
     taken: list[FloatArray] = []

@@ -7,10 +7,11 @@ scene version. Whoever approves an id approves exactly that; a changed scene voi
 import hashlib
 import json
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
 
 from ..errors import ToolError
 from ..geometry.outline import FloatArray
@@ -37,8 +38,7 @@ class Formation(BaseModel):
     @property
     def id(self) -> str:
         """The content hash that names the plan, `p-` and 10 hex digits."""
-        text = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
-        return "p-" + hashlib.sha256(text.encode()).hexdigest()[:10]
+        return "p-" + _digest(self.model_dump(mode="json"))
 
     @property
     def points(self) -> FloatArray:
@@ -46,18 +46,58 @@ class Formation(BaseModel):
         return np.asarray(self.positions, dtype=float).reshape(-1, 2)
 
 
+class Shortfall(BaseModel):
+    """What a partial plan falls short of: robots, or the clearance asked for.
+
+    Attributes:
+        asked: robots over all groups that were asked for.
+        placed: robots that have places.
+        clearance_asked: least and greatest that were stated, px, where that is what is missed.
+        clearance: the greatest found that can be held instead, px.
+        sentence: the same in words.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    asked: int
+    placed: int
+    clearance_asked: tuple[float, float] | None = None
+    clearance: tuple[float, float] | None = None
+    sentence: str
+
+    @property
+    def short(self) -> str:
+        """In a few words, such as `12 of 30`."""
+        if self.clearance is None or self.clearance_asked is None:
+            return f"{self.placed} of {self.asked}"
+        return f"clearance {self.clearance[0]:.1f} px, not {self.clearance_asked[0]:.1f} px"
+
+
 class Plan(BaseModel):
-    """A formation with its verdict; only a certified one may be deployed."""
+    """A formation with its verdict; only a certified one may be deployed.
+
+    One that is partial is certified for less than was asked, and names what is missing.
+    """
 
     model_config = ConfigDict(frozen=True)
 
     formation: Formation
     verdict: Verdict
+    partial: Shortfall | None = None
+
+    @model_serializer(mode="wrap")
+    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A whole plan says nothing of a shortfall, as when there were none to be marked."""
+        written = standard(self)
+        return {k: v for k, v in written.items() if k != "partial" or v is not None}
 
     @property
     def id(self) -> str:
-        """The formation's content hash."""
-        return self.formation.id
+        """The formation's content hash; of a partial plan also that of its shortfall."""
+        if self.partial is None:
+            return self.formation.id
+        content = [self.formation.model_dump(mode="json"), self.partial.model_dump(mode="json")]
+        return "p-" + _digest(content)
 
 
 def make_plan(
@@ -85,6 +125,11 @@ def make_plan(
         scene_version=scene_version,
     )
     return Plan(formation=formation, verdict=certify(rounded, full, site))
+
+
+def _digest(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:10]
 
 
 def scene_version(picture_sha256: str, outlines: Mapping[str, object]) -> str:

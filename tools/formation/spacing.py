@@ -189,8 +189,8 @@ def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.
 class _Spread:
     """Robots along a curve: gaps and who is on either side, ends past the last, bare pieces.
 
-    `jumps` are distances from the last robot of a piece to the first of the next, along the pieces
-    and straight from one to the other: as gaps are, no chord across a sharp corner.
+    `jumps` are ways from the last robot of a piece to the first of the next: along both and
+    straight across the cut. Straight from robot to robot says nothing where a recess is bridged.
     """
 
     gaps: list[float]
@@ -210,19 +210,19 @@ def _spread(part: Part, curve: Curve) -> _Spread:
         pairs = list(zip(names, names[1:] + names[:1], strict=True))
         return _Spread([float(g) for g in around], pairs, [], [], [])
     spread = _Spread([], [], [], [], [])
-    start, last = 0.0, None
+    start, last, since = 0.0, None, 0.0
     for k, line in enumerate(curve.lines):
         mine = [(float(station[i]) - start, int(i) + part.first) for i in order if piece[i] == k]
         length = float(LineString(line).length)
         start += length
+        since += float(np.linalg.norm(line[0] - curve.lines[k - 1][-1]))
         if not mine:
             spread.bare.append(length)
+            since += length
             continue
         if last is not None:
-            robot, left, end = last
-            across = float(np.linalg.norm(line[0] - end))
-            spread.jumps.append((left + across + mine[0][0], (robot, mine[0][1])))
-        last = (mine[-1][1], length - mine[-1][0], line[-1])
+            spread.jumps.append((since + mine[0][0], (last, mine[0][1])))
+        last, since = mine[-1][1], length - mine[-1][0]
         for (a, i), (b, j) in pairwise(mine):
             spread.gaps.append(b - a)
             spread.pairs.append((i, j))

@@ -25,6 +25,8 @@ FACING = math.radians(50)
 """How far a curve's outward normal may turn from a side's direction and still be that side."""
 SIDE_STEP = 400
 """Samples along a curve when a part of it is cut out by a condition."""
+LEAP = 0.02
+"""A chord whose middle is off the curve by this share of the offset leaps over a part of it."""
 
 
 @dataclass(frozen=True)
@@ -144,9 +146,43 @@ def side(
     tangent = np.gradient(line, axis=0)
     facing = np.abs(np.arctan2(tangent @ unit, np.abs(tangent @ across))) <= FACING
     found = np.flatnonzero(facing)
-    if len(found) < 2:
-        return _clip([line], frame)
-    return _clip([line[found[0] : found[-1] + 1]], frame)
+    kept = line if len(found) < 2 else line[found[0] : found[-1] + 1]
+    return _clip([_along_loop(kept, loop, offset)], frame)
+
+
+def _along_loop(line: FloatArray, loop: BaseGeometry, offset: float) -> FloatArray:
+    """A polyline of points on a loop, with the loop itself where it leaps over an overhang of it.
+
+    Rays meet only the outer end of what hangs over; a chord from there to what lies behind is at
+    no certain distance from the outline.
+    """
+    chords = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    leaps = np.flatnonzero(chords > 2 * np.median(chords))
+    exterior = _filled_parts(loop).boundary
+    off = distances(exterior, (line[leaps] + line[leaps + 1]) / 2)
+    leaps = leaps[off > LEAP * offset]
+    if not len(leaps):
+        return line
+    around = shapely.get_coordinates(exterior)
+    pieces: list[FloatArray] = []
+    start = 0
+    for i in leaps:
+        pieces += [line[start : i + 1], _stretch(around, line[i], line[i + 1])]
+        start = i + 1
+    return np.concatenate([*pieces, line[start:]])
+
+
+def _stretch(loop: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """The vertices of a loop (m, 2) on the shorter way from one place of it to another."""
+    lengths = np.linalg.norm(np.diff(loop, axis=0), axis=1)
+    whole, at = float(lengths.sum()), (np.cumsum(lengths) - lengths)
+    a, b = locate(loop, np.stack([start, end]))
+    ahead, turn = (b - a) % whole, 1.0
+    if ahead > whole / 2:
+        ahead, turn = whole - ahead, -1.0
+    way = (turn * (at - a)) % whole
+    passed = np.flatnonzero((way > 0) & (way < ahead))
+    return loop[passed[np.argsort(way[passed], kind="stable")]]
 
 
 def edge_curve(

@@ -106,6 +106,8 @@ def _region(outline: Outline, margin: float, depth: float) -> BaseGeometry:
     """Where robots may stand: as deep inside as they must and no deeper than they may."""
     deepest = outline.polygon.buffer(-min(depth, outline.perimeter))
     kept = outline.polygon.buffer(-margin * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
+    if kept.is_empty:  # a sliver has no round joins to make up for
+        kept = outline.polygon.buffer(-margin)
     return kept.difference(deepest)
 
 

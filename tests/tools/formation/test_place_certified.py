@@ -139,6 +139,31 @@ def test_between(first: Outline, second: Outline, n: int, radius: float, layout:
     check(group, radius, Site({"t1": first, "t2": second}, WIDTH, HEIGHT))
 
 
+STAR = [(329, 198.5), (340.4, 216.2), (305, 238.9), (326.1, 271.7), (311, 281.5), (278.5, 231)]
+FOUND: list[tuple[list[tuple[float, float]], dict[str, object], float]] = [
+    (STAR, {"relation": "along", "side": "bottom", "robots": 4}, 0.0),
+    (
+        [(60, -20), (242, -20), (242, 344), (580, 344), (580, 500), (60, 500)],
+        {"relation": "around", "robots": 2, "fit": "tight"},
+        0.0,
+    ),
+    (
+        [(420, 500), (220, 500), (220, 300), (260, 300), (260, 450), (380, 450), (380, 300)],
+        {"relation": "centre", "robots": 4},
+        9.0,
+    ),
+]
+
+
+@pytest.mark.parametrize(("points", "group", "radius"), FOUND, ids=lambda x: str(x)[:40])
+def test_what_long_searches_found(
+    points: list[tuple[float, float]], group: dict[str, object], radius: float
+) -> None:
+    """An overhang, a ring cut in two, a centre at the picture's border."""
+    wanted = Group.model_validate(group | {"targets": ("t1",)})
+    check(wanted, radius, Site({"t1": make_outline(points)}, WIDTH, HEIGHT))
+
+
 coordinate = st.floats(-50, 700)
 
 

@@ -53,6 +53,16 @@ def test_the_energy_is_within_a_few_hundredths_of_the_least(n: int) -> None:
     assert min_spacing(points) > 0.6 * ideal_pitch(BUMPY.area, n)
 
 
+@pytest.mark.parametrize("n", [11, 13, 14, 22, 23, 24])
+def test_the_margin_is_kept_at_a_reflex_corner(n: int) -> None:
+    """Off it the edge of what is left is a chord of an arc, which must not cut the arc."""
+    turns, reach = np.arange(8) * math.pi / 4, np.full(8, 30.0)
+    reach[7] = 11.2
+    bitten = make_outline(np.stack([np.cos(turns), np.sin(turns)], axis=1) * reach[:, None] + 50)
+    points = inside(bitten, n, 5.3, math.inf, 6.0)
+    assert shapely.distance(bitten.polygon.boundary, shapely.points(points)).min() >= 5.3 - 1e-6
+
+
 @given(st.integers(3, 400), st.floats(0, 1.05))
 @settings(derandomize=True, deadline=None, max_examples=15)
 def test_the_widest_lattice_has_exactly_n_and_none_missing_inside(n: int, turn: float) -> None:

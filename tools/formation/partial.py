@@ -1,0 +1,165 @@
+"""The best that can be done where a contract cannot be met: fewer robots, or a nearer clearance.
+
+Whatever comes of it is certified by the same checker, and says of itself what it falls short of.
+"""
+
+from collections.abc import Callable
+
+from .caging import CageError, escape_proof
+from .contract import Contract, Group, with_defaults
+from .place import CapacityError, Site
+from .plan import Plan, Shortfall, make_plan
+
+ROUNDS = 60
+"""Times that robots are taken out of one group or another."""
+TENTH = 10
+"""Clearances are tried in steps of a tenth of a pixel."""
+COARSE = 5
+"""Halvings of a clearance for an escape-proof cage, each of which may take a second or more."""
+ROUND = frozenset({"around", "cage"})
+OPEN = 1000.0
+"""A greatest clearance from here on, px, only says that there is none."""
+
+
+Refusal = CapacityError | CageError
+
+
+def best_partial(
+    contract: Contract, site: Site, scene_version: str, refusal: Refusal | None
+) -> Plan | None:
+    """A certified plan that falls as little short of a contract as is known, marked as partial.
+
+    As many robots as fit; where none does, all of them at the nearest clearance to the one stated
+    that can be held. Nothing is done about a clearance that was left open.
+
+    Args:
+        contract: as stated.
+        refusal: why the robots cannot all be placed; None where they can, but not certified.
+        site: outlines of every target it names, and the picture's size.
+        scene_version: of the scene the outlines were measured in.
+
+    Returns:
+        None where nothing that is certified was found, as where a cage needs more robots.
+    """
+    if isinstance(refusal, CageError) and refusal.needed is not None:
+        return None
+    full = with_defaults(contract, site.outlines, site.room)
+
+    def attempt(smaller: Contract) -> Plan:
+        return make_plan(smaller, site, scene_version)
+
+    fewer = None if refusal is None else _fewer(full, attempt)
+    return fewer or _nearer(contract, full, attempt)
+
+
+def _fewer(full: Contract, attempt: Callable[[Contract], Plan]) -> Plan | None:
+    """As many robots as fit, group after group."""
+    smaller = full
+    for _ in range(ROUNDS):
+        try:
+            plan = attempt(smaller)
+        except (CapacityError, CageError) as error:
+            fits = error.fits
+            if fits < (3 if error.group.relation == "cage" else 1):
+                return None
+            changed = error.group.model_copy(update={"robots": fits})
+            smaller = _with(smaller, smaller.groups.index(error.group), changed)
+            continue
+        if not plan.verdict.certified or smaller == full:
+            return None
+        asked, placed = full.robots, smaller.robots
+        have = "has a place" if placed == 1 else "have places"
+        sentence = f"{placed} of the {asked} robots {have}."
+        return _marked(plan, Shortfall(asked=asked, placed=placed, sentence=sentence))
+    return None
+
+
+def _nearer(stated: Contract, full: Contract, attempt: Callable[[Contract], Plan]) -> Plan | None:
+    """All robots at the greatest clearance that can be held, of the first group it helps.
+
+    A ring that goes all the way round comes before a wider one of which the picture leaves a part.
+    """
+    for index, (said, group) in enumerate(zip(stated.groups, full.groups, strict=True)):
+        if said.clearance is None or not group.keeps_clearance:
+            continue
+        whole = _greatest(full, index, attempt, _uncut)
+        plan = whole or _greatest(full, index, attempt)
+        if plan is None:
+            continue
+        held = plan.formation.contract.groups[index]
+        sentence = (
+            f"{_span(held)} is the greatest clearance found that can be held"
+            f"{' all round' if whole and group.relation in ROUND else ''}, not {_span(group)}."
+        )
+        short = Shortfall(
+            asked=full.robots,
+            placed=full.robots,
+            clearance_asked=group.clearance,
+            clearance=held.clearance,
+            sentence=sentence,
+        )
+        return _marked(plan, short)
+    return None
+
+
+def _greatest(
+    full: Contract,
+    index: int,
+    attempt: Callable[[Contract], Plan],
+    suits: Callable[[Plan], bool] = lambda plan: True,
+) -> Plan | None:
+    """The plan at the greatest clearance of a group that certifies and suits, found by halving."""
+    group = full.groups[index]
+    assert group.clearance is not None
+    least, greatest = group.clearance
+    aim = least or greatest
+    works, fails, best = 0, int(aim * TENTH), None
+    steps = COARSE if escape_proof(group) else fails.bit_length()
+    for _ in range(steps):
+        if fails - works < 2:
+            break
+        middle = (works + fails) // 2 if best or fails < 4 else max(fails // 2, 1)
+        plan = _tried(attempt, _with(full, index, _scaled(group, middle / TENTH / aim)))
+        if plan is None or not suits(plan):
+            fails = middle
+        else:
+            works, best = middle, plan
+    return best
+
+
+def _uncut(plan: Plan) -> bool:
+    return "ring_in_picture" not in plan.verdict.measures
+
+
+def _scaled(group: Group, share: float) -> Group:
+    """The group at a share of its clearance; inside only the least one is in the way."""
+    assert group.clearance is not None
+    least, greatest = group.clearance
+    deep = greatest >= OPEN or group.relation == "inside"
+    far = greatest if deep else max(round(greatest * share, 3), 0.1)
+    return group.model_copy(update={"clearance": (round(least * share, 3), far)})
+
+
+def _tried(attempt: Callable[[Contract], Plan], contract: Contract) -> Plan | None:
+    try:
+        plan = attempt(contract)
+    except (CapacityError, CageError):
+        return None
+    return plan if plan.verdict.certified else None
+
+
+def _with(contract: Contract, index: int, group: Group) -> Contract:
+    groups = (*contract.groups[:index], group, *contract.groups[index + 1 :])
+    return contract.model_copy(update={"groups": groups})
+
+
+def _marked(plan: Plan, short: Shortfall) -> Plan:
+    return plan.model_copy(update={"partial": short})
+
+
+def _span(group: Group) -> str:
+    assert group.clearance is not None
+    least, greatest = group.clearance
+    if greatest >= OPEN or group.relation == "inside":
+        return f"{least:.1f} px or more"
+    return f"{least:.1f} to {greatest:.1f} px"
