@@ -10,6 +10,8 @@ from ..suite import Task
 from .graded import Part
 from .slots import even_along, matched
 
+OFF = 0.1
+"""Strict: how far off the target a robot stands at a corner, as a share of the tolerance."""
 EVEN = 0.25
 """Strict: how far off its even place a robot may stand along a line, as a share of a gap."""
 
@@ -37,7 +39,7 @@ def corners(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
         problems.append(f"{empty} of {len(slots)} corners without a robot within {most} px")
     if (near <= 0).any():
         problems.append(f"{int((near <= 0).sum())} on the target")
-    strictly = matched(points[stands & (near >= 1)], slots, STRICT_SHARE * most)
+    strictly = matched(points[stands & (near >= OFF * most)], slots, STRICT_SHARE * most)
     short = len(slots) - int((strictly >= 0).sum())
     strict = (f"{short} corners not held within {STRICT_SHARE * most:.0f} px",) if short else ()
     return Part(held >= 0, 1.0, tuple(problems), strict)

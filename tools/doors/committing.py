@@ -71,17 +71,21 @@ def propose_formation(
     except (CapacityError, CageError) as error:
         raise ToolError(f"{error}{_partial(workspace, held, error)}") from None
     _keep(workspace, plan)
-    exact = {t for group in contract.groups if group.clearance is not None for t in group.targets}
-    workspace.exact[plan.id] = tuple(sorted(exact))
+    exact = workspace.exact[plan.id] = _exact(contract)
     data = _proposal(workspace, plan)
     if places is None and not plan.verdict.certified:
         found = _partial(workspace, held, None)
         _keep(workspace, plan)
         data |= {"partial": found.strip()} if found else {}
-    shown = [
-        t for t in map(workspace.scene.target, held.target_ids) if doubtful(t) or t.id in exact
-    ]
+    named = map(workspace.scene.target, held.target_ids)
+    shown = [target for target in named if doubtful(target) or target.id in exact]
     return ToolResult(data, overlays(workspace, shown, plan))
+
+
+def _exact(contract: Contract) -> tuple[str, ...]:
+    """Targets to be kept a named distance from."""
+    groups = (group for group in contract.groups if group.clearance is not None)
+    return tuple(sorted({name for group in groups for name in group.targets}))
 
 
 @tool("actuate")
