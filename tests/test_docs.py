@@ -40,6 +40,7 @@ SHOWN = {
     "formup run": "deployed:",
     "formup eval suites": "zerocap15",
     "formup eval run": "chance GCR",
+    "formup prompts": "former",
 }
 """What commands print, by how they begin."""
 
