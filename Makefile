@@ -37,8 +37,11 @@ check: .venv/.ready-dev
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest -q tests/test_architecture.py
 
+# The tools, placing and checking, who takes which place, cages: each beside the bare library calls.
 bench: .venv/.ready-dev
-	$(BIN)/python -m formup.evals.bench
+	@for what in bench bench_sampling bench_assignment bench_cages; do \
+	  echo "== $$what"; $(BIN)/python -m formup.evals.$$what || exit 1; echo; \
+	done
 
 # Loops of other agent frameworks beside ours, each in an environment of its own.
 bench-loop: .venv/.ready-dev $(PEERS:%=.venv/bench/%/.ready)

@@ -15,8 +15,8 @@ from scipy.spatial import cKDTree
 from ..tools.formation.check import certify
 from ..tools.formation.contract import Contract, Group, with_defaults
 from ..tools.formation.place import Site, place
-from ..tools.geometry.curves import ring
-from ..tools.geometry.interior import inside
+from ..tools.geometry.curves import Curve, ring
+from ..tools.geometry.interior import BRISK_STEPS, FEW, LLOYD_STEPS, inside
 from ..tools.geometry.lloyd import cells_of, grid
 from ..tools.geometry.outline import FloatArray, Outline, make_outline, nearest_segments
 from ..tools.geometry.rings import equal_chords
@@ -69,18 +69,56 @@ def _placing(outline: Outline) -> None:
     plain = make_outline(shapely.get_coordinates(outline.filled.simplify(SIZE / 200)))
     loop = ring(outline, 100, 200)
     few = len(plain.polygon.exterior.coords) - 1
-    rows: list[tuple[str, Work]] = [
-        (f"around, 8, {few} vertices", lambda: along_curve(ring(plain, 100, 200), 8)),
-        ("around, 8", lambda: along_curve(ring(outline, 100, 200), 8)),
-        ("8 on the ring alone", lambda: along_curve(loop, 8)),
-        (f"{MANY} on the ring alone", lambda: along_curve(loop, MANY)),
-        ("100 at equal chords", lambda: equal_chords(loop, 100)),
+    rows: list[tuple[str, Work, Work]] = [
+        (
+            f"around, 8, {few} vertices",
+            lambda: along_curve(ring(plain, 100, 200), 8),
+            _bare_ring(plain, 8),
+        ),
+        ("around, 8", lambda: along_curve(ring(outline, 100, 200), 8), _bare_ring(outline, 8)),
+        ("8 on the ring alone", lambda: along_curve(loop, 8), _bare_places(loop, 8)),
+        (f"{MANY} on the ring alone", lambda: along_curve(loop, MANY), _bare_places(loop, MANY)),
+        ("100 at equal chords", lambda: equal_chords(loop, 100), _bare_places(loop, 100)),
     ]
-    for name, work in rows:
-        print(f"{name:28} {_best(work):10.2f}")  # noqa: T201
+    print(f"{'placing':28} {'formup':>10} {'bare':>10}")  # noqa: T201
+    for name, work, bare in rows:
+        print(f"{name:28} {_best(work):10.2f} {_best(bare):10.2f}")  # noqa: T201
     for n in (6, 50, 100, 1000, MANY):
         ratio = energy_ratio(outline, inside(outline, n, 10, SIZE, 0.0))
-        print(f"{f'inside, {n}':28} {_best(_inside(outline, n)):10.2f}   energy {ratio:.3f}")  # noqa: T201
+        ours, theirs = _best(_inside(outline, n)), _best(_bare_lloyd(outline, n))
+        print(f"{f'inside, {n}':28} {ours:10.2f} {theirs:10.2f}   energy {ratio:.3f}")  # noqa: T201
+
+
+def _bare_ring(outline: Outline, n: int) -> Work:
+    """The region grown, and places on its edge, without a bay bridged or a phase chosen."""
+
+    def work() -> object:
+        line = outline.filled.buffer(100).exterior
+        return shapely.line_interpolate_point(line, np.arange(n) * line.length / n)
+
+    return work
+
+
+def _bare_places(loop: Curve, n: int) -> Work:
+    line = shapely.LineString(loop.lines[0])
+    return lambda: shapely.line_interpolate_point(line, np.arange(n) * line.length / n)
+
+
+def _bare_lloyd(outline: Outline, n: int) -> Work:
+    """As many plain steps of Lloyd's iteration as one start gets, from random places."""
+    cells = cells_of(outline.polygon, n)
+    first = np.random.default_rng(0).choice(cells, n, replace=False)
+
+    def work() -> object:
+        points = first
+        for _ in range(LLOYD_STEPS if n <= FEW else BRISK_STEPS):
+            index = cKDTree(points).query(cells)[1]
+            size = np.maximum(np.bincount(index, minlength=n), 1)
+            sums = [np.bincount(index, weights=x, minlength=n) for x in cells.T]
+            points = np.stack(sums, axis=1) / size[:, None]
+        return points
+
+    return work
 
 
 def _inside(outline: Outline, n: int) -> Work:

@@ -107,6 +107,8 @@ def without(
         if len(other.points)
     ]
     try:
-        return outline_of(outline.polygon.difference(shapely.union_all(discs)))
+        return outline_of(
+            outline.polygon.difference(shapely.union_all(np.asarray(discs, dtype=object)))
+        )
     except InputError:
         return None

@@ -4,7 +4,7 @@ Each relation has one reference (a curve, corners, a region, a point) that the c
 measures against. Frame: image pixels, x right, y down.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -38,12 +38,17 @@ square root of 2 in a right-angled reflex one."""
 DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
 
 
-def place(contract: Contract, site: Site) -> FloatArray:
+Sound = Callable[[Group, FloatArray], bool]
+"""Whether a group alone is certified at some places."""
+
+
+def place(contract: Contract, site: Site, sound: Sound = lambda group, points: True) -> FloatArray:
     """Positions of all robots, groups in order, (N, 2).
 
     Args:
         contract: with its defaults written out.
         site: the outlines of every target named, and the picture.
+        sound: asked where a group has to be placed otherwise than it would be alone.
 
     Raises:
         CapacityError: a group has more robots than fit; its `fits` says how many do.
@@ -55,7 +60,10 @@ def place(contract: Contract, site: Site) -> FloatArray:
     for group in contract.groups:
         stand = Stand(group, _place_group(group, site, contract.robot_radius))
         clash = conflict(stand, stands)
-        stands.append(stand if clash is None else _elsewhere(group, stands, clash, contract, site))
+        if clash is not None:
+            others = _otherwise(group, stands, site, contract.robot_radius)
+            stand = _elsewhere(others, group, stands, clash, sound)
+        stands.append(stand)
     return np.concatenate([stand.points for stand in stands])
 
 
@@ -142,20 +150,21 @@ def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
 
 
 def _elsewhere(
+    places: Iterator[FloatArray],
     group: Group,
     earlier: list[Stand],
     clash: tuple[int, float, float],
-    contract: Contract,
-    site: Site,
+    sound: Sound,
 ) -> Stand:
     """The group's robots at other places, clear of those placed before.
 
     Raises:
         CrowdedError: none were found.
     """
-    for points in _otherwise(group, earlier, site, contract.robot_radius):
+    for points in places:
         stand = Stand(group, points)
-        if len(points) == group.robots and conflict(stand, earlier) is None:
+        full = len(points) == group.robots
+        if full and conflict(stand, earlier) is None and sound(group, points):
             return stand
     index, apart, least = clash
     raise CrowdedError(index + 1, len(earlier) + 1, apart, least)

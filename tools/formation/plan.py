@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model
 from ..errors import ToolError
 from ..geometry.outline import FloatArray
 from .check import certify
-from .contract import Contract, with_defaults
+from .contract import Contract, Group, with_defaults
 from .place import Site, place
 from .verdict import Verdict
 
@@ -115,7 +115,11 @@ def make_plan(
         ToolError: the positions are no pairs, or none were given and the contract cannot be met.
     """
     full = with_defaults(contract, site.outlines, site.room)
-    points = place(full, site) if positions is None else np.asarray(positions, dtype=float)
+
+    def sound(group: Group, places: FloatArray) -> bool:
+        return certify(places, full.model_copy(update={"groups": (group,)}), site).certified
+
+    points = place(full, site, sound) if positions is None else np.asarray(positions, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2:
         raise ToolError(f"Positions must be (x, y) pairs, shape (N, 2); got {points.shape}.")
     rounded = np.round(points, DECIMALS) + 0.0  # + 0.0: no negative zeros

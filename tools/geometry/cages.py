@@ -8,6 +8,7 @@ that compares gaps with the object's least width is used: it is wrong for shapes
 import math
 from collections import deque
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -74,7 +75,7 @@ def cage(
         escapes: whether to look for a way out, which takes longer than proving that there is none.
     """
     points = np.asarray(robots, dtype=float).reshape(-1, 2)
-    filled = Polygon(region.exterior)
+    filled = Polygon(region.exterior) if region.interiors else region
     centre, depth = _inscribed_disc(filled)
     between = widest_link(points, centre) if walls is None else None
     gap = None
@@ -83,8 +84,7 @@ def cage(
     known = (2 * depth, gap, between)
     if not len(points):
         return Cage("not certified", None, *known)
-    apart = shapely.distance(filled, shapely.points(points)) - radius
-    if (apart <= 0).any():
+    if shapely.dwithin(filled, shapely.multipoints(points), radius):
         return Cage("not certified", None, *known)
     if gap is not None and gap < 2 * depth * (1 - MARGIN):
         return Cage("caged", "disc", *known)
@@ -97,6 +97,7 @@ def cage(
     return Cage("not certified" if found.path is None else "escape", None, *known, found.path)
 
 
+@lru_cache(maxsize=16)  # one thing is put in many cages before the best of them is found
 def _inscribed_disc(region: Polygon) -> tuple[FloatArray, float]:
     """Centre and radius of a greatest inscribed disc; the radius holds for that very centre."""
     with np.errstate(all="ignore"):  # GEOS on denormal coordinates
@@ -131,8 +132,8 @@ def widest_link(points: FloatArray, centre: FloatArray) -> tuple[int, int] | Non
     near: list[list[int]] = [[] for _ in points]
     for (i, j), angle in zip(links.tolist(), angles, strict=True):
         if abs(forest.join(i, j, angle)) > math.pi:
-            loop = Polygon(points[_way(near, i, j)])
-            if loop.is_valid and shapely.contains_xy(loop, *centre):
+            loop = shapely.polygons(points[_way(near, i, j)])
+            if shapely.is_valid(loop) and shapely.contains_xy(loop, *centre):
                 return i, j
         near[i].append(j)
         near[j].append(i)
@@ -173,8 +174,8 @@ def _links(points: FloatArray) -> NDArray[np.intp]:
     ends = shapely.get_coordinates(edges)
     index = {(x, y): i for i, (x, y) in enumerate(points.tolist())}
     links = np.array([index[x, y] for x, y in ends.tolist()], dtype=np.intp).reshape(-1, 2)
-    length = np.linalg.norm(points[links[:, 1]] - points[links[:, 0]], axis=1)
-    return links[np.argsort(length, kind="stable")]
+    across = ends[1::2] - ends[::2]
+    return links[np.argsort((across * across).sum(axis=1), kind="stable")]
 
 
 def _way(near: list[list[int]], start: int, end: int) -> list[int]:

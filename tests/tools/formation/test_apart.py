@@ -57,7 +57,7 @@ def test_a_group_that_is_in_nobodys_way_stands_as_if_alone() -> None:
 
 
 def test_where_there_is_no_room_for_both_it_is_said_which() -> None:
-    ring_of = {"relation": "around", "robots": 26, "clearance": (20, 20)}
+    ring_of: dict[str, object] = {"relation": "around", "robots": 26, "clearance": (20, 20)}
     with pytest.raises(CrowdedError, match=r"group 1 and of group 2.*20.0 px or more") as caught:
         planned(10, ring_of, ring_of)
     assert "another clearance" in str(caught.value)
