@@ -150,7 +150,7 @@ def _plan(outcome: Outcome, workspace: Workspace) -> Plan | None:
 
 def _named(messages: History) -> str | None:
     """The plan that the report which closed the run names."""
-    last = messages[-1]
+    last = messages[-1] if messages else None  # none where a run was killed before its first
     if not isinstance(last, Result) or last.name != "report_impossible" or last.error:
         return None
     calls = [c for m in messages if isinstance(m, Reply) for c in m.calls]
