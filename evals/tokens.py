@@ -36,7 +36,7 @@ def spent(messages: History, system: str = "", tools: Sequence[Tool] = ()) -> Sp
         system: the prompt that every request began with.
         tools: those every request offered.
     """
-    offered = [{"name": t.name, "description": t.description, "schema": t.schema} for t in tools]
+    offered = [{"name": t.name, "description": t.description, "schema": t.offered} for t in tools]
     sent = text_tokens(system) + (text_tokens(_json(offered)) if tools else 0)
     requests, paid, output = 0, 0, 0
     for message in messages:

@@ -10,6 +10,11 @@ from typing import Any, cast
 
 from pydantic import BaseModel
 
+BOUNDS = frozenset(
+    f"{which}{what}" for which in ("min", "max") for what in ("imum", "Items", "Length")
+) | {"additionalProperties", "pattern"}
+"""What a schema says of values that descriptions say as well, or an answer does in good time."""
+
 
 def compact_schema(model: type[BaseModel]) -> dict[str, Any]:
     """A model's schema (draft 2020-12), which accepts all that the model's own does but nulls."""
@@ -42,4 +47,19 @@ def _compact(node: Any, once: Mapping[str, Any]) -> Any:
             made = _compact(given, once) | made
         elif not (key == "title" or (key == "default" and value in (None, [], ""))):
             made[key] = _compact(value, once)
+    return made
+
+
+def without_bounds(node: Any) -> Any:
+    """A schema as models are offered it: with every name, kind and choice, without BOUNDS."""
+    if isinstance(node, list):
+        return [without_bounds(item) for item in cast("list[Any]", node)]
+    if not isinstance(node, dict):
+        return node
+    made: dict[str, Any] = {}
+    for key, value in cast("dict[str, Any]", node).items():
+        if key in ("properties", "$defs"):  # here keys are names of their own
+            made[key] = {name: without_bounds(kind) for name, kind in value.items()}
+        elif key not in BOUNDS:
+            made[key] = without_bounds(value)
     return made

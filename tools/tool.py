@@ -18,7 +18,7 @@ from typing import Any, Literal, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .errors import ArgumentsError
-from .schema import compact_schema
+from .schema import compact_schema, without_bounds
 from .workspace import Workspace
 
 Kind = Literal["read", "commit", "actuate", "ask", "end"]
@@ -66,6 +66,11 @@ class Tool:
     def schema(self) -> dict[str, Any]:
         """JSON Schema of the arguments (draft 2020-12)."""
         return compact_schema(self.arguments)
+
+    @property
+    def offered(self) -> dict[str, Any]:
+        """The schema as models read it, in fewer words: what it leaves out, `parse` says."""
+        return without_bounds(self.schema)
 
     def parse(self, arguments: Mapping[str, Any]) -> BaseModel:
         """Validated arguments.

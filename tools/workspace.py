@@ -23,8 +23,9 @@ from .geometry.outline import FloatArray, Outline, distances
 from .perception.attributes import Candidate
 from .perception.candidates import find_candidates, segment_candidate
 from .perception.contours import outline_of_mask
+from .perception.drawn import straightened
 from .perception.prompts import Point, TargetPrompt
-from .perception.segmenters import segmenter_named
+from .perception.segmenters import segmenter_named, visible_vertices
 from .scene import Scene, Target
 
 Descriptor = Literal["edges", "edges+vertices", "matrix"]
@@ -84,7 +85,7 @@ class Workspace:
         pointed: what the person pointed at, in order t1, t2, ...
         instruction: the person's words, if there are any.
         samples: positions kept by the sampling tools under s1, s2, ...
-        exact: targets to be kept a named distance from, by plan id.
+        unseen: by plan id, targets whose outlines are to be looked at before robots move.
         doubted: what was found last with too little confidence, for a person to look at.
         found: what was found in the picture, once somebody has asked.
         arrivals: by plan id, what was observed after a deployment, and the way there.
@@ -97,7 +98,7 @@ class Workspace:
     plans: dict[str, Plan] = field(default_factory=dict[str, Plan])
     samples: dict[str, FloatArray] = field(default_factory=dict[str, FloatArray])
     doubted: Target | None = None
-    exact: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+    unseen: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     found: tuple[Candidate, ...] | None = None
     arrivals: dict[str, Arrival] = field(default_factory=dict[str, Arrival])
     frames: dict[str, list[FloatArray]] = field(default_factory=dict[str, list[FloatArray]])
@@ -111,7 +112,7 @@ class Workspace:
     def copy(self) -> "Workspace":
         """One to work on that leaves this one as it is."""
         made = copy(self)
-        for name in ("plans", "samples", "arrivals", "frames", "exact"):
+        for name in ("plans", "samples", "arrivals", "frames", "unseen"):
             setattr(made, name, dict(getattr(self, name)))
         return made
 
@@ -181,7 +182,11 @@ class Workspace:
         segmenter, pixels = segmenter_named(self.settings.segmenter), self.scene.picture.pixels
         if prompt.candidate is None:
             found = segmenter.run(pixels, prompt)
-            return outline_of_mask(found.mask), found.confidence, found.parts
+            outline = outline_of_mask(found.mask)
+            if prompt.straight and prompt.outline is not None:
+                seen = visible_vertices(prompt.outline, *self.scene.picture.size)
+                outline = straightened(outline, seen)
+            return outline, found.confidence, found.parts
         candidate = self.candidate(prompt.candidate)
         return segment_candidate(lambda p: segmenter.run(pixels, p), candidate)
 
@@ -209,8 +214,8 @@ class Workspace:
         plan = self.plans[plan_id]
         if plan.formation.scene_version != self.scene.version:
             raise ToolError(
-                f"The scene has changed since plan {plan_id} was certified, which voids it: "
-                "propose the formation again."
+                f"Plan {plan_id} is void: what it is about was measured again since. Deploy one "
+                "proposed since, or propose this one again, with the outline it had."
             )
         return plan
 

@@ -224,7 +224,7 @@ def _marked(blocks: bytes) -> bytes:
 @lru_cache(maxsize=16)
 def _tools(tools: tuple[Tool, ...], marked: bool) -> bytes:
     listed = [
-        {"name": t.name, "description": t.description, "input_schema": t.schema} for t in tools
+        {"name": t.name, "description": t.description, "input_schema": t.offered} for t in tools
     ]
     written = b",".join(dumped(tool) for tool in listed)
     return _marked(written) if marked else written

@@ -295,7 +295,7 @@ def _image(image: bytes) -> dict[str, Any]:
 @lru_cache(maxsize=16)
 def _tools(tools: tuple[Tool, ...]) -> bytes:
     declared = [
-        {"name": t.name, "description": t.description, "parametersJsonSchema": t.schema}
+        {"name": t.name, "description": t.description, "parametersJsonSchema": t.offered}
         for t in tools
     ]
     return dumped([{"functionDeclarations": declared}])

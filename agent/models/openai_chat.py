@@ -289,6 +289,6 @@ def _system(text: str) -> bytes:
 @lru_cache(maxsize=16)
 def _tools(tools: tuple[Tool, ...]) -> bytes:
     functions = [
-        {"name": t.name, "description": t.description, "parameters": t.schema} for t in tools
+        {"name": t.name, "description": t.description, "parameters": t.offered} for t in tools
     ]
     return dumped([{"type": "function", "function": function} for function in functions])

@@ -239,7 +239,7 @@ def _tools(tools: tuple[Tool, ...]) -> bytes:
             "type": "function",
             "name": t.name,
             "description": t.description,
-            "parameters": t.schema,
+            "parameters": t.offered,
             # The schemas have optional parameters, which strict mode does not know.
             "strict": False,
         }

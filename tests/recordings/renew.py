@@ -6,6 +6,7 @@ ended before and now: replies that no longer fit have to be given anew by somebo
 """
 
 import json
+import re
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,6 +17,7 @@ from formup.agent.model import Request
 from formup.agent.models.replay import ReplayModel
 from formup.agent.trace import Trace, read_trace
 from formup.evals.suite import load_tasks, photos_folder
+from formup.tools.errors import ModelError
 from formup.tools.perception.image import load_picture
 from formup.tools.workspace import Settings
 
@@ -23,22 +25,32 @@ DRAWN = Path(__file__).parent / "injected" / "images"
 TASKS = {t.id: t for t in (*load_tasks(), *load_tasks(photos_folder() / "many.json"))}
 
 
+PLAN = re.compile(r"p-[0-9a-f]{10}")
+
+
 class Spoken(ReplayModel):
-    """The recorded replies in turn, without a look at what is said in between."""
+    """The recorded replies in turn, whatever is said in between; plans go by their new ids."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        lines = read_trace(path).of_type("message")
-        fields = set(Reply.model_fields)
-        self._replies = iter(
-            Reply.model_validate({k: v for k, v in line.items() if k in fields})
-            for line in lines
-            if line["role"] == "assistant"
-        )
+        self._said = read_trace(path).of_type("message")
 
     async def reply(self, request: Request) -> Reply:
-        """The next one."""
-        return next(self._replies)
+        """The next one.
+
+        Raises:
+            ModelError: there is none.
+        """
+        count = len(request.messages)
+        if count >= len(self._said) or self._said[count]["role"] != "assistant":
+            raise ModelError("The recorded replies fit no more.")
+        named = {
+            old: new
+            for then, now in zip(self._said, request.messages, strict=False)
+            for old, new in zip(PLAN.findall(then["text"]), PLAN.findall(now.text), strict=False)
+        }
+        line = json.dumps({k: v for k, v in self._said[count].items() if k in Reply.model_fields})
+        return Reply.model_validate_json(PLAN.sub(lambda m: named.get(m[0], m[0]), line))
 
 
 def renewed(path: Path, written: Path) -> Trace:

@@ -16,6 +16,9 @@ from formup.tools.workspace import Settings, Workspace
 
 TARGET = {"id": "t1", "label": "the box", "box": [55, 35, 125, 95]}
 
+DRAWN = [[60, 40], [119, 40], [119, 60], [150, 65], [119, 70], [119, 89], [60, 89]]
+MENDED = {"id": "t1", "label": "the box", "outline": DRAWN, "points": [[140, 65]]}
+
 
 def workspace(instruction: str = "", **settings: Any) -> Workspace:
     """A red 60 x 50 rectangle at (60, 40) on grey."""
@@ -88,10 +91,13 @@ def test_a_doubtful_outline_must_be_looked_at_before_robots_move() -> None:
     assert target.confidence > CLEAR
     assert made.images == ()
     work.scene = replace(work.scene, targets=(replace(target, confidence=CLEAR - 0.01),))
-    again = propose(work, targets=[])
+    again = propose(work, robots=5, targets=[])
     assert len(again.images) == 1
-    with pytest.raises(ToolError, match=r"confidence 0\.69.*outline shown"):
-        answer(work, "deploy", tell="done")
+    held = answer(work, "deploy", tell="done")
+    assert held.data["deployed"] is False
+    assert "t1 was measured with confidence 0.69. If the outline shown follows" in held.data["why"]
+    assert held.told is None
+    assert work.arrivals == {}
     assert answer(work, "deploy", plan_id=again.data["plan_id"]).data["arrived"]
 
 
@@ -151,23 +157,36 @@ def test_where_a_distance_is_named_the_outline_is_seen_first() -> None:
     made = answer(work, "propose_formation", contract={"groups": groups}, targets=[TARGET])
     assert made.data["certified"]
     assert len(made.images) == 1
-    with pytest.raises(ToolError, match="t1 is to be kept a named distance from") as held:
-        answer(work, "deploy", tell="They stand.")
-    assert made.data["plan_id"] in str(held.value)
+    held = answer(work, "deploy", tell="They stand.")
+    assert held.told is None
+    assert "t1 is to be kept a named distance from" in held.data["why"]
+    assert f"within about 2 px, deploy plan_id {made.data['plan_id']}" in held.data["why"]
     assert work.arrivals == {}
     assert answer(work, "deploy", plan_id=made.data["plan_id"], tell="They stand.").told
 
 
+def test_a_plan_that_was_shown_and_is_proposed_again_may_be_deployed_at_once() -> None:
+    work = workspace()
+    groups = [{"relation": "around", "targets": ["t1"], "robots": 6, "clearance": [9, 9]}]
+    first = answer(work, "propose_formation", contract={"groups": groups}, targets=[TARGET])
+    other = answer(work, "propose_formation", contract={"groups": groups}, targets=[MENDED])
+    assert other.data["plan_id"] != first.data["plan_id"]
+    with pytest.raises(ToolError, match=r"is void: what it is about was measured again since"):
+        answer(work, "deploy", plan_id=first.data["plan_id"])
+    again = answer(work, "propose_formation", contract={"groups": groups}, targets=[TARGET])
+    assert again.data["plan_id"] == first.data["plan_id"]
+    assert again.images == ()
+    assert answer(work, "deploy", tell="They stand.").data["arrived"]
+
+
 def test_what_was_drawn_and_is_left_out_holds_a_deployment_back() -> None:
     work = workspace()
-    drawn = [[60, 40], [119, 40], [119, 60], [150, 65], [119, 70], [119, 89], [60, 89]]
-    outlined = {"id": "t1", "outline": drawn}
+    outlined = {"id": "t1", "outline": DRAWN}
     made = propose(work, targets=[outlined])
     assert made.data["targets"][0]["leaves_out_your_vertices"] == ((150.0, 65.0),)
     assert len(made.images) == 1
-    with pytest.raises(ToolError, match=r"leaves out your \(150, 65\) by 1\d px"):
-        answer(work, "deploy")
+    assert "t1 as measured leaves out your (150, 65) by 1" in answer(work, "deploy").data["why"]
     assert answer(work, "deploy", plan_id=made.data["plan_id"]).data["arrived"]
-    clear = propose(workspace(), targets=[outlined | {"outline": drawn[:3] + drawn[4:]}])
+    clear = propose(workspace(), targets=[outlined | {"outline": DRAWN[:3] + DRAWN[4:]}])
     assert "leaves_out_your_vertices" not in clear.data["targets"][0]
     assert clear.images == ()

@@ -9,7 +9,7 @@ from ..fleet.deploy import Arrival
 from ..fleet.deploy import deploy as drive
 from ..fleet.simulated import SimulatedFleet
 from ..formation.caging import CageError
-from ..formation.contract import Contract, Group
+from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
 from ..formation.partial import Refusal, best_partial
 from ..formation.place import CapacityError
 from ..formation.plan import Plan, make_plan
@@ -25,6 +25,8 @@ MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
 EXACT_SHARE, EXACT_PX = 0.05, 1.0
 """How exactly a clearance the person fixed is held."""
+SLACK_SHARE, SLACK_PX = 0.25, 2.0
+"""How far off an outline may be, as a share of the distance kept from it, and at least."""
 SHOW_PARTIAL = "To show it to the person, pass its plan_id to report_impossible."
 """Ends the answer to what cannot be met in full; for a model, not for the person."""
 
@@ -71,21 +73,22 @@ def propose_formation(
     except (CapacityError, CageError) as error:
         raise ToolError(f"{error}{_partial(workspace, held, error)}") from None
     _keep(workspace, plan)
-    exact = workspace.exact[plan.id] = _exact(contract)
+    unseen = workspace.unseen[plan.id] = _unseen(workspace, plan, contract)
     data = _proposal(workspace, plan)
     if places is None and not plan.verdict.certified:
         found = _partial(workspace, held, None)
         _keep(workspace, plan)
         data |= {"partial": found.strip()} if found else {}
-    named = map(workspace.scene.target, held.target_ids)
-    shown = [target for target in named if doubtful(target) or target.id in exact]
-    return ToolResult(data, overlays(workspace, shown, plan))
+    return ToolResult(data, overlays(workspace, map(workspace.scene.target, unseen), plan))
 
 
-def _exact(contract: Contract) -> tuple[str, ...]:
-    """Targets to be kept a named distance from."""
-    groups = (group for group in contract.groups if group.clearance is not None)
-    return tuple(sorted({name for group in groups for name in group.targets}))
+def _unseen(workspace: Workspace, plan: Plan, contract: Contract) -> tuple[str, ...]:
+    """Targets whose outlines have to be seen before robots move: none of a plan shown before."""
+    if plan.id in workspace.unseen:
+        return ()
+    measured_from = {n for g in contract.groups if g.clearance is not None for n in g.targets}
+    named = map(workspace.scene.target, contract.target_ids)
+    return tuple(t.id for t in named if doubtful(t) or t.id in measured_from)
 
 
 @tool("actuate")
@@ -109,8 +112,8 @@ async def deploy(
         )
     if not workspace.settings.may_deploy:
         raise ToolError("The person asked for the plan only: nothing may be moved.")
-    if plan_id is None:
-        _check_clear(workspace, plan)
+    if plan_id is None and (held_back := _held_back(workspace, plan)):
+        return ToolResult({"deployed": False, "why": held_back})
     plan_id = plan.id
     site = workspace.scene.site(plan.formation.contract)
     fleet = workspace.fleet_for(plan.formation.contract, site)
@@ -181,17 +184,19 @@ def _partial(workspace: Workspace, held: Contract, refusal: Refusal | None) -> s
     return f" Plan {plan.id} is certified as partial: {plan.partial.sentence} {SHOW_PARTIAL}"
 
 
-def _check_clear(workspace: Workspace, plan: Plan) -> None:
-    """A plan nobody has looked at may be deployed only about things that were measured clearly."""
-    for name in plan.formation.contract.target_ids:
-        target = workspace.scene.target(name)
-        if doubtful(target) or name in workspace.exact.get(plan.id, ()):
-            raise ToolError(
-                f"Not deployed yet: {name} {_doubt(target)}. If the outline shown follows the "
-                f"thing meant, deploy plan_id {plan.id} (with tell). Else propose again with a "
-                "closer outline, with a point on what is left out beside it, or with negative "
-                "points on what is not part of it."
+def _held_back(workspace: Workspace, plan: Plan) -> str:
+    """Why a plan that nobody has looked at does not go ahead yet; nothing where it may."""
+    unseen = workspace.unseen.get(plan.id, plan.formation.contract.target_ids)
+    for target in map(workspace.scene.target, unseen):
+        if plan.id in workspace.unseen or doubtful(target):
+            return (
+                f"{target.id} {_doubt(target)}. If the outline shown follows the thing meant to "
+                f"within about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with "
+                "tell). Else propose again: with a closer outline, or with the same one and, "
+                "where the one shown leaves yours, points (on the thing) or negative points "
+                "(off it): there yours is taken."
             )
+    return ""
 
 
 def _doubt(target: Target) -> str:
@@ -204,6 +209,13 @@ def _doubt(target: Target) -> str:
     places = zip(target.missed, away, strict=True)
     left = ", ".join(f"({x:g}, {y:g}) by {px:.0f} px" for (x, y), px in places)
     return f"as measured leaves out your {left}, which has so much less clearance"
+
+
+def _slack(plan: Plan, name: str) -> float:
+    """How far off an outline may be without harm, px: a quarter of the distance to be kept."""
+    groups = (g for g in plan.formation.contract.groups if name in g.targets)
+    kept = [nominal(g.clearance) for g in groups if g.clearance is not None]
+    return max(SLACK_SHARE * min(kept, default=MIN_CLEARANCE), SLACK_PX)
 
 
 def _told(tell: str | None, arrival: Arrival) -> str | None:

@@ -162,6 +162,7 @@ def segment(
     points: tuple[Point, ...] | None = None,
     negative: tuple[Point, ...] = (),
     outline: tuple[Point, ...] | None = None,
+    straight: bool = False,
 ) -> ToolResult:
     """Measure the exact outline of one thing; needs an outline, box, points or a candidate.
 
@@ -175,6 +176,7 @@ def segment(
         points: points (x, y) on it, px; beside an outline or box they correct it.
         negative: points (x, y) that are not part of it, px.
         outline: rough outline, 3 to 30 vertices (x, y) in order around it, px; the surest way.
+        straight: whether the outline's sides are straight lines between its vertices.
     """
     prompt = parse_prompt(
         {
@@ -185,6 +187,7 @@ def segment(
             "points": points,
             "negative": negative,
             "outline": outline,
+            "straight": straight,
         }
     )
     target = measured(workspace, prompt)

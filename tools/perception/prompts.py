@@ -44,6 +44,10 @@ class TargetPrompt(BaseModel):
         description="Rough outline, 3 to 30 vertices (x, y) in order, px; the surest way",
     )
 
+    straight: bool = Field(
+        default=False, description="outline: its sides are straight lines between the vertices"
+    )
+
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         leading = [self.candidate, self.box, self.outline]
@@ -54,6 +58,8 @@ class TargetPrompt(BaseModel):
             raise ValueError("give one of candidate, box and outline")
         if self.candidate is not None and (self.points or self.negative):
             raise ValueError("a candidate takes no points; give an outline of yours instead")
+        if self.straight and self.outline is None:
+            raise ValueError("straight belongs to an outline")
         return self
 
     @property

@@ -130,20 +130,10 @@ def segment_outline(
     regions = [gc.polygon_region(v, window.shape) for v in (drawn, *_moved_outlines(drawn))]
     cores = [_eroded(region) for region in regions]
     trimaps = [
-        _pinned(window, gc.trimap(region, _dilated(region), core), regions[0], on, off)
+        pin(window.features, gc.trimap(region, _dilated(region), core), on, off)
         for region, core in zip(regions, cores, strict=True)
     ]
     return _segment(_Prompt(window, trimaps, regions[0], cores[0], on, box, drawn=True))
-
-
-def _pinned(window: Window, labels: Bytes, drawn: Mask, on: Points, off: Points) -> Bytes:
-    """`pin`, but around points within the drawn outline nothing beyond it is surely the thing."""
-    pinned = pin(window.features, labels, on, off)
-    columns, rows = np.round(on).astype(int).T
-    if on.size and drawn[rows, columns].all():
-        beyond = (pinned == cv2.GC_FGD) & (labels != cv2.GC_FGD) & ~drawn
-        pinned[beyond] = labels[beyond]
-    return pinned
 
 
 def segment_points(

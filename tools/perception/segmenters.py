@@ -1,6 +1,6 @@
 """The segmenters by name: a prompt and a picture go in, a mask and its confidence come out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +9,9 @@ from shapely.geometry import Polygon
 
 from ..errors import InputError
 from ..geometry.outline import largest_part
-from .prompts import TargetPrompt
-from .segment import Segmentation, segment_box, segment_outline, segment_points
+from .drawn import segment_mended
+from .prompts import Point, TargetPrompt
+from .segment import Segmentation, segment_box, segment_points
 
 Pixels = NDArray[np.uint8]
 
@@ -40,15 +41,20 @@ def segmenter_named(name: str) -> Segmenter:
     return SEGMENTERS[name]
 
 
+def visible_vertices(outline: Sequence[Point], width: int, height: int) -> list[Point]:
+    """The vertices of what lies in the picture of an outline that was drawn."""
+    frame = Polygon([(0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)])
+    visible = largest_part(Polygon(outline).intersection(frame))
+    assert visible is not None  # TargetPrompt.problems was asked before
+    return [(float(x), float(y)) for x, y in visible.exterior.coords[:-1]]
+
+
 def _grabcut(pixels: Pixels, prompt: TargetPrompt) -> Segmentation:
     height, width = pixels.shape[:2]
     positive, negative = prompt.points or (), prompt.negative
     if prompt.outline is not None:
-        frame = Polygon([(0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)])
-        visible = largest_part(Polygon(prompt.outline).intersection(frame))
-        assert visible is not None  # TargetPrompt.problems was asked before
-        vertices = [(float(x), float(y)) for x, y in visible.exterior.coords[:-1]]
-        return segment_outline(pixels, vertices, positive=positive, negative=negative)
+        vertices = visible_vertices(prompt.outline, width, height)
+        return segment_mended(pixels, vertices, positive=positive, negative=negative)
     if prompt.box is not None:
         x0, y0, x1, y1 = prompt.box
         box = (max(x0, 0.0), max(y0, 0.0), min(x1, width - 1.0), min(y1, height - 1.0))

@@ -161,7 +161,7 @@ def test_gemini() -> None:
         {"functionResponse": {"id": "b c", "name": "functions.x", "response": {"error": "no"}}},
     ]
     declared = [
-        {"name": t.name, "description": t.description, "parametersJsonSchema": t.schema}
+        {"name": t.name, "description": t.description, "parametersJsonSchema": t.offered}
         for t in TOOLS[:2]
     ]
     assert sent == {
