@@ -67,6 +67,7 @@ class Row:
     message: str
     requests: int
     input_tokens: int
+    cached_tokens: int
     output_tokens: int
 
 
@@ -179,6 +180,7 @@ def _row(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) ->
         message=report.message,
         requests=cost.requests,
         input_tokens=cost.input,
+        cached_tokens=cost.cached,
         output_tokens=cost.output,
     )
 

@@ -2,7 +2,8 @@
 
 Text: four characters a token, a rule of thumb that leaves no provider's tokenizer out. Pictures: as
 Anthropic bills them, width times height / 750 after the long side is brought down to 1,568 px
-(their guide to vision, 2026). Every request is paid whole: caches are left out.
+(their guide to vision, 2026). Every request is paid whole, or with its prompt and tools at the
+tenth that is paid for what the cache holds.
 """
 
 import json
@@ -17,15 +18,22 @@ from ..agent.messages import History, Reply, Result, User
 from ..tools.tool import Tool
 
 CHARACTERS, PIXELS, LONG = 4, 750, 1568
+CACHED, CACHEABLE = 0.1, 1024
+"""Price of a token read from the cache, and the shortest prefix that is kept (Anthropic, 2026)."""
 
 
 @dataclass(frozen=True)
 class Spent:
-    """Requests made, and tokens over all of them."""
+    """Requests made, and tokens over all of them.
+
+    Attributes:
+        cached: input in tokens of full price, where the prompt and the tools were in the cache.
+    """
 
     requests: int
     input: int
     output: int
+    cached: int
 
 
 def spent(messages: History, system: str = "", tools: Sequence[Tool] = ()) -> Spent:
@@ -37,14 +45,15 @@ def spent(messages: History, system: str = "", tools: Sequence[Tool] = ()) -> Sp
         tools: those every request offered.
     """
     offered = [{"name": t.name, "description": t.description, "schema": t.offered} for t in tools]
-    sent = text_tokens(system) + (text_tokens(_json(offered)) if tools else 0)
-    requests, paid, output = 0, 0, 0
+    prefix = text_tokens(system) + (text_tokens(_json(offered)) if tools else 0)
+    sent, requests, paid, output = prefix, 0, 0, 0
     for message in messages:
         size = _size(message)
         if isinstance(message, Reply):
             requests, paid, output = requests + 1, paid + sent, output + size
         sent += size
-    return Spent(requests, paid, output)
+    saved = (1 - CACHED) * prefix * requests if prefix >= CACHEABLE else 0
+    return Spent(requests, paid, output, paid - round(saved))
 
 
 def text_tokens(text: str) -> int:

@@ -30,10 +30,11 @@ def test_every_request_is_paid_whole() -> None:
     last = Reply(text="w" * 12)
     written = text_tokens('[{"name":"look","arguments":{}}]')
     begins = 10 + 10 + 5
-    assert spent((first,), "s" * 20) == Spent(0, 0, 0)
-    assert spent((first, reply), "s" * 20) == Spent(1, begins, 2 + written)
+    assert spent((first,), "s" * 20) == Spent(0, 0, 0, 0)
+    assert spent((first, reply), "s" * 20) == Spent(1, begins, 2 + written, begins)
     whole = spent((first, reply, result, last), "s" * 20)
-    assert whole == Spent(2, begins + begins + 2 + written + 20, 2 + written + 3)
+    paid = begins + begins + 2 + written + 20
+    assert whole == Spent(2, paid, 2 + written + 3, paid)  # too short a prompt to be kept
 
 
 def test_tools_are_part_of_every_request() -> None:
@@ -43,3 +44,11 @@ def test_tools_are_part_of_every_request() -> None:
     assert tools > 2500
     assert spent(twice, "", TOOLS).input == 2 * tools + spent(twice).input
     assert spent(twice, "", TOOLS).output == 2
+
+
+def test_a_prompt_in_the_cache_is_paid_a_tenth_of() -> None:
+    once = (User(text="x" * 40), Reply(text="a"))
+    whole, held = spent(once, "s" * 40_000), spent(once, "s" * 4 * 1024)
+    assert (whole.input, whole.cached) == (10_010, 1_010)
+    assert held.cached == 10 + 102
+    assert spent(once, "s" * 4 * 1023).cached == 1033

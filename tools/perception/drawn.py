@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from scipy.stats import theilslopes
 from shapely.geometry import LineString, Polygon
 
 from ..geometry.outline import FloatArray, Outline, distances, make_outline
@@ -107,7 +106,11 @@ def _along(side: FloatArray, places: FloatArray) -> FloatArray:
     middle = (share > ENDS) & (share < 1 - ENDS)
     if not middle.any() or np.ptp(share[middle]) < LEAST:
         return side
-    slope, start, *_ = theilslopes(((places - side[0]) @ normal)[middle], share[middle])
+    x, y = share[middle], ((places - side[0]) @ normal)[middle]
+    first, second = np.triu_indices(len(x), 1)
+    apart = np.abs(x[second] - x[first]) > 1e-9
+    slope = float(np.median(((y[second] - y[first])[apart]) / (x[second] - x[first])[apart]))
+    start = float(np.median(y - slope * x))
     return side + np.array([start, start + slope])[:, None] * normal
 
 
