@@ -14,6 +14,7 @@ from .formation.place import Site
 from .formation.plan import scene_version
 from .geometry.outline import Outline
 from .perception.image import Picture
+from .perception.prompts import TargetPrompt
 
 Box = tuple[float, float, float, float]
 
@@ -30,6 +31,7 @@ class Target:
         outline: measured, holes kept.
         prompt: what it was found from: point, box, outline or points.
         parts: what alpha was made of.
+        source: what it was found from, if that was an outline somebody drew.
         missed: vertices of the rough outline it was found from that lie well outside of `outline`.
     """
 
@@ -41,6 +43,7 @@ class Target:
     prompt: str
     parts: tuple[tuple[str, float], ...] = ()
     missed: tuple[tuple[float, float], ...] = ()
+    source: TargetPrompt | None = None
 
 
 @dataclass(frozen=True)

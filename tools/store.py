@@ -11,7 +11,13 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+)
 from pydantic_core import to_json
 
 from .errors import ImageError, InputError
@@ -43,6 +49,12 @@ class StoredTarget(_Value):
     missed: tuple[Point, ...] = ()
     outline: tuple[Point, ...]
     holes: tuple[tuple[Point, ...], ...]
+    source: TargetPrompt | None = None
+
+    @model_serializer(mode="wrap")
+    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without a source that there is not, as when none was kept: the digest stays the same."""
+        return {k: v for k, v in standard(self).items() if k != "source" or v is not None}
 
 
 class StoredImage(_Value):
@@ -220,6 +232,7 @@ def _stored_target(target: Target) -> StoredTarget:
         prompt=target.prompt,
         parts=dict(target.parts),
         missed=target.missed,
+        source=target.source,
         outline=tuple((float(x), float(y)) for x, y in polygon.exterior.coords[:-1]),
         holes=tuple(
             tuple((float(x), float(y)) for x, y in ring.coords[:-1]) for ring in polygon.interiors
@@ -237,4 +250,5 @@ def _target(stored: StoredTarget) -> Target:
         prompt=stored.prompt,
         parts=tuple(stored.parts.items()),
         missed=stored.missed,
+        source=stored.source,
     )

@@ -123,10 +123,13 @@ class Workspace:
     def segment(self, prompt: TargetPrompt) -> Target:
         """Find the outline of the thing pointed at and keep it as a target.
 
+        Points alone, for a target found from an outline that was drawn, correct that.
+
         Raises:
             ToolError: the prompt does not fit the picture, or the mask is not to be believed.
         """
         picture = self.scene.picture
+        prompt = self._with_outline(prompt)
         problems = prompt.problems(picture.width, picture.height)
         if problems:
             raise ToolError(" ".join(problems))
@@ -145,12 +148,25 @@ class Workspace:
             prompt=prompt.how,
             parts=tuple((name, round(value, 3)) for name, value in parts.items()),
             missed=_missed(outline, prompt),
+            source=None if prompt.outline is None else prompt,
         )
         if confidence < threshold:
             self.doubted = target
             raise ToolError(_insufficient(confidence, threshold, prompt.how))
         self.scene = self.scene.with_target(target)
         return target
+
+    def _with_outline(self, prompt: TargetPrompt) -> TargetPrompt:
+        """The prompt, with the outline that its points correct if it has no way of its own."""
+        known = next((t.source for t in self.scene.targets if t.id == prompt.id), None)
+        if prompt.how == "point" and known is not None:
+            return known.mended_by(prompt)
+        if prompt.how == "point" and prompt.points is None:
+            raise ToolError(
+                f"Negative points alone correct an outline that was drawn; {prompt.id} has none. "
+                "Give an outline, a box or points with them."
+            )
+        return prompt
 
     def threshold(self, how: str) -> float:
         """The least confidence a mask pointed at in that way is used at."""

@@ -11,6 +11,7 @@ from formup.tools.doors.seeing import CLEAR
 from formup.tools.errors import ToolError
 from formup.tools.perception.image import picture_from_array
 from formup.tools.scene import Scene
+from formup.tools.store import restore, store
 from formup.tools.tool import ToolResult
 from formup.tools.workspace import Settings, Workspace
 
@@ -160,7 +161,8 @@ def test_where_a_distance_is_named_the_outline_is_seen_first() -> None:
     held = answer(work, "deploy", tell="They stand.")
     assert held.told is None
     assert "t1 is to be kept a named distance from" in held.data["why"]
-    assert f"within about 2 px, deploy plan_id {made.data['plan_id']}" in held.data["why"]
+    assert f"within about 3 px, deploy plan_id {made.data['plan_id']}" in held.data["why"]
+    assert held.data["why"] == f"Look first: {made.data['look_first']}"
     assert work.arrivals == {}
     assert answer(work, "deploy", plan_id=made.data["plan_id"], tell="They stand.").told
 
@@ -177,6 +179,23 @@ def test_a_plan_that_was_shown_and_is_proposed_again_may_be_deployed_at_once() -
     assert again.data["plan_id"] == first.data["plan_id"]
     assert again.images == ()
     assert answer(work, "deploy", tell="They stand.").data["arrived"]
+
+
+def test_points_alone_correct_an_outline_that_was_drawn() -> None:
+    work = workspace()
+    first = propose(work, targets=[{"id": "t1", "label": "the box", "outline": DRAWN}])
+    assert "points" in first.data["look_first"]
+    mended = propose(work, targets=[{"id": "t1", "points": [[140, 65]]}])
+    assert mended.data["targets"][0]["label"] == "the box"
+    assert "leaves_out_your_vertices" not in mended.data["targets"][0]
+    at_once = propose(workspace(), targets=[MENDED])
+    assert mended.data["targets"] == at_once.data["targets"]
+    cut = propose(work, targets=[{"id": "t1", "negative": [[130, 65]]}])
+    assert cut.data["targets"][0]["area_px"] < mended.data["targets"][0]["area_px"]
+    again = restore(store(work), work.scene.picture, work.settings)
+    assert again.scene.targets == work.scene.targets
+    with pytest.raises(ToolError, match="Negative points alone correct an outline that was drawn"):
+        propose(work, targets=[{"id": "t2", "negative": [[140, 65]]}])
 
 
 def test_what_was_drawn_and_is_left_out_holds_a_deployment_back() -> None:

@@ -25,7 +25,7 @@ MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
 EXACT_SHARE, EXACT_PX = 0.05, 1.0
 """How exactly a clearance the person fixed is held."""
-SLACK_SHARE, SLACK_PX = 0.25, 2.0
+SLACK_SHARE, SLACK_PX = 0.25, 3.0
 """How far off an outline may be, as a share of the distance kept from it, and at least."""
 SHOW_PARTIAL = "To show it to the person, pass its plan_id to report_impossible."
 """Ends the answer to what cannot be met in full; for a model, not for the person."""
@@ -79,6 +79,8 @@ def propose_formation(
         found = _partial(workspace, held, None)
         _keep(workspace, plan)
         data |= {"partial": found.strip()} if found else {}
+    if plan.verdict.certified and (advice := _to_see(workspace, plan)):
+        data |= {"look_first": advice}
     return ToolResult(data, overlays(workspace, map(workspace.scene.target, unseen), plan))
 
 
@@ -112,8 +114,8 @@ async def deploy(
         )
     if not workspace.settings.may_deploy:
         raise ToolError("The person asked for the plan only: nothing may be moved.")
-    if plan_id is None and (held_back := _held_back(workspace, plan)):
-        return ToolResult({"deployed": False, "why": held_back})
+    if plan_id is None and (advice := _to_see(workspace, plan)):
+        return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
     plan_id = plan.id
     site = workspace.scene.site(plan.formation.contract)
     fleet = workspace.fleet_for(plan.formation.contract, site)
@@ -184,17 +186,16 @@ def _partial(workspace: Workspace, held: Contract, refusal: Refusal | None) -> s
     return f" Plan {plan.id} is certified as partial: {plan.partial.sentence} {SHOW_PARTIAL}"
 
 
-def _held_back(workspace: Workspace, plan: Plan) -> str:
-    """Why a plan that nobody has looked at does not go ahead yet; nothing where it may."""
+def _to_see(workspace: Workspace, plan: Plan) -> str:
+    """What has to be looked at before a plan nobody has seen is carried out, if anything."""
     unseen = workspace.unseen.get(plan.id, plan.formation.contract.target_ids)
     for target in map(workspace.scene.target, unseen):
         if plan.id in workspace.unseen or doubtful(target):
             return (
-                f"{target.id} {_doubt(target)}. If the outline shown follows the thing meant to "
-                f"within about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with "
-                "tell). Else propose again: with a closer outline, or with the same one and, "
-                "where the one shown leaves yours, points (on the thing) or negative points "
-                "(off it): there yours is taken."
+                f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
+                f"about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with tell). "
+                f"Where it does not and yours does, propose again with {target.id} and `points` "
+                "on the thing there, or `negative` ones off it; else with a closer outline."
             )
     return ""
 
@@ -202,7 +203,7 @@ def _held_back(workspace: Workspace, plan: Plan) -> str:
 def _doubt(target: Target) -> str:
     """Why a target has to be looked at."""
     if not doubtful(target):
-        return "is to be kept a named distance from, so its outline has to be seen first"
+        return "is to be kept a named distance from"
     if not target.missed:
         return f"was measured with confidence {target.confidence:.2f}"
     away = distances(target.outline.filled, np.asarray(target.missed))

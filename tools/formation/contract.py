@@ -132,8 +132,9 @@ class Group(_Frozen):
     robots: int = Field(ge=1, le=MAX_ROBOTS, description="How many of the robots.")
     clearance: Annotated[tuple[Length, Length], _numbers(2)] | None = Field(
         default=None,
-        description="Least and greatest distance from the outline to a robot's edge, px; only "
-        "where the person named a length: 15 px away is [15, 15], at least 15 is [15, 1000].",
+        description="Least and greatest distance from the outline (inside: inwards) to a robot's "
+        "edge, px; only where the person named a length: 15 px away is [15, 15], at least 15 is "
+        "[15, 1000].",
     )
     fit: Fit = Field(
         default="normal",

@@ -23,6 +23,8 @@ ENDS = 0.08
 """Share of a side at each end that is not measured: corners come out rounded."""
 LEAST = 0.5
 """Where less than this share of a side was measured, the drawn one stays."""
+DRAWN = 0.5
+"""How much the drawn side counts beside the measured one."""
 SAMPLES = 120
 """Places of a side that are measured."""
 
@@ -56,11 +58,11 @@ def segment_mended(
 
 
 def straightened(outline: Outline, vertices: Sequence[Point]) -> Outline:
-    """The polygon of a drawn one's sides, each laid along the measured edge beside it.
+    """The polygon of a drawn one's sides, each midway between it and the measured edge beside it.
 
-    Every side is the Theil-Sen line (Sen 1968) of the measured edge's offsets from it, which
-    leaves out what up to 29 % of them say; where little was measured beside it the drawn side
-    stays.
+    The measured edge is taken as its Theil-Sen line (Sen 1968), which up to 29 % of it do not
+    move: who draws errs by reading, the mask by colour, and the mean of both by less than either.
+    Where little was measured beside a side, the drawn one stays.
 
     Args:
         outline: as measured.
@@ -98,7 +100,7 @@ def _discs(shape: tuple[int, int], centres: Sequence[Point], radius: float) -> M
 
 
 def _along(side: FloatArray, places: FloatArray) -> FloatArray:
-    """A drawn side, (2, 2), moved and turned to lie along places measured beside it."""
+    """A drawn side, (2, 2), moved and turned towards the line of places measured beside it."""
     way = side[1] - side[0]
     length = float(np.hypot(*way))
     normal = np.array([-way[1], way[0]]) / length
@@ -111,7 +113,7 @@ def _along(side: FloatArray, places: FloatArray) -> FloatArray:
     apart = np.abs(x[second] - x[first]) > 1e-9
     slope = float(np.median(((y[second] - y[first])[apart]) / (x[second] - x[first])[apart]))
     start = float(np.median(y - slope * x))
-    return side + np.array([start, start + slope])[:, None] * normal
+    return side + (1 - DRAWN) * np.array([start, start + slope])[:, None] * normal
 
 
 def _crossing(before: FloatArray, after: FloatArray) -> FloatArray:

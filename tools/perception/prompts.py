@@ -1,8 +1,16 @@
 """How a thing is pointed at: candidate, box, points or rough outline, checked on the picture."""
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
 from shapely.geometry import Polygon
 
 _Number = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
@@ -32,10 +40,11 @@ class TargetPrompt(BaseModel):
         default=None,
         min_length=1,
         max_length=20,
-        description="Points (x, y) on it, px; with an outline or box they correct it",
+        description="Points (x, y) on it, px; with an outline or box, or for an id measured from "
+        "an outline before, they correct it there",
     )
     negative: tuple[Point, ...] = Field(
-        default=(), max_length=20, description="Points (x, y) that are not part of it, px"
+        default=(), max_length=20, description="Points (x, y) off it, px, in the same way"
     )
     outline: tuple[Point, ...] | None = Field(
         default=None,
@@ -52,7 +61,7 @@ class TargetPrompt(BaseModel):
     def _one_way(self) -> Self:
         leading = [self.candidate, self.box, self.outline]
         given = sum(way is not None for way in leading)
-        if given == 0 and self.points is None:
+        if given == 0 and self.points is None and not self.negative:
             raise ValueError("give a candidate, a box, points or an outline")
         if given > 1:
             raise ValueError("give one of candidate, box and outline")
@@ -61,6 +70,17 @@ class TargetPrompt(BaseModel):
         if self.straight and self.outline is None:
             raise ValueError("straight belongs to an outline")
         return self
+
+    @model_serializer(mode="wrap")
+    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `straight` where it says nothing, as before there was such a word."""
+        return {k: v for k, v in standard(self).items() if k != "straight" or v}
+
+    def mended_by(self, later: "TargetPrompt") -> "TargetPrompt":
+        """This outline, corrected by another prompt's points as well."""
+        points = (*(self.points or ()), *(later.points or ()))
+        update = {"points": points or None, "negative": self.negative + later.negative}
+        return self.model_copy(update=update | ({"label": later.label} if later.label else {}))
 
     @property
     def how(self) -> str:
