@@ -18,6 +18,7 @@ from ..evals.pointed import JITTERED, Mode, Row, as_json, evaluate, mode_named, 
 from ..evals.scenes.build import write_scenes
 from ..evals.suite import Task, load_tasks
 from ..prompts import PromptLibrary
+from ..tools.errors import InputError
 from ..tools.store import write_whole
 from . import compare, inputs, report
 from . import options as o
@@ -141,6 +142,8 @@ def _run(
     """The rows of all tasks that can be pointed at this way, with a bar as they come."""
     if mode in JITTERED:
         tasks = one_target(tasks)
+    if not tasks:
+        raise InputError("No task is left to run: it has no recording here, or is about two things.")
     count = len(tasks) * (jitters if mode in JITTERED else 1)
     with Progress(console=_stderr(), transient=True) as progress:
         bar = progress.add_task(f"{mode}, {len(tasks)} tasks", total=count)

@@ -216,5 +216,6 @@ def test_eval_says_what_is_wrong(cli: Cli, tmp_path: Path) -> None:
     refused(cli("eval", "photos", "--mode", "psychic"), "'psychic'", "outline")
     refused(cli("eval", "photos", "--data", tmp_path), "annotations.json")
     refused(cli("eval", "photos", "--seeds", 0), "--seeds '0'")
+    refused(cli("eval", "photos", "--model", f"replay:{tmp_path}"), "no recording here")
     (tmp_path / "annotations.json").write_text("[{}]")
     refused(cli("eval", "photos", "--data", tmp_path), "required")
