@@ -170,8 +170,6 @@ def test_the_rest_is_for_the_arrangement(words: str, rest: str) -> None:
         "line up along its left side and along its top side",
         "line up along the lower left side of it",
         "surround it, at most 20 px away",
-        "surround it with robots of radius 5 px",
-        "surround it with 7 robots 20 pixels apart",
         "cage it leaving one exit",
         "surround it but leave a gap at the top",
         "remove the robots around it",
