@@ -29,14 +29,15 @@ LENGTH = re.compile(
     rf"(?<=[0-9])(?:{'|'.join(u for u, *_ in UNITS)}))\b(?!\s*(?:/|per\b))"
 )
 ROBOT = r"(?:robots?|bots?|drones?|rovers?|agents?)"
-SIZED = rf"\b(?:{ROBOT}|each|they)(?:,|\s+(?:that|which|are|is|being|measuring|each|of|with|an?))*"
+LEADING = "that|which|are|is|being|measuring|each|of|with|an?"
+SIZED = rf"\b(?:{ROBOT}|each|they)(?:\s*[,:]|\s+(?:{LEADING}))*"
 BEFORE: tuple[tuple[str, Of], ...] = (
-    (rf"(?:{SIZED}\s+|\brobot )(?P<own>radius(?: of| is|:)?\s*)\Z", "radius"),
-    (rf"{SIZED}\s+(?P<own>diameter(?: of| is|:)?\s*)\Z", "across"),
+    (rf"(?:{SIZED}\s+|\brobot )(?P<own>radius(?: of| is|\s*:)?\s*)\Z", "radius"),
+    (rf"{SIZED}\s+(?P<own>diameter(?: of| is|\s*:)?\s*)\Z", "across"),
     (
-        r"(?:\bno two(?: \w+){0,2} (?:closer|nearer) than|\bspac(?:ed|ing)(?: of| by| at)?:?"
-        rf"|\bbetween (?:any two |the )?{ROBOT}(?: there)?(?: shall| must)?(?: be)?:?"
-        r"|\bfrom the next, which is)(?: about| at least)?\s*\Z",
+        r"(?:\bno two(?: \w+){0,2} (?:closer|nearer) than|\bspac(?:ed|ing)(?: of| by| at|\s*:)?"
+        rf"|\bbetween (?:any two |the )?{ROBOT}(?: there)?(?: shall| must)?(?: be|\s*:)?"
+        r"|\bfrom the next ?, which is)(?: about| at least)?\s*\Z",
         "apart",
     ),
     (
@@ -44,7 +45,7 @@ BEFORE: tuple[tuple[str, Of], ...] = (
         r"(?: of| a| an| about)*\s*\Z",
         "most",
     ),
-    (r"\b(?:radius|diameter)(?: of| is|:)?\s*\Z", "something"),
+    (r"\b(?:radius|diameter)(?: of| is|\s*:)?\s*\Z", "something"),
 )
 AFTER: tuple[tuple[str, Of], ...] = (
     (r"\A(?: or more)? (?:apart\b|(?:between|from|to) (?:(?:any two |the )?(?:robots|bots|drones)"

@@ -1,5 +1,7 @@
 """Lengths in words: how long, in which unit, and of what."""
 
+import re
+
 import pytest
 from formup.tools.formation.named import named_lengths
 
@@ -16,8 +18,12 @@ THREE = [
     ("the robots are {} across.", "across"),
     ("6 robots, each {} in diameter", "across"),
     ("robots with a diameter of {}", "across"),
+    ("robots: {} in diameter.", "across"),
     ("{} wide robots", "across"),
     ("robots of radius {}", "radius"),
+    ("spacing: {}", "apart"),
+    ("distance between robots: at least {}", "apart"),
+    ("each keeps away from the next, which is {} or more", "apart"),
     ("at most {} away", "most"),
     ("10 to {}", "most"),
     ("the {} long boat", "something"),
@@ -41,6 +47,8 @@ THREE = [
 def test_what_a_length_is_of(template: str, of: str, said: str, value: float, unit: str) -> None:
     text = template.format(said)
     (found,) = named_lengths(text)
+    (apart,) = named_lengths(re.sub(r"([,:])", r" \1", template).format(said))  # words apart
+    assert (apart.value, apart.of) == (value, of)
     assert (found.value, found.unit, found.of, found.said) == (value, unit, of, said)
     assert said in text[slice(*found.span)]
     assert found.px(0.5) == (value if unit == "px" else value / 0.5)
