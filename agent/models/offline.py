@@ -22,6 +22,7 @@ from .which import Step, find, located_reasons
 MAX_LABEL = 100
 FARTHEST = 100_000
 """Inside, a length that is named is the least distance from the edge, px."""
+DISTANCELESS = {"between": "between", "centre": "at the centre of"}
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 
@@ -116,6 +117,9 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
         return f"Which arrangement is meant? For example {EXAMPLES}."
     if len(reading.relations) > 1:
         return f"Which arrangement is meant: {' or '.join(reading.relations)}?"
+    where = DISTANCELESS.get(next(iter(reading.relations)))
+    if reading.clearance is not None and where:
+        return f"No distance is kept to what robots stand {where}. Which arrangement is meant?"
     if robots is None and reading.odd_count:
         return f"How many robots? {reading.odd_count!r} names no whole number above 0."
     if robots is not None and robots > MAX_ROBOTS:
@@ -144,7 +148,7 @@ def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
         group["side"] = reading.side or "long"
     if relation == "between":
         group["layout"] = reading.layout
-    if reading.clearance is not None and relation not in ("between", "centre"):
+    if reading.clearance is not None:
         most = FARTHEST if relation == "inside" else reading.clearance + 1
         group["clearance"] = [reading.clearance, most]
     if reading.min_spacing is not None:

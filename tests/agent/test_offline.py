@@ -238,6 +238,12 @@ def test_a_named_distance_becomes_the_contracts_clearance() -> None:
     assert report.contract.groups[0].clearance == (14, 15)
 
 
+def test_a_distance_that_cannot_be_kept_is_asked_about() -> None:
+    report = run("Gather 3 robots at its centre, 14 px away", pointed=[COIN])
+    assert report.status == "question"
+    assert "at the centre of" in report.message
+
+
 def test_a_cage_of_two_is_impossible_and_it_says_why() -> None:
     report = run("Cage it", pointed=[COIN], settings=Settings(robots=2))
     assert report.status == "impossible"
