@@ -7,10 +7,11 @@ from pydantic import BaseModel, ConfigDict
 
 from ..tools.fleet.deploy import Arrival
 from ..tools.formation.contract import Contract
+from ..tools.formation.lengths import in_metres, with_metres
 from ..tools.formation.plan import Plan, Shortfall
 from ..tools.formation.verdict import Verdict
 from ..tools.perception.attributes import Candidate
-from ..tools.scene import Box, Target
+from ..tools.scene import Box, Scene, Target
 from ..tools.store import rings
 from ..tools.workspace import Workspace
 from .messages import History, Reply, Result
@@ -47,7 +48,8 @@ class Report(BaseModel):
     """Status, what was found, the contract, its certificate, and what was observed.
 
     Lengths are pixels of the picture as the user sees it (x right, y down); positions are in
-    robot order over all groups. What does not apply is None.
+    robot order over all groups. What does not apply is None; `metric` is the same in metres where
+    the picture's scale is known, see `metric_data`.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -64,6 +66,7 @@ class Report(BaseModel):
     verdict: Verdict | None = None
     partial: Shortfall | None = None
     arrival: Arrival | None = None
+    metric: dict[str, Any] | None = None
     model: str
     prompt: dict[str, Any] | None = None
     prompts: tuple[dict[str, Any], ...] = ()
@@ -74,6 +77,29 @@ class Report(BaseModel):
     def exit_code(self) -> int:
         """What `formup run` exits with."""
         return EXIT_CODES[self.status]
+
+
+METRIC_FRAME = "metres, x right, y down, 0, 0 is the centre of the picture's top left pixel"
+
+
+def metric_data(scene: Scene, plan: Plan | None, arrival: Arrival | None) -> dict[str, Any] | None:
+    """What a report says in metres; None where the scale is not known.
+
+    Positions as planned and as observed, how far off each is, and the certificate's measures.
+    """
+    scale = scene.metres_per_pixel
+    if scale is None:
+        return None
+    data: dict[str, Any] = {"metres_per_pixel": scale, "frame": METRIC_FRAME}
+    if plan is not None:
+        places = plan.formation.positions
+        measures = with_metres(plan.verdict.measures, scale)
+        data["positions"] = [[in_metres(v, scale) for v in place] for place in places]
+        data["measures"] = {k: v for k, v in measures.items() if k.endswith("_m")}
+    if arrival is not None:
+        data["observed"] = [[in_metres(v, scale) for v in place] for place in arrival.observed]
+        data["residual"] = [in_metres(v, scale) for v in arrival.residual_px]
+    return data
 
 
 def target_data(target: Target) -> dict[str, Any]:
@@ -129,6 +155,7 @@ def make_report(
         verdict=plan.verdict if plan else None,
         partial=plan.partial if plan else None,
         arrival=arrival,
+        metric=metric_data(workspace.scene, plan, arrival),
         model=model,
         usage=_totals(outcome.messages, seconds),
     )

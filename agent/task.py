@@ -21,6 +21,7 @@ class Task:
         pointed: what the person pointed at, as arguments of propose_formation's `targets`.
         targets: ids of targets that are measured already.
         deploy: whether robots shall move once the plan is certified.
+        metres_per_pixel: of the picture; None where it has no scale.
     """
 
     instruction: str
@@ -28,6 +29,7 @@ class Task:
     pointed: tuple[dict[str, Any], ...]
     targets: tuple[str, ...]
     deploy: bool
+    metres_per_pixel: float | None = None
 
 
 def first_message(workspace: Workspace, *, seen: bool) -> User:
@@ -49,7 +51,8 @@ def first_message(workspace: Workspace, *, seen: bool) -> User:
 
 def task_text(workspace: Workspace, how: str = "") -> str:
     """The first message: one fact a line, the person's words quoted so that they stay one."""
-    settings, picture = workspace.settings, workspace.scene.picture
+    settings, scene = workspace.settings, workspace.scene
+    picture, scale = scene.picture, scene.metres_per_pixel
     pointed = [
         p.model_dump(mode="json", exclude_defaults=True) | {"id": p.id} for p in workspace.pointed
     ]
@@ -57,8 +60,9 @@ def task_text(workspace: Workspace, how: str = "") -> str:
         "Instruction": workspace.instruction,
         "Robots": settings.robots,
         "Picture": f"{picture.width} x {picture.height} px{how}",
+        **({} if scale is None else {"Metres per pixel": scale}),
         "Pointed at": pointed,
-        "Targets": [t.id for t in workspace.scene.targets],
+        "Targets": [t.id for t in scene.targets],
         "Deploy": settings.may_deploy,
     }
     return "\n".join(f"{name}: {json.dumps(v, ensure_ascii=False)}" for name, v in lines.items())
@@ -81,4 +85,5 @@ def read_task(text: str) -> Task:
         pointed=tuple(facts["Pointed at"]),
         targets=tuple(facts["Targets"]),
         deploy=facts["Deploy"],
+        metres_per_pixel=facts.get("Metres per pixel"),
     )

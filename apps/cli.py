@@ -66,6 +66,7 @@ def run(
     descriptor: o.DescriptorName = "edges",
     fleet: o.FleetName = "simulated",
     starts: o.Starts = None,
+    metres_per_pixel: o.MetresPerPixel = None,
     robot_radius: o.Radius = None,
     clearance: o.Clearance = None,
     seed: o.Seed = "0",
@@ -73,8 +74,7 @@ def run(
     """Carry out an instruction on a picture."""
     fixed = Settings(
         robots=inputs.robots(robots),
-        robot_radius=inputs.length("--robot-radius", robot_radius),
-        clearance=inputs.length("--clearance", clearance),
+        **inputs.lengths(metres_per_pixel, robot_radius, clearance),
         segmenter=segmenter,
         threshold=inputs.share("--threshold", threshold),
         descriptor=inputs.descriptor(descriptor),

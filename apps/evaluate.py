@@ -143,7 +143,7 @@ def _run(
     if mode in JITTERED:
         tasks = one_target(tasks)
     if not tasks:
-        raise InputError("No task is left to run: it has no recording here, or is about two things.")
+        raise InputError("No task is left: none has a recording here, or is about one thing alone.")
     count = len(tasks) * (jitters if mode in JITTERED else 1)
     with Progress(console=_stderr(), transient=True) as progress:
         bar = progress.add_task(f"{mode}, {len(tasks)} tasks", total=count)

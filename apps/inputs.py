@@ -16,7 +16,9 @@ from ..agent.policy import Policy
 from ..evals.suite import Task
 from ..prompts.inputs import Input
 from ..tools.errors import InputError
-from ..tools.formation.contract import MAX_ROBOTS
+from ..tools.formation.contract import MAX_LENGTH, MAX_ROBOTS
+from ..tools.formation.lengths import COARSEST, FINEST, check_scale
+from ..tools.formation.named import named_lengths
 from ..tools.geometry.outline import FARTHEST, FloatArray
 from ..tools.perception.prompts import TargetPrompt
 from ..tools.store import read_text
@@ -86,18 +88,71 @@ def tasks(names: list[str] | None, there: list[Task]) -> list[Task]:
     return [known[name] for name in names] if names else there
 
 
-def length(name: str, text: str | None) -> float | None:
-    """A length in pixels, 0 or more.
+def scale(text: str | None) -> float | None:
+    """Metres per pixel.
 
     Raises:
-        InputError: not such a number.
+        InputError: not a number, or no scale that a picture has.
     """
     if text is None:
         return None
     value = _number(text)
-    if value is None or not 0 <= value <= 100_000:
-        raise InputError(f"{name} {text!r} is no length; give pixels from 0 to 100000, such as 12.")
+    try:
+        if value is not None:
+            check_scale(value)
+            return value
+    except InputError:
+        pass
+    raise InputError(
+        f"--metres-per-pixel {text!r} cannot be used; give a number from {FINEST:f} to "
+        f"{COARSEST:g}, such as 0.05."
+    )
+
+
+def lengths(scale_text: str | None, radius: str | None, clearance: str | None) -> dict[str, Any]:
+    """The scale, the robots' radius and the clearance, as fields of Settings.
+
+    Raises:
+        InputError: as `scale` and `length` do.
+    """
+    metres_per_pixel = scale(scale_text)
+    return {
+        "metres_per_pixel": metres_per_pixel,
+        "robot_radius": length("--robot-radius", radius, metres_per_pixel),
+        "clearance": length("--clearance", clearance, metres_per_pixel),
+    }
+
+
+def length(name: str, text: str | None, metres_per_pixel: float | None) -> float | None:
+    """A length in pixels, 0 or more, from pixels or, with a unit behind them, m, cm or mm.
+
+    Raises:
+        InputError: not such a number, or a metric one in a picture without a scale.
+    """
+    if text is None:
+        return None
+    value = _number(text)
+    if value is None:
+        value = _metric(name, text, metres_per_pixel)
+    if value is None or not 0 <= value <= MAX_LENGTH:
+        raise InputError(
+            f"{name} {text!r} is no length; give pixels from 0 to 100000, such as 12, or a metric "
+            "length such as 1.5m or 40cm together with --metres-per-pixel."
+        )
     return value
+
+
+def _metric(name: str, text: str, metres_per_pixel: float | None) -> float | None:
+    """A length with its unit, px; None where it is none."""
+    found = named_lengths(text.strip().lower())
+    if len(found) != 1 or found[0].said != text.strip().lower():
+        return None
+    if found[0].unit == "m" and metres_per_pixel is None:
+        raise InputError(
+            f"{name} {text!r} is metric, and the picture has no scale; give --metres-per-pixel "
+            "too, or pixels."
+        )
+    return found[0].px(metres_per_pixel)
 
 
 def share(name: str, text: str | None) -> float | None:

@@ -125,9 +125,16 @@ FleetName = Annotated[str, typer.Option("--fleet", help="Which robots move.")]
 Starts = Annotated[
     Path | None, typer.Option("--starts", help="Starting positions: x,y a line, or JSON.")
 ]
-Radius = Annotated[str | None, typer.Option("--robot-radius", help="Radius of a robot, px.")]
+MetresPerPixel = Annotated[
+    str | None,
+    typer.Option("--metres-per-pixel", help="Scale of a picture taken straight from above."),
+]
+Radius = Annotated[
+    str | None, typer.Option("--robot-radius", help="Radius of a robot: px, or such as 20cm.")
+]
 Clearance = Annotated[
-    str | None, typer.Option("--clearance", help="Exact distance from the target, px.")
+    str | None,
+    typer.Option("--clearance", help="Exact distance from the target: px, or such as 1.5m."),
 ]
 Seed = Annotated[str, typer.Option("--seed", help="Of the simulator.")]
 Arguments = Annotated[str, typer.Option("--args", help="The tool's arguments as JSON.")]

@@ -7,7 +7,7 @@ import sys
 import typer
 from rich.console import Console
 
-from ..agent.report import Report, target_data
+from ..agent.report import Report, metric_data, target_data
 from ..tools.doors.committing import deploy as deploy_tool
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.plan import Plan
@@ -44,21 +44,24 @@ def deploy(plan: o.PlanFile, fleet: o.FleetName = "simulated", as_json: o.Json =
 
 
 def _report(plan: Plan, workspace: Workspace, stored: Stored, animation: str | None) -> Report:
-    arrival = workspace.arrivals[plan.id]
+    arrival, scene = workspace.arrivals[plan.id], workspace.scene
     state = "All arrived" if arrival.arrived else "Not all arrived"
     return Report(
         status="deployed" if arrival.arrived else "failed",
-        message=f"{state}; the furthest is {max(arrival.residual_px):.1f} px from its place."
+        message=scene.told(
+            f"{state}; the furthest is {max(arrival.residual_px):.1f} px from its place."
+        )
         + (f" The plan is partial: {plan.partial.sentence}" if plan.partial else ""),
         instruction=stored.instruction or "",
-        image=json.loads(stored.image.model_dump_json(exclude={"path"})),
-        targets=tuple(target_data(t) for t in workspace.scene.targets),
+        image=json.loads(stored.image.model_dump_json(exclude={"path", "metres_per_pixel"})),
+        targets=tuple(target_data(t) for t in scene.targets),
         contract=plan.formation.contract,
         plan_id=plan.id,
         positions=plan.formation.positions,
         verdict=plan.verdict,
         partial=plan.partial,
         arrival=arrival,
+        metric=metric_data(scene, plan, arrival),
         model="none",
         files={"plan": None, "picture": None, "animation": animation, "trace": None},
     )

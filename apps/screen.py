@@ -10,6 +10,7 @@ from rich.text import Text
 
 from ..agent.report import Report
 from ..tools.formation.contract import Group
+from ..tools.formation.lengths import also_metres
 from ..tools.formation.verdict import Measure
 
 LONGEST = 600
@@ -57,7 +58,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
         )
     if report.contract is not None:
         for group in report.contract.groups:
-            _line(console, "contract", _group(group))
+            _line(console, "contract", _told(_group(group), report))
     if report.verdict is not None:
         _certificate(console, report)
     if report.arrival is not None:
@@ -131,6 +132,11 @@ def _group(group: Group) -> str:
     return " ".join(word for word in words if word)
 
 
+def _told(text: str, report: Report) -> str:
+    """With lengths in metres too, where the picture's scale is known."""
+    return also_metres(text, report.metric["metres_per_pixel"] if report.metric else None)
+
+
 def _measures(measures: dict[str, Measure]) -> str:
     """Measures as words, those in pixels with their unit behind the number."""
     return ", ".join(
@@ -144,7 +150,7 @@ def _measures(measures: dict[str, Measure]) -> str:
 def _certificate(console: Console, report: Report) -> None:
     verdict = report.verdict
     assert verdict is not None
-    measures = _measures(verdict.measures)
+    measures = _told(_measures(verdict.measures), report)
     if report.partial is not None:
         _line(console, "partial", report.partial.sentence)
     if verdict.certified:

@@ -15,6 +15,7 @@ from ..tools.scene import Scene
 from ..tools.schema import compact_schema
 from ..tools.store import read_stored, restore, store, write_whole
 from ..tools.workspace import Settings, Workspace
+from . import inputs
 from . import options as o
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -45,14 +46,18 @@ def print_schema(name: str) -> None:
 
 @app.command("call")
 def call_tool(
-    name: str, image: o.PictureFile = None, args: o.Arguments = "{}", state: o.StateFile = None
+    name: str,
+    image: o.PictureFile = None,
+    args: o.Arguments = "{}",
+    state: o.StateFile = None,
+    metres_per_pixel: o.MetresPerPixel = None,
 ) -> None:
     """Call one tool and print its answer; pictures go beside the state file or here."""
     tool = next((t for t in TOOLS if t.name == name), None)
     if tool is None:
         raise InputError(f"Unknown tool {name!r}. There are: {', '.join(t.name for t in TOOLS)}.")
     arguments = _arguments(args)
-    workspace = _workspace(image, state)
+    workspace = _workspace(image, state, Settings(metres_per_pixel=inputs.scale(metres_per_pixel)))
     try:
         result = asyncio.run(tool.call(workspace, arguments))
     except ToolError as error:
@@ -83,12 +88,12 @@ def _arguments(text: str) -> dict[str, Any]:
     return cast(dict[str, Any], arguments)
 
 
-def _workspace(image: Path | None, state: Path | None) -> Workspace:
+def _workspace(image: Path | None, state: Path | None, settings: Settings) -> Workspace:
     if state is not None and state.exists():
         picture = None if image is None else load_picture(image)
-        return restore(read_stored(state), picture, Settings())
+        return restore(read_stored(state), picture, settings)
     if image is None:
         raise InputError(
             "Name the picture with --image, or a state file that has one with --state."
         )
-    return Workspace(Scene(load_picture(image)))
+    return Workspace(Scene(load_picture(image)), settings)

@@ -174,7 +174,12 @@ class SuiteWork:
 
     def _run(self, task: SuiteTask, arm: Method, trial: Trial) -> Run:
         agent = arm.agent(trial.seed, self.base_url)
-        settings = Settings(robots=task.robots, descriptor=arm.descriptor, seed=trial.seed)
+        settings = Settings(
+            robots=task.robots,
+            descriptor=arm.descriptor,
+            seed=trial.seed,
+            metres_per_pixel=task.metres_per_pixel,
+        )
         trace = None
         if self.keep is not None and arm.model not in ("offline", OBEDIENT):
             trace = self.keep / f"{kept_as(trial)}.jsonl"

@@ -199,7 +199,7 @@ def written_positions(text: str) -> tuple[tuple[float, float], ...] | None:
 
 def _run(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) -> Run:
     picture = _picture(task.image)
-    settings = Settings(robots=task.robots)
+    settings = Settings(robots=task.robots, metres_per_pixel=task.metres_per_pixel)
     if mode == "truth":
         things = [task.target, *filter(None, [task.other])]
         targets = tuple(

@@ -8,7 +8,7 @@ import json
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import jsonschema
 
@@ -49,6 +49,7 @@ class Task:
     other: Thing | None = None
     referring: str = ""
     wording: str = ""
+    metres_per_pixel: float | None = None
 
 
 def photos_folder() -> Path:
@@ -92,6 +93,38 @@ def read_entries(path: Path, entries: Any = None) -> list[dict[str, Any]]:
     return entries
 
 
+def rule_in_pixels(entry: dict[str, Any], task: dict[str, Any], rule: Any) -> dict[str, Any]:
+    """A success rule with its lengths in px, `band_px` for `band_m`, which is what is graded.
+
+    Args:
+        entry: of the picture, with its `metres_per_pixel` if it has any.
+        task: that the rule is of.
+        rule: as written.
+
+    Raises:
+        InputError: a length in metres on a picture without a scale, or twice.
+    """
+    scale: float | None = entry.get("metres_per_pixel")
+    made = dict[str, Any]()
+    for name, value in rule.items():
+        if not name.endswith("_m"):
+            made[name] = value
+            continue
+        px = f"{name.removesuffix('_m')}_px"
+        if scale is None or px in rule:
+            why = "its picture has no metres_per_pixel" if scale is None else f"also {px}"
+            raise InputError(f"Task {task['id']} has {name}, but {why}.")
+        made[px] = _scaled(value, scale)
+    return made
+
+
+def _scaled(length: Any, scale: float) -> Any:
+    """A length in metres, or a list of them, in px."""
+    lengths = cast("list[Any]", length) if isinstance(length, list) else [length]
+    px = [round(float(v) / scale, 2) for v in lengths]
+    return px if isinstance(length, list) else px[0]
+
+
 def _validate(entries: Any, path: Path) -> None:
     schema = json.loads((photos_folder() / "schema.json").read_text(encoding="utf-8"))
     validator = jsonschema.Draft202012Validator(schema)
@@ -130,10 +163,11 @@ def _tasks(entry: dict[str, Any], root: Path) -> list[Task]:
                 image=root / entry["image"],
                 size=(entry["width"], entry["height"]),
                 target=things[task["target"]],
-                success=task["success"],
+                success=rule_in_pixels(entry, task, task["success"]),
                 other=things[named[1]] if len(named) > 1 else None,
                 referring=task.get("referring", ""),
                 wording=task.get("wording", ""),
+                metres_per_pixel=entry.get("metres_per_pixel"),
             )
         )
     return tasks

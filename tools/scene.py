@@ -10,6 +10,7 @@ import shapely
 
 from .errors import ToolError
 from .formation.contract import Contract
+from .formation.lengths import also_metres, check_scale
 from .formation.place import Site
 from .formation.plan import scene_version
 from .geometry.outline import Outline
@@ -48,17 +49,32 @@ class Target:
 
 @dataclass(frozen=True)
 class Scene:
-    """A picture and the targets found in it."""
+    """A picture and the targets found in it.
+
+    Attributes:
+        metres_per_pixel: the same everywhere, as in a picture taken straight from above; None
+            where it is not known.
+
+    Raises:
+        InputError: metres per pixel that no picture has.
+    """
 
     picture: Picture
     targets: tuple[Target, ...] = ()
+    metres_per_pixel: float | None = None
+
+    def __post_init__(self) -> None:
+        check_scale(self.metres_per_pixel)
 
     @property
     def version(self) -> str:
-        """Changes with the picture and with every target found, moved or renamed."""
-        return scene_version(
-            self.picture.sha256, {t.id: _canonical(t.outline) for t in self.targets}
-        )
+        """Changes with the picture, its scale and every target found, moved or renamed."""
+        outlines = {t.id: _canonical(t.outline) for t in self.targets}
+        return scene_version(self.picture.sha256, outlines, self.metres_per_pixel)
+
+    def told(self, text: str) -> str:
+        """A text with each length in px told in metres too, where the scale is known."""
+        return also_metres(text, self.metres_per_pixel)
 
     def target(self, name: str) -> Target:
         """The target with an id.
@@ -84,7 +100,7 @@ class Scene:
             ToolError: it names a target that is not there.
         """
         outlines = {name: self.target(name).outline for name in contract.target_ids}
-        return Site(outlines, self.picture.width, self.picture.height)
+        return Site(outlines, *self.picture.size, self.metres_per_pixel)
 
 
 def _canonical(outline: Outline) -> str:

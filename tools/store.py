@@ -58,12 +58,19 @@ class StoredTarget(_Value):
 
 
 class StoredImage(_Value):
-    """Where the picture lies and what it must be."""
+    """Where the picture lies and what it must be, and its scale if that is known."""
 
     path: str | None
     sha256: str
     width: int
     height: int
+    metres_per_pixel: float | None = None
+
+    @model_serializer(mode="wrap")
+    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without a scale that is not known, as when there was none: the digest stays the same."""
+        written = standard(self)
+        return {k: v for k, v in written.items() if k != "metres_per_pixel" or v is not None}
 
 
 class Stored(_Value):
@@ -100,6 +107,7 @@ def store(
             sha256=picture.sha256,
             width=picture.width,
             height=picture.height,
+            metres_per_pixel=workspace.scene.metres_per_pixel,
         ),
         targets=tuple(_stored_target(t) for t in workspace.scene.targets),
         pointed=workspace.pointed,
@@ -187,7 +195,9 @@ def restore(stored: Stored, picture: Picture | None, settings: Settings) -> Work
             "its targets and plans; run again on the new picture."
         )
     return Workspace(
-        scene=Scene(picture, tuple(_target(t) for t in stored.targets)),
+        scene=Scene(
+            picture, tuple(_target(t) for t in stored.targets), stored.image.metres_per_pixel
+        ),
         settings=settings,
         pointed=stored.pointed,
         plans=dict(stored.plans),

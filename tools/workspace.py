@@ -7,7 +7,7 @@ target id means the same in the next call.
 import math
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -51,6 +51,7 @@ class Settings:
         may_deploy: whether robots may be moved at all in this run.
         approved: id of the one plan a person has approved although it is partial.
         numbered: whether what stands out is numbered in the picture a model gets.
+        metres_per_pixel: of a picture taken straight from above; None where it is not known.
     """
 
     robots: int | None = None
@@ -65,6 +66,7 @@ class Settings:
     may_deploy: bool = True
     approved: str | None = None
     numbered: bool = False
+    metres_per_pixel: float | None = None
 
     def check(self) -> None:
         """Refuse names that do not exist.
@@ -105,6 +107,8 @@ class Workspace:
 
     def __post_init__(self) -> None:
         self.settings.check()
+        if self.settings.metres_per_pixel is not None:
+            self.scene = replace(self.scene, metres_per_pixel=self.settings.metres_per_pixel)
         problems = [p for q in self.pointed for p in q.problems(*self.scene.picture.size)]
         if problems:
             raise InputError(" ".join(problems))

@@ -10,6 +10,7 @@ from typing import Any
 
 from ...tools.doors.committing import SHOW_PARTIAL
 from ...tools.formation.contract import MAX_ROBOTS
+from ...tools.formation.lengths import also_metres
 from ..messages import Call, History, Reply, Result, User
 from ..model import Request
 from ..task import Task, read_task
@@ -21,6 +22,8 @@ from .which import Step, find, located_reasons
 MAX_LABEL = 100
 FARTHEST = 100_000
 """Inside, a length that is named is the least distance from the edge, px."""
+DISTANCELESS = {"between": "between", "centre": "at the centre of"}
+UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 
 
@@ -49,7 +52,7 @@ def _begin(task: Task, history: History) -> Reply:
     pointed = bool(_target_ids(task))
     spoken = Words((), task.instruction) if pointed else references(task.instruction)
     answers = _spoken_answers(history)
-    reading = understand(". ".join([spoken.rest, *answers]))
+    reading = understand(". ".join([spoken.rest, *answers]), task.metres_per_pixel)
     bare = [int(a) for a in answers if a.strip().isascii() and a.strip().isdecimal()]
     robots = task.robots or reading.robots or next(iter(bare), None)
     question = _open_question(task, reading, robots)
@@ -66,8 +69,12 @@ def _begin(task: Task, history: History) -> Reply:
             for i, f in enumerate(found, start=1)
         ]
     ids = list(dict.fromkeys([*task.targets, *(p["id"] for p in prompts)]))
-    group = _group(reading, robots, ids[:things])
-    arguments = {"contract": {"groups": [group]}, "targets": prompts}
+    contract: dict[str, Any] = {"groups": [_group(reading, robots, ids[:things])]}
+    if reading.robot_radius is not None:
+        contract["robot_radius"] = reading.robot_radius
+    if task.metres_per_pixel is not None:
+        contract["unit"] = "px"
+    arguments = {"contract": contract, "targets": prompts}
     return _call(history, "propose_formation", arguments)
 
 
@@ -104,12 +111,15 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
         said = " and ".join(reading.beyond)
         return (
             f"The offline rules do not carry out {said}. Say it another way: one arrangement of "
-            "all the robots, lengths in px."
+            "all the robots, lengths in px." + (f" {UNSCALED}" if reading.unscaled else "")
         )
     if not reading.relations:
         return f"Which arrangement is meant? For example {EXAMPLES}."
     if len(reading.relations) > 1:
         return f"Which arrangement is meant: {' or '.join(reading.relations)}?"
+    where = DISTANCELESS.get(next(iter(reading.relations)))
+    if reading.clearance is not None and where:
+        return f"No distance is kept to what robots stand {where}. Which arrangement is meant?"
     if robots is None and reading.odd_count:
         return f"How many robots? {reading.odd_count!r} names no whole number above 0."
     if robots is not None and robots > MAX_ROBOTS:
@@ -138,9 +148,11 @@ def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
         group["side"] = reading.side or "long"
     if relation == "between":
         group["layout"] = reading.layout
-    if reading.clearance is not None and relation not in ("between", "centre"):
+    if reading.clearance is not None:
         most = FARTHEST if relation == "inside" else reading.clearance + 1
         group["clearance"] = [reading.clearance, most]
+    if reading.min_spacing is not None:
+        group["min_spacing"] = reading.min_spacing
     return group
 
 
@@ -179,15 +191,12 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
     if result.error:
         return f"{planned} {result.text}"
     arrival = json.loads(result.text)
+    off = f"{arrival['worst_residual_px']:.1f} px from its place"
+    said = f"All arrived; the furthest is {off}."
     if not arrival["arrived"]:
-        return (
-            f"{planned} Robot {arrival['worst_robot']} stopped {arrival['worst_residual_px']:.1f} "
-            f"px from its place after {arrival['corrections']} corrections."
-        )
-    return (
-        f"{planned} All arrived; the furthest is {arrival['worst_residual_px']:.1f} px from its "
-        "place."
-    )
+        corrected = f"after {arrival['corrections']} corrections"
+        said = f"Robot {arrival['worst_robot']} stopped {off} {corrected}."
+    return f"{planned} {also_metres(said, task.metres_per_pixel)}"
 
 
 def _planned(plan: dict[str, Any], history: History) -> str:

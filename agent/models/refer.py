@@ -41,7 +41,7 @@ def references(instruction: str) -> Reading:
 
 def _words(text: str) -> list[str]:
     plain = text.lower().replace("-", " ").replace("\N{RIGHT SINGLE QUOTATION MARK}", "'")
-    return re.findall(r"[a-z0-9]+(?:'[a-z0-9]+)*|[,.;:!?+*%]", plain)
+    return re.findall(r"[0-9]+(?:[.,][0-9]+)+[a-z]*|[a-z0-9]+(?:'[a-z0-9]+)*|[,.;:!?+*%]", plain)
 
 
 def _read(words: Words, at: int) -> tuple[Reference, int] | None:

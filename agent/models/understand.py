@@ -8,9 +8,11 @@ import re
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import Any, get_args
 
 import yaml
+
+from ...tools.formation.named import NamedLength, Of, named_lengths
 
 GAP = 6
 """Words that "..." may stand for."""
@@ -30,7 +32,12 @@ Words = list[str]
 
 @dataclass(frozen=True)
 class Reading:
-    """What was understood; `relations` with more or fewer than one entry settles nothing."""
+    """What was understood; `relations` with more or fewer than one entry settles nothing.
+
+    Lengths are px: the distance to keep, the least distance of robots' centres, a robot's radius.
+    `unscaled` are metric lengths that a picture without a scale says nothing of; `beyond` has them
+    too.
+    """
 
     relations: tuple[str, ...]
     robots: int | None
@@ -40,17 +47,23 @@ class Reading:
     fit: str
     spacing: str
     clearance: float | None
+    min_spacing: float | None
+    robot_radius: float | None
+    unscaled: tuple[str, ...]
     beyond: tuple[str, ...]
 
 
-def understand(instruction: str) -> Reading:
-    """Read an instruction in English."""
-    words = _without_ignored(_words(ASIDE.sub(" ", QUESTION.sub(" ", instruction.lower()))))
+def understand(instruction: str, metres_per_pixel: float | None = None) -> Reading:
+    """Read an instruction in English about a picture of a scale, if it has one."""
+    lengths = _Lengths(instruction, metres_per_pixel)
+    spoken = lengths.cut("apart", "across", "radius")
+    words = _without_ignored(_words(ASIDE.sub(" ", QUESTION.sub(" ", spoken))))
     side = next(iter(_matches("sides", words)), None)
     relations = _unbeaten(_matches("relations", words))
     if not relations:
         relations = ["along"] if side else _matches("weak", words)
-    robots, odd = _count(instruction)
+    numbers = lengths.cut(*get_args(Of))
+    robots, odd = _count(numbers)
     return Reading(
         relations=tuple(relations),
         robots=robots,
@@ -59,13 +72,56 @@ def understand(instruction: str) -> Reading:
         layout=next(iter(_matches("layout", words)), "line"),
         fit=next(iter(_matches("fit", words)), "normal"),
         spacing="free" if any(_found(p, words) for p in _vocabulary()["free"]) else "even",
-        clearance=_clearance(instruction),
-        beyond=(
-            *_beyond(words, relations, side),
-            *_foreign_units(instruction),
-            *_bounds(instruction),
-        ),
+        clearance=lengths.of("distance"),
+        min_spacing=lengths.of("apart"),
+        robot_radius=lengths.radius,
+        unscaled=lengths.unscaled,
+        beyond=(*_beyond(words, relations, side), *lengths.beyond, *_foreign_units(numbers)),
     )
+
+
+class _Lengths:
+    """What an instruction's lengths come to in px.
+
+    Attributes:
+        unscaled: metric ones that need a scale there is none of.
+        beyond: these, and those that say what the rules do not carry out.
+    """
+
+    def __init__(self, instruction: str, metres_per_pixel: float | None) -> None:
+        self._text = instruction.lower()
+        self._named = named_lengths(self._text)
+        metric = () if metres_per_pixel else [n for n in self._named if n.unit == "m"]
+        self.unscaled = tuple(n.said for n in metric)
+        loose = [n for n in self._named if n not in metric and n.of in ("most", "something")]
+        known = [n for n in self._named if n not in metric and n not in loose]
+        self._px: dict[Of, list[float]] = {}
+        for length in known:
+            self._px.setdefault(length.of, []).append(length.px(metres_per_pixel))
+        several = [n for n in known if len(set(self._px[n.of])) > 1]
+        self.beyond = (*self.unscaled, *(self._whole(n) for n in (*loose, *several)))
+
+    @property
+    def radius(self) -> float | None:
+        """Of a robot; half of what it is across."""
+        across = self.of("across")
+        return self.of("radius") if across is None else across / 2
+
+    def of(self, what: Of) -> float | None:
+        """The length that is of that."""
+        return next(iter(self._px.get(what, ())), None)
+
+    def cut(self, *of: Of) -> str:
+        """The text, lower case, without the words for such lengths."""
+        text = self._text
+        for length in reversed(self._named):
+            if length.of in of:
+                start, end = length.span
+                text = f"{text[:start]} , {text[end:]}"
+        return text
+
+    def _whole(self, length: NamedLength) -> str:
+        return self._text[slice(*length.span)]
 
 
 @cache
@@ -186,24 +242,7 @@ def _beyond(words: Words, relations: list[str], side: str | None) -> tuple[str, 
 
 
 def _foreign_units(text: str) -> list[str]:
-    """Lengths in other units than pixels, such as 3 metres."""
+    """Lengths in units that are not read, such as 3 feet."""
     units = "|".join(_vocabulary()["units"])
     amount = rf"(?:[0-9][0-9.,]*|{_number_words()}|\bhalf\s+an?|\ban?)"
     return re.findall(rf"{amount}\s*(?:{units})s?\b", text.lower())
-
-
-def _bounds(text: str) -> list[str]:
-    """Lengths that are no distance to keep: at most 20 px, 20 px apart, of radius 5 px."""
-    length = r"[0-9]+(?:\.[0-9]+)?\s*(?:px|pixels?)\b"
-    before = (
-        r"(?:at most|up to|less than|no more than|within|radius|diameter|spac\w+"
-        r"|[0-9]+ (?:and|to|or))"
-    )
-    after = r"(?:apart|wide|long|high|tall|big|in diameter|in size|between)"
-    return re.findall(rf"{before}(?: of| a| an)*\s+{length}|{length}\s+{after}\b", text.lower())
-
-
-def _clearance(text: str) -> float | None:
-    """A distance in pixels that the words name."""
-    found = re.search(r"([0-9]+(?:\.[0-9]+)?)\s*(?:px|pixels?)\b", text.lower())
-    return float(found[1]) if found else None

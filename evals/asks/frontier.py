@@ -4,6 +4,8 @@ The turn of a seed says what is asked: a ring, an infill, groups, a cage. Distan
 about what a careful outline is off.
 """
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,32 +14,42 @@ from numpy.random import Generator
 from ..scenes.build import Story, entry_of, named, standable, tell
 from ..scenes.choose import View, phrase
 from ..scenes.things import Thing
+from .metric import SPREAD, Named, named_length, robot_size
 from .rules import distance, inner_cell, inner_rule, many, margin, ring_rule
 
-ROBOTS = (20, 100)
+ROBOTS, SIZED_ROBOTS = (20, 100), (20, 48)
 OFF = 3.0
-APART = 0.5
+APART, BODIES = 0.5, 2.1
+"""Least distance of robots inside: a share of a robot's cell, and so many of its radius."""
 SHARED = (8, 30)
 """Robots of one group where there are several."""
 TURNS = ("ring", "infill", "groups", "cage")
 
 
-def frontier(seed: int) -> dict[str, Any]:
-    """The entry of annotations.json of a seed."""
+def frontier(seed: int, scale: float | None = None) -> dict[str, Any]:
+    """The entry of annotations.json of a seed.
+
+    Args:
+        seed: of the scene.
+        scale: metres per pixel: lengths are named in metres, and the robots' size too.
+    """
     story = tell(seed)
     random = np.random.default_rng([seed, 5])
     entry = entry_of(story)
     ids = {id(t): o["id"] for t, o in zip(story.scene.things, entry["objects"], strict=True)}
-    turn = turn_of(story)
+    turn, team = turn_of(story), Team(scale, robot_size(seed, scale))
     if turn == "groups":
-        parts = _groups(random, story)
+        parts = _groups(random, story, team)
     else:
-        parts = [(story.target, *_one(random, story, turn, named(random, story)))]
+        what = turn, named(random, story)
+        bounds = ROBOTS if scale is None else SIZED_ROBOTS
+        size = story.scene.size
+        parts = [(story.target, *_placed(random, story.target, size, what, bounds, team))]
     said = [words for *_, words in parts]
     text = ", and ".join([", ".join(said[:-1]), said[-1]]) if len(said) > 1 else said[0]
     goals = [{"target": ids[id(t)], "robots": n, "success": rule} for t, n, rule, _ in parts]
     entry["tasks"][0] |= {
-        "instruction": f"{text[:1].upper()}{text[1:]}.",
+        "instruction": f"{text[:1].upper()}{text[1:]}.{team.words}",
         "robots": sum(n for _, n, _, _ in parts),
         "success": goals[0]["success"],
         "target": goals[0]["target"],
@@ -57,11 +69,22 @@ def turn_of(story: Story) -> str:
 Part = tuple[Thing, int, dict[str, Any], str]
 
 
-def _one(
-    random: Generator, story: Story, turn: str, said: str, bounds: tuple[int, int] = ROBOTS
-) -> tuple[int, dict[str, Any], str]:
-    """Robots, rule and words for a thing that is called so."""
-    return _placed(random, story.target, story.scene.size, (turn, said), bounds)
+@dataclass(frozen=True)
+class Team:
+    """How its lengths are named, and how large its robots are."""
+
+    scale: float | None
+    across: Named | None
+
+    @property
+    def radius(self) -> float:
+        """Of a robot, px; 0 where its size is not named."""
+        return self.across.px / 2 if self.across else 0.0
+
+    @property
+    def words(self) -> str:
+        """A sentence that names the robots' size, if it is named."""
+        return f" The robots are {self.across.words} across." if self.across else ""
 
 
 def _placed(
@@ -70,26 +93,31 @@ def _placed(
     size: tuple[int, int],
     what: tuple[str, str],
     bounds: tuple[int, int],
+    team: Team,
 ) -> tuple[int, dict[str, Any], str]:
     turn, said = what
+    wide = SPREAD * team.radius
     if turn == "infill":
-        n = many(random, thing, "inside", bounds)
-        d = margin(random, thing) or 0
-        apart = max(int(APART * inner_cell(thing, n, d)), 3)
-        rule = inner_rule(thing, n, d, apart)
-        rule["min_clearance_px"] = max(d - OFF / 2, 0.5)
-        edge = f", at least {d} px from its edge" if d else ""
-        return n, rule, f"spread {n} robots evenly over {said}{edge}, no two closer than {apart} px"
+        n = many(random, thing, "inside", bounds, wide)
+        d = named_length(margin(random, thing) or 0, team.scale)
+        deep = d.px + team.radius
+        near = max(int(APART * inner_cell(thing, n, deep)), 3, math.ceil(BODIES * team.radius))
+        apart = named_length(near, team.scale)
+        rule = inner_rule(thing, n, deep, apart.px)
+        rule["min_clearance_px"] = max(deep - OFF / 2, 0.5)
+        edge = f", at least {d.words} from its edge" if d.px else ""
+        text = f"spread {n} robots evenly over {said}{edge}, no two closer than {apart.words}"
+        return n, rule, text
     arrangement = "cage" if turn == "cage" else "around"
-    n = many(random, thing, arrangement, bounds)
-    d = distance(random, thing, size) or 6
-    rule = ring_rule(thing, arrangement, n, d, OFF)
+    n = many(random, thing, arrangement, bounds, wide)
+    d = named_length(distance(random, thing, size) or 6, team.scale)
+    rule = ring_rule(thing, arrangement, n, d.px + team.radius, OFF)
     if turn == "cage":
-        return n, rule, f"cage {said} with {n} robots, exactly {d} px from it"
-    return n, rule, f"place {n} robots evenly around {said}, exactly {d} px from it"
+        return n, rule, f"cage {said} with {n} robots, exactly {d.words} from it"
+    return n, rule, f"place {n} robots evenly around {said}, exactly {d.words} from it"
 
 
-def _groups(random: Generator, story: Story) -> list[Part]:
+def _groups(random: Generator, story: Story, team: Team) -> list[Part]:
     """The target and up to two more things that a phrase tells, each with robots of its own."""
     view = View(story.scene.things, story.scene.size)
     others = [
@@ -103,6 +131,6 @@ def _groups(random: Generator, story: Story) -> list[Part]:
     chosen = [(story.target, named(random, story)), *others[:2]]
     turns = ("ring", "infill", "ring") if random.random() < 0.5 else ("infill", "ring", "infill")
     return [
-        (thing, *_placed(random, thing, story.scene.size, (turn, words), SHARED))
+        (thing, *_placed(random, thing, story.scene.size, (turn, words), SHARED, team))
         for (thing, words), turn in zip(chosen, turns, strict=False)
     ]

@@ -64,13 +64,19 @@ def margin(random: Generator, thing: Thing) -> int | None:
     return d if shapely.get_num_geometries(thing.polygon.buffer(-d)) == 1 else None
 
 
-def many(random: Generator, thing: Thing, arrangement: str, bounds: tuple[int, int]) -> int:
-    """A number of robots within bounds that the thing has room for, small ones more often."""
+def many(
+    random: Generator, thing: Thing, arrangement: str, bounds: tuple[int, int], wide: float = 0.0
+) -> int:
+    """A number of robots within bounds that the thing has room for, small ones more often.
+
+    `wide` is the least distance of neighbours that robots of a size need, px.
+    """
+    gap = max(FINE_GAP, wide)
     least, most = bounds
     if arrangement == "inside":
-        fits = int(thing.polygon.buffer(-0.05 * thing.size).area / (1.6 * FINE_GAP) ** 2)
+        fits = int(thing.polygon.buffer(-0.05 * thing.size).area / (1.6 * gap) ** 2)
     else:
-        fits = int(thing.polygon.convex_hull.buffer(0.1 * thing.size).length / FINE_GAP)
+        fits = int(thing.polygon.convex_hull.buffer(0.1 * thing.size).length / gap)
     if arrangement == "cage":
         least = max(least, 10 if hollow(thing) else 6)
     top = max(least, min(most, fits))

@@ -23,19 +23,21 @@ from ..asks.inscribed import inscribed
 from ..asks.styled import styled
 from ..asks.unmet import unmet
 from ..scenes.build import entry_of, family_of, tell
-from ..suite import Task, Thing, photos_folder, read_entries
+from ..suite import Task, Thing, photos_folder, read_entries, rule_in_pixels
 from .tasks import SPLITS, Drawing, Split, Suite, SuiteTask
 
+SCALE = "metres_per_pixel"
 FILE = "suite.yaml"
 """In a folder of somebody's own."""
 Entry = dict[str, Any]
-ASKS: dict[str, Callable[[int], Entry]] = {
-    "own": lambda seed: entry_of(tell(seed)),
+ASKS: dict[str, Callable[[int, float | None], Entry]] = {
+    "own": lambda seed, scale: entry_of(tell(seed)),
     "styled": styled,
     "frontier": frontier,
-    "unmet": unmet,
-    "inscribed": inscribed,
+    "unmet": lambda seed, scale: unmet(seed),
+    "inscribed": lambda seed, scale: inscribed(seed),
 }
+"""What makes the entry of a seed; lengths are named in metres where there are metres per pixel."""
 DEPLOYED: tuple[Status, ...] = ("deployed",)
 
 
@@ -145,11 +147,12 @@ class _Families:
 def _item(item: Entry, path: Path, families: _Families) -> Iterator[SuiteTask]:
     """The tasks of one item of a suite's list."""
     must, named = bool(item.get("must_pass")), item.get("photos", "all")
+    scale = {name: item[name] for name in (SCALE,) if name in item}
     for make, family, root in _entries(item, path):
         split = families.split(family)
         if split is None:
             continue
-        entry = make()
+        entry = make() | scale
         for task in entry["tasks"]:
             if named == "all" or task["id"] in named:
                 yield _task(entry, task, root, (family, split, must))
@@ -160,7 +163,11 @@ def _entries(item: Entry, path: Path) -> Iterator[tuple[Callable[[], Entry], str
     if "scenes" in item:
         ask = ASKS[item.get("ask", "own")]
         for seed in seeds(item["scenes"], path):
-            yield partial(ask, seed), item.get("family") or family_of(seed).name, Path()
+            yield (
+                partial(ask, seed, item.get(SCALE)),
+                item.get("family") or family_of(seed).name,
+                Path(),
+            )
         return
     if "photos" in item:
         source = photos_folder() / item.get("file", "annotations.json")
@@ -214,6 +221,7 @@ def _task(entry: Entry, task: Entry, root: Path, placed: tuple[str, Split, bool]
         expects=expects,
         picture=picture,
         must_pass=must_pass,
+        metres_per_pixel=entry.get(SCALE),
     )
 
 
@@ -235,8 +243,9 @@ def _goal(entry: Entry, task: Entry, goal: Entry, picture: Path | Drawing) -> Ta
         image=picture if isinstance(picture, Path) else Path(picture.name),
         size=(entry["width"], entry["height"]),
         target=things[goal["target"]],
-        success=goal["success"],
+        success=rule_in_pixels(entry, task, goal["success"]),
         other=things[other] if other else None,
         referring=task.get("referring", ""),
         wording=task.get("wording", ""),
+        metres_per_pixel=entry.get(SCALE),
     )

@@ -52,6 +52,7 @@ class SuiteTask:
         expects: statuses that are right.
         picture: a file, or one that is drawn.
         must_pass: it always succeeds; the gate holds new versions to it.
+        metres_per_pixel: of the picture, told to who carries it out; None where it has no scale.
     """
 
     id: str
@@ -66,6 +67,7 @@ class SuiteTask:
     expects: tuple[Status, ...]
     picture: Path | Drawing
     must_pass: bool = False
+    metres_per_pixel: float | None = None
 
     @property
     def cell(self) -> tuple[str, str]:
@@ -83,6 +85,7 @@ class SuiteTask:
             "expects": self.expects,
             "goals": [_goal(goal) for goal in self.goals],
             "must_pass": self.must_pass,
+            **({"metres_per_pixel": self.metres_per_pixel} if self.metres_per_pixel else {}),
         }
 
 

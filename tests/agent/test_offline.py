@@ -1,6 +1,7 @@
 """The offline planner: which arrangement the words mean, and what it asks when they do not say."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -151,7 +152,44 @@ def test_closeness_spacing_distance_and_layout() -> None:
     assert understand("a wide ring around it").fit == "wide"
     assert understand("around it, unevenly").spacing == "free"
     assert understand("around it, 20 px away").clearance == 20
+    reading = understand("6 robots of radius 5 px around it, 20 px away, 30 px apart")
+    assert (reading.robots, reading.robot_radius) == (6, 5)
+    assert (reading.clearance, reading.min_spacing) == (20, 30)
     assert understand("between them as a barrier: between the two cars").layout == "divider"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "surround it with 6 robots 40 cm wide, stay 2 m away, 1.5 m apart",
+        "surround it with 6 robots, 2 metres away; they are 0.4 m across, spaced 1.5 metres apart",
+        "Ring of 6 robots around it. 2m from it. No two robots closer than 1.5m to each other. "
+        "The robots are 0.4 m in diameter.",
+    ],
+)
+def test_metric_lengths_are_read_wherever_pixels_are(words: str) -> None:
+    for scale, metric in ((0.05, words), (None, _in_px(words))):
+        reading = understand(metric, scale)
+        assert reading.relations == ("around",)
+        assert (reading.robots, reading.fit, reading.beyond) == (6, "normal", ())
+        lengths = (reading.clearance, reading.min_spacing, reading.robot_radius)
+        assert lengths == (40, 30, 4)
+    assert len(understand(words).unscaled) == 3
+    assert understand(words).clearance is None
+
+
+def _in_px(words: str) -> str:
+    def px(found: re.Match[str]) -> str:
+        return f"{float(found[1]) / (5 if found[2] == 'cm' else 0.05):g} px"
+
+    return re.sub(r"([0-9.]+) ?(metres|cm|m)\b", px, words)
+
+
+def test_lengths_that_are_none_to_keep_or_disagree_are_said_to_go_beyond() -> None:
+    assert understand("ring it, at most 2 m away", 0.05).beyond == ("at most 2 m",)
+    assert understand("ring the 3 m long boat, 1 m away", 0.05).beyond == ("3 m long",)
+    assert understand("ring it, 1 m away, 3 m away", 0.05).beyond == ("1 m", "3 m")
+    assert understand("ring it, 7 feet away", 0.05).beyond == ("7 feet",)
 
 
 def test_every_instruction_of_the_suite_is_read_as_its_rule_means_it() -> None:
@@ -198,6 +236,12 @@ def test_a_named_distance_becomes_the_contracts_clearance() -> None:
     report = run("Ring it with 5 robots, 14 px away", pointed=[COIN])
     assert report.contract is not None
     assert report.contract.groups[0].clearance == (14, 15)
+
+
+def test_a_distance_that_cannot_be_kept_is_asked_about() -> None:
+    report = run("Gather 3 robots at its centre, 14 px away", pointed=[COIN])
+    assert report.status == "question"
+    assert "at the centre of" in report.message
 
 
 def test_a_cage_of_two_is_impossible_and_it_says_why() -> None:

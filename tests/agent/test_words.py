@@ -170,8 +170,6 @@ def test_the_rest_is_for_the_arrangement(words: str, rest: str) -> None:
         "line up along its left side and along its top side",
         "line up along the lower left side of it",
         "surround it, at most 20 px away",
-        "surround it with robots of radius 5 px",
-        "surround it with 7 robots 20 pixels apart",
         "cage it leaving one exit",
         "surround it but leave a gap at the top",
         "remove the robots around it",
@@ -248,3 +246,9 @@ def test_any_words_are_read_without_a_crash(words: str) -> None:
     reading = references(words)
     assert isinstance(understand(reading.rest).relations, tuple)
     assert all(thing.said for thing in reading.things)
+
+
+@pytest.mark.parametrize("length", ["1.4 m", "0.64m", "1,500 mm", "12.5 px"])
+def test_numbers_with_a_point_or_a_comma_stay_whole(length: str) -> None:
+    assert length in references(f"Surround the red box, {length} from it.").rest
+    assert understand(references("2.5 robots around the red box").rest).robots is None

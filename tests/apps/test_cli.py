@@ -28,6 +28,7 @@ KEYS = [
     "verdict",
     "partial",
     "arrival",
+    "metric",
     "model",
     "prompt",
     "prompts",
@@ -254,6 +255,24 @@ def test_starts_seed_radius_and_clearance_are_held_to(tmp_path: Path) -> None:
     assert data["contract"]["robot_radius"] == 5
     assert data["contract"]["groups"][0]["clearance"] == [11, 13]
     assert 11 <= data["verdict"]["measures"]["min_clearance_px"] <= 13
+
+
+def test_a_scale_gives_lengths_in_metres_and_goes_with_the_plan(tmp_path: Path) -> None:
+    command = ("run", PHOTOS / "cars_two.jpg", "Surround the car", "-n", 6, *CAR_BOX, "--json")
+    scaled = ("--metres-per-pixel", 0.02, "--clearance", "0.5m", "--robot-radius", "10 cm")
+    done = formup(*command, *scaled, "--plan-only", "--out", "out", cwd=tmp_path)
+    planned = report(done)
+    assert planned["status"] == "planned", done.stderr
+    assert planned["contract"]["robot_radius"] == 5
+    least, most = planned["contract"]["groups"][0]["clearance"]
+    assert least < 25 < most
+    assert planned["metric"]["metres_per_pixel"] == 0.02
+    again = report(formup("deploy", "out/plan.json", "--json", cwd=tmp_path))
+    assert again["status"] == "deployed"
+    assert again["metric"]["positions"] == planned["metric"]["positions"]
+    assert len(again["metric"]["observed"]) == 6
+    shown = formup("deploy", "out/plan.json", cwd=tmp_path).stdout
+    assert " px) away" in " ".join(shown.split())
 
 
 def test_the_schema_of_a_contract_is_what_the_tool_takes(tmp_path: Path) -> None:

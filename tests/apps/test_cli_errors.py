@@ -216,6 +216,23 @@ def test_eval_says_what_is_wrong(cli: Cli, tmp_path: Path) -> None:
     refused(cli("eval", "photos", "--mode", "psychic"), "'psychic'", "outline")
     refused(cli("eval", "photos", "--data", tmp_path), "annotations.json")
     refused(cli("eval", "photos", "--seeds", 0), "--seeds '0'")
-    refused(cli("eval", "photos", "--model", f"replay:{tmp_path}"), "no recording here")
+    refused(cli("eval", "photos", "--model", f"replay:{tmp_path}"), "none has a recording here")
     (tmp_path / "annotations.json").write_text("[{}]")
     refused(cli("eval", "photos", "--data", tmp_path), "required")
+
+
+@pytest.mark.parametrize("scale", ["0", "-1", "nan", "inf", "1e9", "5 cm", ""])
+def test_no_scale_of_a_picture(cli: Cli, picture: Path, scale: str) -> None:
+    refused(
+        cli("run", picture, *CAR, "--metres-per-pixel", scale),
+        f"--metres-per-pixel {scale!r}",
+        "0.000001 to 1000, such as 0.05",
+    )
+    tool = ("tools", "call", "look", "--image", picture)
+    refused(cli(*tool, "--metres-per-pixel", scale), "--metres-per-pixel")
+
+
+@pytest.mark.parametrize("option", ["--clearance", "--robot-radius"])
+def test_metric_options_take_a_scale(cli: Cli, picture: Path, option: str) -> None:
+    refused(cli("run", picture, *CAR, option, "1.5m"), f"{option} '1.5m'", "--metres-per-pixel")
+    refused(cli("run", picture, *CAR, option, "1.5 feet"), "1.5 feet", "1.5m or 40cm")

@@ -1,6 +1,7 @@
 """Suites: their format, their pictures, and every task of every one against a right answer."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from formup.evals.suites.ledger import look
 from formup.evals.suites.load import load_suite, schema, seeds, shipped, write_suite
 from formup.evals.suites.tasks import Drawing, Suite
 from formup.tools.errors import InputError
+from formup.tools.formation.named import named_lengths
 from shapely.geometry import Point
 
 SPLIT = {"formation-dev": ("train", "dev", "test")}
@@ -108,9 +110,71 @@ def test_the_frontier_has_what_it_says() -> None:
     tasks = loaded("frontier").tasks
     assert min(task.robots or 0 for task in tasks) >= 20
     assert max(task.robots or 0 for task in tasks) > 80
-    assert sum(len(task.goals) > 1 for task in tasks) == 12
+    assert sum(len(task.goals) > 1 for task in tasks) == 12 + 4
     assert any(task.goals[0].target.holes for task in tasks)
-    assert sum(bool(task.goals[0].success.get("closed")) for task in tasks) == 12
+    assert sum(bool(task.goals[0].success.get("closed")) for task in tasks) == 12 + 4
+    metric = [task for task in tasks if task.metres_per_pixel]
+    assert len(metric) == 16
+    for task in metric:
+        lengths = [length.of for length in named_lengths(task.instruction.lower())]
+        assert lengths.count("across") == 1
+        assert {"distance", "apart"} & set(lengths)
+        assert "px" not in task.instruction
+
+
+def test_metric_tasks_name_metres_and_are_graded_in_px() -> None:
+    tasks = [t for split in SPLIT["formation-dev"] for t in loaded("formation-dev", split).tasks]
+    metric = [task for task in tasks if task.metres_per_pixel]
+    assert len(metric) == 36
+    assert {task.family for task in metric} == {task.family for task in tasks}
+    sized = 0
+    for task in metric:
+        lengths = named_lengths(task.instruction.lower())
+        assert lengths
+        assert all(length.unit == "m" for length in lengths)
+        sized += any(length.of == "across" for length in lengths)
+        (goal,) = task.goals
+        assert goal.metres_per_pixel == task.metres_per_pixel
+        assert not [name for name in goal.success if name.endswith("_m")]
+        for length in lengths:
+            if length.of == "distance" and "band_px" in goal.success:
+                across = [n.px(goal.metres_per_pixel) for n in lengths if n.of == "across"]
+                far = length.px(goal.metres_per_pixel) + sum(across) / 2
+                assert sum(goal.success["band_px"]) / 2 == pytest.approx(far, abs=0.6)
+    assert sized >= 15
+
+
+def test_robots_whose_named_size_is_left_out_stand_too_near() -> None:
+    for task in loaded("frontier").tasks:
+        goal = task.goals[0]
+        if not task.metres_per_pixel or "band_px" not in goal.success:
+            continue
+        across = [n for n in named_lengths(task.instruction.lower()) if n.of == "across"]
+        radius = across[0].px(task.metres_per_pixel) / 2
+        low, high = goal.success["band_px"]
+        assert radius > (high - low) / 2
+        near = replace(goal, success=goal.success | {"band_px": [low - radius, high - radius]})
+        assert grade_goals([near], reference(near)).sr
+        assert not grade_goals([goal], reference(near)).sr
+
+
+@pytest.mark.parametrize("extra", [{}, {"metres_per_pixel": 0.1, "band": True}])
+def test_metres_in_a_rule_take_a_scale_and_stand_alone(
+    tmp_path: Path, extra: dict[str, Any]
+) -> None:
+    entries = json.loads((photos_folder() / "metric.json").read_text("utf-8"))[:1]
+    (tmp_path / "images").symlink_to(photos_folder() / "images")
+    folder = write(tmp_path, [{"pictures": entries, "metres_per_pixel": 0.2}])
+    (task,) = load_suite(folder).tasks
+    rule = entries[0]["tasks"][0]["success"]
+    assert task.goals[0].success["band_px"] == pytest.approx([v / 0.2 for v in rule["band_m"]])
+    entries[0].pop("metres_per_pixel")
+    if extra:
+        entries[0]["metres_per_pixel"] = 0.1
+        rule["band_px"] = [1, 2]
+    (tmp_path / "annotations.json").write_text(json.dumps(entries))
+    with pytest.raises(InputError, match="band_m" if not extra else "breaks the photos format"):
+        load_tasks(tmp_path)
 
 
 def test_where_nothing_is_to_be_placed_moving_is_wrong() -> None:

@@ -10,16 +10,17 @@ from ..fleet.deploy import deploy as drive
 from ..fleet.simulated import SimulatedFleet
 from ..formation.caging import CageError
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
+from ..formation.lengths import contract_in_pixels, with_metres
 from ..formation.partial import Refusal, best_partial
 from ..formation.place import CapacityError
 from ..formation.plan import Plan, make_plan
 from ..formation.wording import doubts
 from ..geometry.outline import distances
 from ..perception.prompts import Point, TargetPrompt
-from ..scene import Target
+from ..scene import Scene, Target
 from ..tool import ToolResult, tool
 from ..workspace import Settings, Workspace
-from .seeing import FRAME, doubtful, measured, overlays, sighting, summary
+from .seeing import doubtful, framed, measured, overlays, sighting, summary
 
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
@@ -58,20 +59,13 @@ def propose_formation(
             f"The person asked for {asked} robots; the contract's groups add up to "
             f"{contract.robots}."
         )
-    found = doubts(workspace.instruction, contract, counted=asked is not None)
-    if found and not contract.reading:
-        raise ToolError(
-            f"A doubt: {'; '.join(found)}. Propose again with a contract that says what is meant; "
-            "if this one does, say why in its `reading`."
-        )
+    stated = contract_in_pixels(contract, workspace.scene.metres_per_pixel)
+    _check_doubts(workspace, stated)
     for prompt in targets:
         measured(workspace, prompt)
-    held = _held_to(contract, workspace.settings)
+    held = _held_to(stated, workspace.settings)
     places = positions if samples is None else _sampled(workspace, samples)
-    try:
-        plan = make_plan(held, workspace.scene.site(held), workspace.scene.version, places)
-    except (CapacityError, CageError) as error:
-        raise ToolError(f"{error}{_partial(workspace, held, error)}") from None
+    plan = _planned(workspace, held, places)
     _keep(workspace, plan)
     unseen = workspace.unseen[plan.id] = _unseen(workspace, plan, contract)
     data = _proposal(workspace, plan)
@@ -82,6 +76,30 @@ def propose_formation(
     if plan.verdict.certified and (advice := _to_see(workspace, plan)):
         data |= {"look_first": advice}
     return ToolResult(data, overlays(workspace, map(workspace.scene.target, unseen), plan))
+
+
+def _check_doubts(workspace: Workspace, contract: Contract) -> None:
+    """Hold the contract, in px, against the person's words."""
+    settings = workspace.settings
+    free = settings.clearance is settings.robot_radius is None
+    scale = workspace.scene.metres_per_pixel if free else None  # else lengths are fixed already
+    counted = settings.robots is not None
+    found = doubts(workspace.instruction, contract, counted=counted, scale=scale)
+    if found and not contract.reading:
+        raise ToolError(
+            f"A doubt: {'; '.join(found)}. Propose again with a contract that says what is meant; "
+            "if this one does, say why in its `reading`."
+        )
+
+
+def _planned(workspace: Workspace, held: Contract, places: Any) -> Plan:
+    scene = workspace.scene
+    try:
+        return make_plan(held, scene.site(held), scene.version, places)
+    except ToolError as error:
+        short = isinstance(error, CapacityError | CageError)
+        less = _partial(workspace, held, error) if short else ""
+        raise ToolError(f"{scene.told(str(error))}{less}") from None
 
 
 def _unseen(workspace: Workspace, plan: Plan, contract: Contract) -> tuple[str, ...]:
@@ -109,8 +127,8 @@ async def deploy(
         raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
     if plan.partial is not None and workspace.settings.approved != plan.id:
         raise ToolError(
-            f"Plan {plan.id} is partial ({plan.partial.short}): nothing of a task is done unasked. "
-            "A person may have exactly this plan driven, with formup deploy."
+            f"Plan {plan.id} is partial ({workspace.scene.told(plan.partial.short)}): nothing of a "
+            "task is done unasked. A person may have exactly this plan driven, with formup deploy."
         )
     if not workspace.settings.may_deploy:
         raise ToolError("The person asked for the plan only: nothing may be moved.")
@@ -135,7 +153,8 @@ async def deploy(
     if arrival.assignment_gap is not None:
         most = f"{arrival.assignment_gap:.2%} of the summed squared ways"
         data["assignment"] = f"approximate: another could have saved {most} at most"
-    return ToolResult(data, told=_told(tell, arrival) if arrival.arrived else None)
+    told = _told(tell, arrival, workspace.scene) if arrival.arrived else None
+    return ToolResult(with_metres(data, workspace.scene.metres_per_pixel), told=told)
 
 
 @tool("ask")
@@ -191,7 +210,7 @@ def _to_see(workspace: Workspace, plan: Plan) -> str:
     unseen = workspace.unseen.get(plan.id, plan.formation.contract.target_ids)
     for target in map(workspace.scene.target, unseen):
         if plan.id in workspace.unseen or doubtful(target):
-            return (
+            return workspace.scene.told(
                 f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
                 f"about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with tell). "
                 f"Where it does not and yours does, propose again with {target.id} and `points` "
@@ -219,13 +238,14 @@ def _slack(plan: Plan, name: str) -> float:
     return max(SLACK_SHARE * min(kept, default=MIN_CLEARANCE), SLACK_PX)
 
 
-def _told(tell: str | None, arrival: Arrival) -> str | None:
+def _told(tell: str | None, arrival: Arrival, scene: Scene) -> str | None:
     """The model's words and, after them, what was observed."""
     if not tell:
         return None
     count, worst = len(arrival.observed), max(arrival.residual_px)
     robots = "The robot was" if count == 1 else f"All {count} robots were"
-    return f"{tell.strip()} {robots} observed within {max(worst, 0.1):.1f} px of the plan."
+    observed = scene.told(f"{robots} observed within {max(worst, 0.1):.1f} px of the plan.")
+    return f"{tell.strip()} {observed}"
 
 
 def _held_to(contract: Contract, settings: Settings) -> Contract:
@@ -254,7 +274,7 @@ def _sampled(workspace: Workspace, samples: tuple[str, ...]) -> Any:
 
 
 def _proposal(workspace: Workspace, plan: Plan) -> dict[str, Any]:
-    verdict, contract = plan.verdict, plan.formation.contract
+    verdict, contract, scene = plan.verdict, plan.formation.contract, workspace.scene
     findings = [f.sentence for f in verdict.findings]
     more = len(findings) - MAX_FINDINGS
     return {
@@ -262,8 +282,8 @@ def _proposal(workspace: Workspace, plan: Plan) -> dict[str, Any]:
         "certified": verdict.certified,
         "findings": findings[:MAX_FINDINGS] + ([f"and {more} more findings"] if more > 0 else []),
         "notes": list(verdict.notes),
-        "measures": verdict.measures,
-        "targets": [summary(workspace.scene.target(t)) for t in contract.target_ids],
+        "measures": with_metres(verdict.measures, scene.metres_per_pixel),
+        "targets": [summary(scene.target(t)) for t in contract.target_ids],
         "robots": contract.robots,
-        "frame": FRAME,
+        **framed(scene),
     }

@@ -9,11 +9,12 @@ from shapely.geometry import LineString
 from shapely.geometry import Point as Place
 from shapely.geometry.base import BaseGeometry
 
+from ..formation.lengths import with_metres
 from ..geometry.outline import FloatArray, Outline, distances
 from ..perception.prompts import Point
 from ..tool import ToolResult, tool
 from ..workspace import Descriptor, Workspace
-from .seeing import FRAME
+from .seeing import framed
 
 MATRIX_SIDE = 32
 """Longest side of the binary matrix descriptor, cells."""
@@ -46,8 +47,9 @@ def describe_shape(
         "centre": _rounded(outline.centre),
         "corners": [_rounded(c) for c in outline.corners],
         "holes": len(outline.polygon.interiors),
-        "frame": FRAME,
+        **framed(workspace.scene),
     }
+    data = with_metres(data, workspace.scene.metres_per_pixel)
     return ToolResult(data | _described(outline, descriptor or workspace.settings.descriptor))
 
 
@@ -66,16 +68,20 @@ def check_point(workspace: Workspace, target: str, points: tuple[Point, ...]) ->
     nearest = np.argmin(np.stack([distances(side, places) for side in sides]), axis=0)
     inside = shapely.intersects_xy(outline.polygon, places)
     depth = distances(outline.polygon.boundary, places)
+    scale = workspace.scene.metres_per_pixel
     rows = [
-        {
-            "point": _rounded(p),
-            "where": "on edge" if d <= ON_EDGE else "inside" if i else "outside",
-            "signed_distance_px": round(float(-d if i else d), 2),
-            "nearest_edge": int(e),
-        }
+        with_metres(
+            {
+                "point": _rounded(p),
+                "where": "on edge" if d <= ON_EDGE else "inside" if i else "outside",
+                "signed_distance_px": round(float(-d if i else d), 2),
+                "nearest_edge": int(e),
+            },
+            scale,
+        )
         for p, i, d, e in zip(places, inside, depth, nearest, strict=True)
     ]
-    return ToolResult({"target": target, "points": rows, "frame": FRAME})
+    return ToolResult({"target": target, "points": rows, **framed(workspace.scene)})
 
 
 @tool("read")
@@ -92,9 +98,9 @@ def measure(workspace: Workspace, a: str | Point, b: str | Point) -> ToolResult:
         "nearest_px": round(float(shape_a.distance(shape_b)), 2),
         "centres_px": round(float(np.hypot(*way)), 2),
         "direction_degrees": round(math.degrees(math.atan2(way[1], way[0])), 1),
-        "frame": f"{FRAME}; directions clockwise from right",
+        **framed(workspace.scene, "; directions clockwise from right"),
     }
-    return ToolResult(data)
+    return ToolResult(with_metres(data, workspace.scene.metres_per_pixel))
 
 
 def _place(workspace: Workspace, thing: str | Point) -> tuple[BaseGeometry, FloatArray]:

@@ -12,10 +12,12 @@ from ..formation.contract import (
     Contract,
     Group,
     SideName,
+    Unit,
     Where,
     default_clearance,
     with_defaults,
 )
+from ..formation.lengths import in_pixels
 from ..formation.place import place, reference_curve
 from ..formation.site import Site
 from ..geometry.curves import Frame, segment
@@ -26,7 +28,7 @@ from ..geometry.shapes import Kind
 from ..perception.prompts import Box, Point
 from ..tool import ToolResult, tool, violations
 from ..workspace import Workspace
-from .seeing import FRAME
+from .seeing import framed
 
 Count = Annotated[int, Field(ge=1, le=MAX_ROBOTS)]
 Pixels = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -45,6 +47,7 @@ def sample_along_edges(
     rings: Annotated[int, Field(ge=1, le=20)] = 1,
     step: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None,
     holes: bool = False,
+    unit: Unit | None = None,
 ) -> ToolResult:
     """Positions outside a target: evenly around it, along one side or chosen edges, or at corners.
 
@@ -59,7 +62,9 @@ def sample_along_edges(
         rings: so many rings around it, one behind the other.
         step: from ring to ring, image pixels; left out: the offset again.
         holes: inside the target's holes, along their edges.
+        unit: of offset and step, px or m; said if Metres per pixel is told.
     """
+    offset, step = (_px(workspace, length, unit) for length in (offset, step))
     if side is not None and edges is not None:
         raise ToolError("sample_along_edges: give a side or edges, not both.")
     if holes or rings > 1:
@@ -80,7 +85,11 @@ def sample_along_edges(
 
 @tool("read")
 def sample_inside(
-    workspace: Workspace, target: str, n: Count, margin: Pixels | None = None
+    workspace: Workspace,
+    target: str,
+    n: Count,
+    margin: Pixels | None = None,
+    unit: Unit | None = None,
 ) -> ToolResult:
     """Positions spread evenly over the inside of a target, holes left out.
 
@@ -88,7 +97,9 @@ def sample_inside(
         target: target id, such as t1.
         n: how many positions.
         margin: least distance from the target's edge, image pixels; left out: the default.
+        unit: of the margin, px or m; said if Metres per pixel is told.
     """
+    margin = _px(workspace, margin, unit)
     group: dict[str, Any] = {"relation": "inside", "targets": (target,), "robots": n}
     if margin is not None:
         deepest = workspace.scene.target(target).outline.size
@@ -142,6 +153,10 @@ def sample_shape(
         return _plain_shape(workspace, kind, n, targets, (start, end), layout)
     group = {"relation": "shape", "targets": targets, "robots": n, "shape": {"kind": kind} | form}
     return _sampled(workspace, "sample_shape", group)
+
+
+def _px(workspace: Workspace, length: float | None, unit: Unit | None) -> float | None:
+    return length and in_pixels(length, unit, workspace.scene.metres_per_pixel)
 
 
 def _plain_shape(
@@ -228,6 +243,6 @@ def _reply(workspace: Workspace, points: FloatArray) -> ToolResult:
     data: dict[str, Any] = {
         "sample": workspace.keep_sample(rounded),
         "positions": rounded.tolist(),
-        "frame": FRAME,
+        **framed(workspace.scene),
     }
     return ToolResult(data)

@@ -28,6 +28,12 @@ LEAST_SHARE = 0.1
 """Colours that fewer of a thing's pixels have are left out of replies."""
 
 
+def framed(scene: Scene, more: str = "") -> dict[str, Any]:
+    """What a reply says of its coordinates and lengths: the frame, and the scale if it is known."""
+    scale = scene.metres_per_pixel
+    return {"frame": FRAME + more} | ({} if scale is None else {"metres_per_pixel": scale})
+
+
 def summary(target: Target) -> dict[str, Any]:
     """What a reply says of a target."""
     data = {
@@ -91,7 +97,7 @@ def look(
         "width": scene.picture.width,
         "height": scene.picture.height,
         **_part_shown(scene, region),
-        "frame": FRAME,
+        **framed(scene),
         "targets": [summary(t) for t in scene.targets],
         "candidates": [sighting(c) for c in shown],
         "notes": list(scene.picture.notes),
@@ -123,10 +129,11 @@ def locate_object(workspace: Workspace, query: Query | None = None) -> ToolResul
             if prompt.id not in found:
                 workspace.segment(prompt)
         targets = [summary(t) for t in workspace.scene.targets]
-        return ToolResult({"targets": targets, "frame": FRAME})
+        return ToolResult({"targets": targets, **framed(workspace.scene)})
     clear = clear_ones(workspace.candidates())
     if query is None:
-        data = {"candidates": [sighting(c) for c in clear[:MOST_SHOWN]], "frame": FRAME}
+        shown = [sighting(c) for c in clear[:MOST_SHOWN]]
+        data = {"candidates": shown, **framed(workspace.scene)}
         return ToolResult(data | {"things": len(clear)})
     selection = select(clear, query, *workspace.scene.picture.size)
     matches = selection.matches[:MOST_SHOWN]
@@ -138,7 +145,7 @@ def locate_object(workspace: Workspace, query: Query | None = None) -> ToolResul
             "lacking": selection.lacking,
             "absent": bool(selection.lacking) and not _hinted(query, workspace.candidates()),
             "things": len(clear),
-            "frame": FRAME,
+            **framed(workspace.scene),
         }
     )
 
@@ -191,7 +198,7 @@ def segment(
         }
     )
     target = measured(workspace, prompt)
-    data = {**summary(target), "parts": dict(target.parts), "frame": FRAME}
+    data = {**summary(target), "parts": dict(target.parts), **framed(workspace.scene)}
     return ToolResult(data, overlays(workspace, (target,) if doubtful(target) else ()))
 
 

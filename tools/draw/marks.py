@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import ToolError
 from ..formation.contract import CENTRE_SHARE, OUTSIDE, Contract
+from ..formation.lengths import also_metres
 from ..formation.place import Site, reference_curve
 from ..formation.verdict import Part, parts_of
 from ..geometry.curves import Curve
@@ -93,12 +94,13 @@ def draw_guides(canvas: Canvas, contract: Contract, site: Site, points: FloatArr
 def label_openings(
     canvas: Canvas, contract: Contract, site: Site, points: FloatArray, labels: Labels
 ) -> None:
-    """The widest gap of every ring in px, where the checker measures it."""
+    """The widest gap of every ring in px, or in metres if it can be, where the checker measures."""
     for part in parts_of(contract, points, site):
         opening = _opening(part)
         if opening is None:
             continue
         text = f"{opening.width:.{0 if opening.width >= 10 else 1}f} px"
+        text = also_metres(text, site.metres_per_pixel).partition(" (")[0]
         middle = canvas.at(opening.middle[None])[0]
         away = middle - canvas.at(np.array([part.outline.centre]))[0]
         size = canvas.chip_size(text, LABEL)

@@ -32,6 +32,7 @@ from .marks import (
 from .numbered import colours_of, draw_numbered
 from .page import draw_bars, draw_footer, make_page
 from .rulers import RULER, draw_rulers
+from .scale_bar import draw_scale_bar
 from .text import drawable
 
 LEAST_LONG, MOST_LONG = 1200, 1500
@@ -65,7 +66,8 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
 
     Areas where robots' centres may stand are tinted; what a ring leaves open, a side, a line
     and the ways to corners are dashed. Robots with a finding are red with a cross. Where a target
-    was found to get out of a cage, its way is shown.
+    was found to get out of a cage, its way is shown. Where the scale is known, lengths are told in
+    metres too and the footer has a scale bar.
 
     Args:
         scene: what the plan was made in.
@@ -94,7 +96,10 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
     if drivable:
         label_openings(canvas, contract, site, points, labels)
     draw_bars(page)
-    draw_footer(canvas, *_badge(plan), _facts(plan))
+    scale = scene.metres_per_pixel
+    taken = draw_scale_bar(canvas, scale) if scale else 0.0
+    badge, ground = _badge(plan)
+    draw_footer(canvas, scene.told(badge), ground, list(map(scene.told, _facts(plan))), taken)
     return canvas.finish()
 
 

@@ -76,13 +76,18 @@ def left_text(canvas: Canvas, x: float, y: float, text: str, size: float, colour
     canvas.text(np.array([x + width / 2, y]), text, size, colour)
 
 
-def draw_footer(canvas: Canvas, badge: str, ground: Colour, items: list[str]) -> None:
-    """A badge and after it as many of the items, most important first, as fit."""
+def draw_footer(
+    canvas: Canvas, badge: str, ground: Colour, items: list[str], taken: float = 0.0
+) -> None:
+    """A badge and after it as many of the items, most important first, as fit.
+
+    `taken` is how much at the right is left free for something else, page px.
+    """
     y, pad = footer_middle(canvas), PAD * canvas.unit
     width, _ = canvas.chip_size(badge, FOOTER)
     canvas.chip(np.array([pad + width / 2, y]), badge, FOOTER, PAPER, ground)
     x = 2 * pad + width
-    room = canvas.size[0] - x - pad
+    room = canvas.size[0] - x - pad - taken
     kept = list(items)
     while len(kept) > 1 and canvas.text_size("   ·   ".join(kept), FOOTER)[0] > room:
         kept.pop()

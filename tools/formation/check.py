@@ -45,7 +45,7 @@ def certify(positions: ArrayLike, contract: Contract, site: Site) -> Verdict:
     Raises:
         InputError: the positions are no (N, 2) array.
     """
-    audit = Audit()
+    audit = Audit(site.metres_per_pixel)
     points = np.asarray(positions, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2:
         raise InputError(f"Positions must be (x, y) pairs, shape (N, 2); got {points.shape}.")

@@ -1,8 +1,9 @@
 """What an instruction demands of a formation, in a form code can check.
 
 A model (or a person) writes a Contract before anything is placed; the checker certifies
-positions against it. Lengths are pixels of the picture; clearances are measured from the
-outline to the robot's edge, so a robot of radius r keeps its centre r further away.
+positions against it. Lengths are pixels of the picture, or metres until `contract_in_pixels`;
+clearances are measured from the outline to the robot's edge, so a robot of radius r keeps its
+centre r further away.
 """
 
 import math
@@ -34,10 +35,12 @@ INSIDE_SHARE = 0.05
 CENTRE_SHARE = 0.2
 
 Relation = Literal["around", "cage", "corners", "along", "inside", "between", "centre", "shape"]
+Unit = Literal["px", "m"]
 SideName = Literal["left", "right", "top", "bottom", "long", "short"]
 Fit = Literal["tight", "normal", "wide"]
 FIT_FACTOR = {"tight": 0.5, "normal": 1.0, "wide": 2.0}
-Length = Annotated[float, Field(ge=0, le=100_000, allow_inf_nan=False)]
+MAX_LENGTH = 100_000.0
+Length = Annotated[float, Field(ge=0, le=MAX_LENGTH, allow_inf_nan=False)]
 Coordinate = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
 
 
@@ -255,6 +258,11 @@ class Contract(_Frozen):
 
     groups: tuple[Group, ...] = Field(min_length=1, max_length=50)
     robot_radius: Length = Field(default=0.0, description="Radius of a robot, px; 0 is a point.")
+    unit: Unit | None = Field(
+        default=None,
+        description="m: its lengths are metres, not px (places are px still). If Metres per pixel "
+        "is told, always say which.",
+    )
     keep_out: tuple[str, ...] = Field(
         default=(),
         description="Further targets no robot may touch; other things are not avoided.",
@@ -264,6 +272,12 @@ class Contract(_Frozen):
         max_length=300,
         description="Only where propose_formation doubts the contract: why it is what is meant.",
     )
+
+    @model_serializer(mode="wrap")
+    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without a unit where none is said: the hash of a plan without a scale stays the same."""
+        written = standard(self)
+        return {k: v for k, v in written.items() if k != "unit" or v is not None}
 
     @property
     def robots(self) -> int:

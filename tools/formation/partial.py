@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from .caging import CageError, escape_proof
 from .contract import Contract, Group, with_defaults
+from .lengths import also_metres
 from .place import CapacityError, Site
 from .plan import Plan, Shortfall, make_plan
 
@@ -49,7 +50,7 @@ def best_partial(
         return make_plan(smaller, site, scene_version)
 
     fewer = None if refusal is None else _fewer(full, attempt)
-    return fewer or _nearer(contract, full, attempt)
+    return fewer or _nearer(contract, full, attempt, site.metres_per_pixel)
 
 
 def _fewer(full: Contract, attempt: Callable[[Contract], Plan]) -> Plan | None:
@@ -74,7 +75,12 @@ def _fewer(full: Contract, attempt: Callable[[Contract], Plan]) -> Plan | None:
     return None
 
 
-def _nearer(stated: Contract, full: Contract, attempt: Callable[[Contract], Plan]) -> Plan | None:
+def _nearer(
+    stated: Contract,
+    full: Contract,
+    attempt: Callable[[Contract], Plan],
+    metres_per_pixel: float | None,
+) -> Plan | None:
     """All robots at the greatest clearance that can be held, of the first group it helps.
 
     A ring that goes all the way round comes before a wider one of which the picture leaves a part.
@@ -96,7 +102,7 @@ def _nearer(stated: Contract, full: Contract, attempt: Callable[[Contract], Plan
             placed=full.robots,
             clearance_asked=group.clearance,
             clearance=held.clearance,
-            sentence=sentence,
+            sentence=also_metres(sentence, metres_per_pixel),
         )
         return _marked(plan, short)
     return None

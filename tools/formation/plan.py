@@ -136,7 +136,11 @@ def _digest(content: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:10]
 
 
-def scene_version(picture_sha256: str, outlines: Mapping[str, object]) -> str:
-    """Hash of what a certificate depends on: the picture and every outline in it."""
-    text = json.dumps([picture_sha256, dict(sorted(outlines.items()))], separators=(",", ":"))
+def scene_version(
+    picture_sha256: str, outlines: Mapping[str, object], metres_per_pixel: float | None = None
+) -> str:
+    """Hash of what a certificate depends on: the picture, every outline in it, its scale if any."""
+    scale = () if metres_per_pixel is None else (metres_per_pixel,)
+    content = [picture_sha256, dict(sorted(outlines.items())), *scale]
+    text = json.dumps(content, separators=(",", ":"))
     return "s-" + hashlib.sha256(text.encode()).hexdigest()[:10]

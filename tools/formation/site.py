@@ -13,11 +13,15 @@ from .contract import Group
 
 @dataclass(frozen=True)
 class Site:
-    """What positions are judged in: the targets' outlines and the picture's size, px."""
+    """What positions are judged in: the targets' outlines and the picture's size, px.
+
+    With metres per pixel, what is said of positions tells lengths in metres too.
+    """
 
     outlines: Mapping[str, Outline]
     width: float
     height: float
+    metres_per_pixel: float | None = None
 
     @property
     def room(self) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from pydantic import BaseModel, ConfigDict
 
 from ..geometry.outline import FloatArray, Outline
 from .contract import Contract, Group
+from .lengths import also_metres
 from .place import Site
 
 TOLERANCE = 5e-3
@@ -85,8 +86,12 @@ class Part:
 
 @dataclass
 class Audit:
-    """Gathers what the rules find, over all groups of one contract."""
+    """Gathers what the rules find, over all groups of one contract.
 
+    With metres per pixel the sentences tell lengths in metres too.
+    """
+
+    metres_per_pixel: float | None = None
     findings: list[Finding] = field(default_factory=list[Finding])
     measures: dict[str, Measure] = field(default_factory=dict[str, Measure])
     notes: list[str] = field(default_factory=list[str])
@@ -128,11 +133,16 @@ class Audit:
         """What was gathered, as a value."""
         return Verdict(
             certified=not self.findings,
-            findings=tuple(self.findings),
+            findings=tuple(
+                f.model_copy(update={"sentence": self._told(f.sentence)}) for f in self.findings
+            ),
             measures=dict(self.measures),
-            notes=tuple(dict.fromkeys(self.notes)),
+            notes=tuple(dict.fromkeys(map(self._told, self.notes))),
             escape=self.escape,
         )
+
+    def _told(self, sentence: str) -> str:
+        return also_metres(sentence, self.metres_per_pixel)
 
 
 def parts_of(contract: Contract, points: FloatArray, site: Site) -> list[Part]:

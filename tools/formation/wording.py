@@ -5,9 +5,11 @@ a question to the model, which may answer that the contract is right.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from .contract import Contract, Relation
+from .lengths import also_metres
+from .named import LENGTH, named_lengths
 
 NUMBERS = (
     *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"),
@@ -30,20 +32,30 @@ PLAIN: tuple[tuple[str, str, frozenset[Relation]], ...] = (
 COUNT = re.compile(rf"\b(\d+|{'|'.join(NUMBERS)})\W+(?:\w+\W+)?(?:robots?|bots?|agents?|drones?)\b")
 
 
-def doubts(instruction: str, contract: Contract, *, counted: bool = False) -> list[str]:
+SAME = 0.05
+"""Share by which a length of the contract may differ from the one named."""
+
+
+def doubts(
+    instruction: str, contract: Contract, *, counted: bool = False, scale: float | None = None
+) -> list[str]:
     """Where a contract says something else than the plain words; each one clause.
 
     Args:
         instruction: in the person's words; words of other languages count nothing.
-        contract: as a model stated it.
+        contract: as a model stated it, in px.
         counted: whether the person gave the number of robots apart from the words.
+        scale: metres per pixel. Where there is one, lengths can be stated in either unit, so that
+            those the words name are looked for; None leaves them alone.
     """
     text = " ".join(instruction.lower().split())
-    return [*(() if counted else _count(text, contract)), *_relations(text, contract)]
+    lengths = () if scale is None else _lengths(text, contract, scale)
+    return [*(() if counted else _count(text, contract)), *_relations(text, contract), *lengths]
 
 
 def _count(text: str, contract: Contract) -> Iterator[str]:
-    said = [NUMBERS.index(n) if n in NUMBERS else int(n) for n in COUNT.findall(text)]
+    counted = COUNT.findall(LENGTH.sub(",", text))  # "0.4 m robots" are not four
+    said = [NUMBERS.index(n) if n in NUMBERS else int(n) for n in counted]
     found = [n for n in said if n > 1]  # "one robot at each corner" counts nothing
     if found and contract.robots not in {*found, sum(found)}:
         counts = " and ".join(map(str, found))
@@ -57,3 +69,27 @@ def _relations(text: str, contract: Contract) -> Iterator[str]:
         if plain and not used & meant:
             names = " or ".join(sorted(meant))
             yield f"the instruction says {word!r}, but no group has the relation {names}"
+
+
+def _lengths(text: str, contract: Contract, scale: float) -> Iterator[str]:
+    """Lengths of the words that the contract has not; forms have lengths of their own."""
+    drawn = any(group.relation == "shape" for group in contract.groups)
+    stated = [
+        length
+        for g in contract.groups
+        for length in (*(g.clearance or ()), sum(g.clearance or ()) / 2, g.min_spacing, g.max_gap)
+        if length
+    ]
+    for named in named_lengths(text):
+        px = named.px(scale)
+        if named.of in ("across", "radius"):
+            wanted = px / 2 if named.of == "across" else px
+            if not _near(wanted, [contract.robot_radius]):
+                has = also_metres(f"{contract.robot_radius:.1f} px", scale)
+                yield f"the instruction says {named.said} {named.of}, but robot_radius is {has}"
+        elif named.of != "something" and not drawn and not _near(px, stated):
+            yield f"the instruction names {named.said}, which is no length of the contract"
+
+
+def _near(length: float, among: Sequence[float]) -> bool:
+    return any(abs(length - other) <= SAME * length for other in among)

@@ -1,0 +1,229 @@
+"""A scene with a scale: what tools take, say and keep, and that it is part of what is certified."""
+
+import asyncio
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from formup.agent.agent import Agent
+from formup.agent.runs import load_run
+from formup.agent.task import read_task, task_text
+from formup.tools.doors import TOOLS
+from formup.tools.draw import draw_plan
+from formup.tools.draw.scale_bar import length_words, round_metres
+from formup.tools.errors import InputError, ToolError
+from formup.tools.formation.lengths import in_metres
+from formup.tools.perception.image import load_picture, picture_from_array
+from formup.tools.scene import Scene
+from formup.tools.store import read_stored, restore, store
+from formup.tools.workspace import Settings, Workspace
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+SCALE = 0.05
+TARGET = {"id": "t1", "label": "the box", "box": [75, 65, 145, 125]}
+
+
+def pixels() -> Any:
+    """A red 60 x 50 rectangle at (80, 70) on grey: 3 x 2.5 m."""
+    made = np.full((200, 240, 3), 90, np.uint8)
+    made[70:120, 80:140] = (200, 40, 40)
+    return made
+
+
+def workspace(instruction: str = "", scale: float | None = SCALE, **more: Any) -> Workspace:
+    scene = Scene(picture_from_array(pixels()))
+    return Workspace(scene, Settings(metres_per_pixel=scale, **more), instruction=instruction)
+
+
+def answer(work: Workspace, name: str, **arguments: Any) -> dict[str, Any]:
+    chosen = next(t for t in TOOLS if t.name == name)
+    return asyncio.run(chosen.call(work, arguments)).data
+
+
+def propose(work: Workspace, more: dict[str, Any], **group: Any) -> dict[str, Any]:
+    given = {"relation": "around", "targets": ["t1"], "robots": 6} | group
+    stated = {"groups": [given]} | more
+    return answer(work, "propose_formation", contract=stated, targets=[TARGET])
+
+
+def test_metres_and_their_pixels_make_the_same_plan() -> None:
+    plans = [
+        propose(workspace(), {"unit": unit, "robot_radius": 4 * f}, clearance=[20 * f, 22 * f])
+        for unit, f in (("m", SCALE), ("px", 1))
+    ]
+    assert plans[0] == plans[1]
+    data = plans[0]
+    assert data["certified"]
+    assert data["metres_per_pixel"] == SCALE
+    assert 1 <= data["measures"]["min_clearance_m"] <= data["measures"]["max_clearance_m"] <= 1.1
+    px = data["measures"]["min_clearance_px"]
+    assert data["measures"]["min_clearance_m"] == in_metres(px, SCALE)
+
+
+def test_a_length_without_a_unit_and_metres_without_a_scale_are_refused() -> None:
+    with pytest.raises(ToolError, match='"m" or "px"'):
+        propose(workspace(), {}, clearance=[1, 1.1])
+    with pytest.raises(ToolError, match=r"no scale.*ask the person"):
+        propose(workspace(scale=None), {"unit": "m"}, clearance=[1, 1.1])
+    assert propose(workspace(), {})["certified"]
+
+
+def test_findings_and_refusals_tell_metres() -> None:
+    group = {"relation": "around", "targets": ["t1"], "robots": 2, "clearance": [1, 1.1]}
+    given = {"targets": [TARGET], "positions": [[40, 90], [180, 95]]}
+    contract = {"groups": [group], "unit": "m"}
+    data = answer(workspace(), "propose_formation", contract=contract, **given)
+    assert not data["certified"]
+    assert re.search(r"is [12]\.\d{3} m \(\d\d\.\d px\) from t1; 1\.100 m \(22\.0 px\)", str(data))
+    with pytest.raises(ToolError, match=r"only \d+ robots? fits?: the .* m \(\d+ px\)"):
+        propose(workspace(), {"unit": "m"}, min_spacing=5)
+    contract = {"groups": [group | {"clearance": [20, 22]}]}
+    plain = answer(workspace(scale=None), "propose_formation", contract=contract, **given)
+    assert [re.sub(r"[0-9.]+ m \((.+?)\)", r"\1", f) for f in data["findings"]] == plain["findings"]
+    assert len(plain["findings"]) > 1
+
+
+def test_a_named_length_that_the_contract_has_not_is_doubted() -> None:
+    words = "Surround the box, 1 m from it; the robots are 40 cm across"
+    right = {"unit": "m", "robot_radius": 0.2}
+    assert propose(workspace(words), right, clearance=[1, 1.05])["certified"]
+    in_px = {"unit": "px", "robot_radius": 4}
+    assert propose(workspace(words), in_px, clearance=[20, 21])["certified"]
+    for more, clearance in (({"unit": "px", "robot_radius": 4}, [1, 1.05]), (right, [20, 21])):
+        with pytest.raises(ToolError, match="names 1 m, which is no length"):
+            propose(workspace(words), more, clearance=clearance)
+    with pytest.raises(ToolError, match=r"40 cm across, but robot_radius is 0\.400 m \(8\.0 px\)"):
+        propose(workspace(words), {"unit": "m", "robot_radius": 0.4}, clearance=[1, 1.05])
+    with pytest.raises(ToolError, match="A doubt"):
+        propose(workspace(words), right)
+    read = right | {"reading": "the metre is another thing's"}
+    assert propose(workspace(words), read)["certified"]
+    assert propose(workspace(words, clearance=20.0, robot_radius=4.0), {})["certified"]
+    assert propose(workspace(words, scale=None), {})["certified"]
+
+
+def test_measuring_tools_tell_metres_beside_pixels() -> None:
+    work = workspace()
+    propose(work, {})
+    shape = answer(work, "describe_shape", target="t1")
+    assert (shape["length_m"], shape["width_m"]) == (
+        in_metres(shape["length_px"], SCALE),
+        in_metres(shape["width_px"], SCALE),
+    )
+    assert shape["area_m2"] == pytest.approx(shape["area_px"] * SCALE**2, abs=0.01)
+    far = answer(work, "measure", a="t1", b=[10, 90])
+    assert far["nearest_m"] == pytest.approx(far["nearest_px"] * SCALE, abs=1e-3)
+    (point,) = answer(work, "check_point", target="t1", points=[[10, 90]])["points"]
+    assert point["signed_distance_m"] == far["nearest_m"]
+    plain = workspace(scale=None)
+    propose(plain, {})
+    assert "_m" not in " ".join(answer(plain, "describe_shape", target="t1"))
+
+
+def test_samples_take_metres() -> None:
+    work = workspace()
+    propose(work, {})
+    metric = answer(work, "sample_along_edges", target="t1", n=6, offset=1, unit="m")
+    plain = answer(work, "sample_along_edges", target="t1", n=6, offset=20, unit="px")
+    assert metric["positions"] == plain["positions"]
+    metric = answer(work, "sample_inside", target="t1", n=3, margin=0.25, unit="m")
+    assert (
+        metric["positions"]
+        == (answer(work, "sample_inside", target="t1", n=3, margin=5, unit="px")["positions"])
+    )
+    with pytest.raises(ToolError, match="unit"):
+        answer(work, "sample_inside", target="t1", n=3, margin=5)
+
+
+def test_the_scale_is_part_of_what_is_certified_and_is_kept(tmp_path: Path) -> None:
+    Image.fromarray(pixels()).save(tmp_path / "box.png")
+    picture = load_picture(tmp_path / "box.png")
+    work = Workspace(Scene(picture), Settings(metres_per_pixel=SCALE))
+    plan = propose(work, {"unit": "m"}, clearance=[1, 1.1])["plan_id"]
+    path = tmp_path / "state.json"
+    path.write_text(store(work).model_dump_json())
+    back = restore(read_stored(path), None, Settings())
+    assert back.scene.metres_per_pixel == SCALE
+    assert answer(back, "deploy", plan_id=plan)["arrived"]
+    other = restore(read_stored(path), None, Settings(metres_per_pixel=0.1))
+    with pytest.raises(ToolError, match="scene has changed"):
+        answer(other, "deploy", plan_id=plan)
+    assert replace(work.scene, metres_per_pixel=None).version != work.scene.version
+    with pytest.raises(InputError, match="-2 metres per pixel"):
+        Workspace(Scene(picture), Settings(metres_per_pixel=-2))
+
+
+def test_the_first_message_tells_the_scale_only_where_there_is_one() -> None:
+    text = task_text(workspace("Go"))
+    assert "\nMetres per pixel: 0.05\n" in text
+    assert read_task(text).metres_per_pixel == SCALE
+    plain = task_text(workspace("Go", scale=None))
+    assert plain == text.replace("Metres per pixel: 0.05\n", "")
+    assert read_task(plain).metres_per_pixel is None
+
+
+def test_a_run_in_metres_is_reported_in_both_and_goes_on_in_another_process(
+    tmp_path: Path,
+) -> None:
+    Image.fromarray(pixels()).save(tmp_path / "box.png")
+    picture, trace = load_picture(tmp_path / "box.png"), tmp_path / "run.jsonl"
+    words = "Ring the red thing with robots 40 cm wide, 1 m away and at least 50 cm apart"
+    agent = Agent()
+    asked = agent.run(picture, words, settings=Settings(metres_per_pixel=SCALE), trace=trace)
+    assert asked.report.status == "question"
+    report = agent.resume(load_run(trace), answer="7").report
+    assert report.status == "deployed", report.message
+    assert report.contract is not None and report.positions is not None
+    (group,) = report.contract.groups
+    assert group.clearance == (20, 21)
+    assert group.min_spacing == 10
+    assert (report.contract.robot_radius, report.contract.unit) == (4, "px")
+    metric = report.metric
+    assert metric is not None
+    assert metric["metres_per_pixel"] == SCALE
+    assert np.allclose(metric["positions"], np.asarray(report.positions) * SCALE, atol=1e-3)
+    assert len(metric["observed"]) == len(metric["residual"]) == 7
+    assert 1 <= metric["measures"]["min_clearance_m"] <= 1.05
+    assert " m (" in report.message
+    assert load_run(trace).report.metric == metric
+
+
+def test_without_a_scale_metric_words_are_refused_with_the_option_named() -> None:
+    words = "Ring the red thing with 6 robots, 1 m away"
+    report = Agent().run(picture_from_array(pixels()), words).report
+    assert report.status == "question"
+    assert "1 m" in report.message
+    assert "--metres-per-pixel" in report.message
+    assert report.metric is None
+
+
+@given(st.floats(1e-5, 1e5))
+def test_scale_bars_have_round_lengths(longest: float) -> None:
+    metres = round_metres(longest)
+    assert longest / 2.5 <= metres * (1 + 1e-6)
+    assert metres <= longest * (1 + 1e-6)
+    number, _, unit = length_words(metres).partition(" ")
+    size = {"km": 1e3, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6}[unit]
+    assert float(number) * size == pytest.approx(metres, rel=1e-5)
+    assert number.strip("0.")[0] in "125"
+
+
+def test_a_drawn_plan_has_a_scale_bar_of_the_length_it_says() -> None:
+    work = workspace()
+    propose(work, {})
+    (plan,) = work.plans.values()
+    drawn = np.asarray(draw_plan(work.scene, plan, "")).astype(int)
+    scene = replace(work.scene, metres_per_pixel=None)
+    plain = np.asarray(draw_plan(scene, plan, "")).astype(int)
+    assert drawn.shape == plain.shape
+    bright = (drawn[:, :, 0] > 230) & (np.abs(drawn - plain).sum(axis=2) > 300)
+    rows = np.flatnonzero(bright.sum(axis=1) > 100)
+    columns = np.flatnonzero(bright[rows].all(axis=0))
+    width = drawn.shape[1] / scene.picture.width
+    runs = np.split(columns, np.flatnonzero(np.diff(columns) > 1) + 1)
+    assert max(map(len, runs)) == pytest.approx(2 / SCALE * width, abs=3)  # 2 m of 12

@@ -1,0 +1,130 @@
+"""Metres and pixels of a picture taken straight from above: where the one becomes the other.
+
+All that is computed is pixels. A scale that differs from place to place would come in here.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import InputError, ToolError
+from .contract import MAX_LENGTH, Contract, Group, Unit
+
+FINEST, COARSEST = 1e-6, 1e3
+"""Least and greatest metres per pixel: from a microscope's picture to a satellite's."""
+NO_SCALE = "this picture has no scale (metres per pixel)"
+DECIMALS_PX, STATED_PX = 2, 6
+"""Decimals of pixels: those that metres beside them tell apart, those kept of a contract's."""
+_SHOWN = re.compile(
+    r"(?P<within>\(?)(?<![\w.])(?P<a>-?[0-9][0-9,]*(?:\.[0-9]+)?)"
+    r"(?:(?P<joint> to | and | x )(?P<b>-?[0-9][0-9,]*(?:\.[0-9]+)?))? px\b"
+)
+
+
+def check_scale(metres_per_pixel: float | None) -> None:
+    """Refuse what is no scale of a picture.
+
+    Raises:
+        InputError: not a number from 0.000001 to 1000.
+    """
+    if metres_per_pixel is not None and not FINEST <= metres_per_pixel <= COARSEST:  # nan fails
+        raise InputError(
+            f"{metres_per_pixel:g} metres per pixel cannot be the scale of a picture; give a "
+            "number from 0.000001 to 1000, such as 0.05."
+        )
+
+
+def in_pixels(length: float, unit: Unit | None, metres_per_pixel: float | None) -> float:
+    """A length in pixels; metres become at most 100,000 of them, with 6 decimals.
+
+    Args:
+        length: in the unit.
+        unit: None is px where there is no scale; where there is one, it has to be said.
+        metres_per_pixel: None where the picture has no scale.
+
+    Raises:
+        ToolError: metres without a scale, or no unit with one.
+    """
+    if unit == "m" and metres_per_pixel is None:
+        raise ToolError(
+            f"Lengths in m cannot be used: {NO_SCALE}. Give them in px, or ask the person."
+        )
+    if unit is None and metres_per_pixel is not None:
+        raise ToolError('The picture has a scale: say the lengths\' unit, "m" or "px".')
+    if unit == "m" and metres_per_pixel is not None:
+        return min(round(length / metres_per_pixel, STATED_PX), MAX_LENGTH)
+    return length
+
+
+def contract_in_pixels(contract: Contract, metres_per_pixel: float | None) -> Contract:
+    """The contract with all lengths in pixels, whatever unit they were stated in.
+
+    Args:
+        contract: as stated; a length of 0 needs no unit.
+        metres_per_pixel: of the picture; None where it has no scale.
+
+    Raises:
+        ToolError: metres without a scale, or lengths of no unit with one.
+    """
+
+    def px(length: float) -> float:
+        return in_pixels(length, contract.unit, metres_per_pixel) if length else length
+
+    def group_in_px(group: Group) -> Group:
+        given = {name: getattr(group, name) for name in ("min_spacing", "max_gap")}
+        update: dict[str, Any] = {k: px(v) for k, v in given.items() if v is not None}
+        if group.clearance is not None:
+            update["clearance"] = tuple(map(px, group.clearance))
+        return group.model_copy(update=update)
+
+    update = {
+        "groups": tuple(map(group_in_px, contract.groups)),
+        "robot_radius": px(contract.robot_radius),
+        "unit": None if metres_per_pixel is None else "px",
+    }
+    return contract.model_copy(update=update)
+
+
+def in_metres(pixels: float, metres_per_pixel: float) -> float:
+    """A length or coordinate in metres, rounded to a hundredth of a pixel or a little finer."""
+    return round(pixels * metres_per_pixel, _decimals(DECIMALS_PX, metres_per_pixel))
+
+
+def also_metres(text: str, metres_per_pixel: float | None) -> str:
+    """A text in which each length in px is told in metres, with the px behind it in brackets."""
+    if metres_per_pixel is None:
+        return text
+    scale = metres_per_pixel
+
+    def metres(number: str) -> str:
+        decimals = _decimals(len(number.partition(".")[2]), scale)
+        return f"{float(number.replace(',', '')) * scale:,.{decimals}f}"
+
+    def told(found: re.Match[str]) -> str:
+        if found["within"]:  # the brackets this function writes, or some that say enough
+            return found[0]
+        second = f"{found['joint']}{metres(found['b'])}" if found["b"] else ""
+        return f"{metres(found['a'])}{second} m ({found[0]})"
+
+    return _SHOWN.sub(told, text)
+
+
+def with_metres(data: Mapping[str, Any], metres_per_pixel: float | None) -> dict[str, Any]:
+    """The data and, beside each number named in px, the same in metres: `far_px`, `far_m`."""
+    if metres_per_pixel is None:
+        return dict(data)
+    beside: dict[str, Any] = {}
+    for name, value in data.items():
+        beside[name] = value
+        if name == "area_px":
+            area = in_metres(value * metres_per_pixel, metres_per_pixel)
+            beside["area_m2"] = area
+        elif name.endswith("_px") and isinstance(value, int | float):
+            beside[f"{name.removesuffix('_px')}_m"] = in_metres(value, metres_per_pixel)
+    return beside
+
+
+def _decimals(px_decimals: int, metres_per_pixel: float) -> int:
+    """Decimals of metres that tell apart what so many decimals of pixels do."""
+    return max(0, math.ceil(px_decimals - math.log10(metres_per_pixel)))
