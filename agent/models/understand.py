@@ -41,6 +41,7 @@ class Reading:
     spacing: str
     clearance: float | None
     beyond: tuple[str, ...]
+    escape_proof: bool
 
 
 def understand(instruction: str) -> Reading:
@@ -65,6 +66,7 @@ def understand(instruction: str) -> Reading:
             *_foreign_units(instruction),
             *_bounds(instruction),
         ),
+        escape_proof=any(_found(p, words) for p in _vocabulary()["escape_proof"]),
     )
 
 

@@ -18,6 +18,7 @@ import yaml
 from ...agent.report import Status
 from ...tools.errors import InputError
 from ...tools.store import write_whole
+from ..asks.caged import caged
 from ..asks.frontier import frontier
 from ..asks.inscribed import inscribed
 from ..asks.styled import styled
@@ -33,6 +34,7 @@ ASKS: dict[str, Callable[[int], Entry]] = {
     "own": lambda seed: entry_of(tell(seed)),
     "styled": styled,
     "frontier": frontier,
+    "caged": caged,
     "unmet": unmet,
     "inscribed": inscribed,
 }

@@ -200,6 +200,14 @@ def test_a_named_distance_becomes_the_contracts_clearance() -> None:
     assert report.contract.groups[0].clearance == (14, 15)
 
 
+def test_an_escape_proof_cage_is_one_that_is_certified() -> None:
+    for words, closure in (("an escape-proof cage", "escape-proof"), ("a cage", None)):
+        report = run(f"Make {words} of 8 robots around it", pointed=[COIN])
+        assert report.contract is not None
+        assert report.contract.groups[0].relation == "cage"
+        assert report.contract.groups[0].closure == closure
+
+
 def test_a_cage_of_two_is_impossible_and_it_says_why() -> None:
     report = run("Cage it", pointed=[COIN], settings=Settings(robots=2))
     assert report.status == "impossible"
