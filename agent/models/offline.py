@@ -134,6 +134,8 @@ def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
         "fit": reading.fit,
         "spacing": "even" if relation == "cage" else reading.spacing,
     }
+    if reading.apart is not None and relation != "centre":
+        group["min_spacing"] = reading.apart
     if relation == "along":
         group["side"] = reading.side or "long"
     if relation == "cage" and reading.escape_proof:

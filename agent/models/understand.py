@@ -24,6 +24,13 @@ QUESTION = re.compile(
     r"\b[^.!?;]*\?"
 )
 """A question is no instruction, unlike "could you surround it?"."""
+_LENGTH = r"([0-9]+(?:\.[0-9]+)?)\s*(?:px|pixels?)\b"
+APART = re.compile(
+    rf"\bno two\b[a-z ]*?\b(?:closer|nearer)(?: together)? than {_LENGTH}(?: to each other)?"
+    rf"|\bat least {_LENGTH} (?:apart|between (?:any two |the )?(?:ro)?bots)\b"
+    rf"|\bbetween (?:any two |the )?(?:ro)?bots[a-z: ]*? at least {_LENGTH}"
+)
+"""Robots at least so far from each other, which is no distance from the thing."""
 ENDINGS = ("ing", "ed", "es", "s", "e")
 Words = list[str]
 
@@ -42,6 +49,7 @@ class Reading:
     clearance: float | None
     beyond: tuple[str, ...]
     escape_proof: bool
+    apart: float | None
 
 
 def understand(instruction: str) -> Reading:
@@ -52,6 +60,8 @@ def understand(instruction: str) -> Reading:
     if not relations:
         relations = ["along"] if side else _matches("weak", words)
     robots, odd = _count(instruction)
+    apart = APART.search(instruction.lower())
+    lengths = APART.sub(" ", instruction.lower())
     return Reading(
         relations=tuple(relations),
         robots=robots,
@@ -60,13 +70,14 @@ def understand(instruction: str) -> Reading:
         layout=next(iter(_matches("layout", words)), "line"),
         fit=next(iter(_matches("fit", words)), "normal"),
         spacing="free" if any(_found(p, words) for p in _vocabulary()["free"]) else "even",
-        clearance=_clearance(instruction),
+        clearance=_clearance(lengths),
         beyond=(
             *_beyond(words, relations, side),
             *_foreign_units(instruction),
-            *_bounds(instruction),
+            *_bounds(lengths),
         ),
         escape_proof=any(_found(p, words) for p in _vocabulary()["escape_proof"]),
+        apart=float(next(filter(None, apart.groups()))) if apart else None,
     )
 
 

@@ -154,6 +154,35 @@ def test_closeness_spacing_distance_and_layout() -> None:
     assert understand("between them as a barrier: between the two cars").layout == "divider"
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "no two closer than 24 px",
+        "No two robots closer than 24 px to each other.",
+        "no two may stand nearer than 24 pixels",
+        "At least 24 px between robots.",
+        "Distance between robots: at least 24 px.",
+        "Between any two robots there shall be at least 24 px.",
+        "at least 24 px apart",
+    ],
+)
+def test_a_distance_of_robots_from_each_other_is_none_from_the_thing(words: str) -> None:
+    reading = understand(f"Fill it with 6 robots. {words}")
+    assert (reading.apart, reading.clearance, reading.beyond) == (24, None, ())
+    both = understand(f"Fill it with 6 robots, at least 8 px from its edge. {words}")
+    assert (both.apart, both.clearance) == (24, 8)
+    assert understand("6 robots inside it, 24 px apart").beyond
+
+
+def test_robots_that_do_not_fit_so_far_apart_are_not_moved() -> None:
+    report = run("Fill it with 60 robots, no two closer than 50 px", pointed=[COIN])
+    assert report.status == "impossible"
+    report = run("Fill it with 6 robots, no two closer than 30 px", pointed=[COIN])
+    assert report.contract is not None
+    assert report.contract.groups[0].min_spacing == 30
+    assert report.status == "deployed"
+
+
 def test_every_instruction_of_the_suite_is_read_as_its_rule_means_it() -> None:
     kinds = {"inside": "inside", "corners": "corners", "line_between": "between"}
     for task in load_tasks():
@@ -201,8 +230,8 @@ def test_a_named_distance_becomes_the_contracts_clearance() -> None:
 
 
 def test_an_escape_proof_cage_is_one_that_is_certified() -> None:
-    for words, closure in (("an escape-proof cage", "escape-proof"), ("a cage", None)):
-        report = run(f"Make {words} of 8 robots around it", pointed=[COIN])
+    for words, closure in (("an escape-proof cage", "escape-proof"), ("a cage", "ring")):
+        report = run(f"Make {words} of 8 robots", pointed=[COIN])
         assert report.contract is not None
         assert report.contract.groups[0].relation == "cage"
         assert report.contract.groups[0].closure == closure
