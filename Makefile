@@ -5,7 +5,7 @@ PHOTOS := evals/photos/images
 OUT := formup-runs/demo
 PEERS := pydantic_ai openai_agents langgraph smolagents
 ROUNDS ?= 80
-SERVERS := transformers litellm
+SERVERS := transformers litellm ray
 
 .PHONY: demo test test-servers check bench bench-loop clean
 
@@ -23,9 +23,14 @@ demo: .venv/.ready
 test: .venv/.ready-dev
 	$(BIN)/pytest -q -n auto --ignore tests/servers
 
-# Models are asked at servers that others wrote, each in an environment of its own.
+# Models are asked at servers that others wrote, trials are run on a Ray cluster, each in an
+# environment of its own.
 test-servers: .venv/.ready-dev $(SERVERS:%=.venv/servers/%/.ready)
 	FORMUP_TEST_SERVERS=.venv/servers $(BIN)/pytest -q tests/servers
+
+.venv/servers/ray/.ready: pyproject.toml constraints.txt
+	@$(call environment,$(@D),-c constraints.txt -e '.[ray]')
+	@touch $@
 
 .venv/servers/%/.ready: tests/servers/%.txt
 	@$(call environment,$(@D),-r $<)

@@ -297,13 +297,6 @@ def test_a_pool_gives_the_same_bytes(tmp_path: Path) -> None:
     equal_to_serial(tmp_path, Pool(2))
 
 
-@pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra formup[ray]")
-@pytest.mark.filterwarnings("default")
-def test_ray_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(HERE))
-    equal_to_serial(tmp_path, Ray(workers=2))
-
-
 @pytest.mark.skipif(find_spec("ray") is not None, reason="Ray is installed")
 def test_without_ray_the_extra_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"formup\[ray\]"):
