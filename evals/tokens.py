@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from io import BytesIO
 
 from PIL import Image
@@ -36,8 +37,7 @@ def spent(messages: History, system: str = "", tools: Sequence[Tool] = ()) -> Sp
         system: the prompt that every request began with.
         tools: those every request offered.
     """
-    offered = [{"name": t.name, "description": t.description, "schema": t.schema} for t in tools]
-    sent = text_tokens(system) + (text_tokens(_json(offered)) if tools else 0)
+    sent = text_tokens(system) + _offered(tuple(tools))
     requests, paid, output = 0, 0, 0
     for message in messages:
         size = _size(message)
@@ -45,6 +45,12 @@ def spent(messages: History, system: str = "", tools: Sequence[Tool] = ()) -> Sp
             requests, paid, output = requests + 1, paid + sent, output + size
         sent += size
     return Spent(requests, paid, output)
+
+
+@lru_cache(maxsize=8)  # a sweep offers the same tools in every trial
+def _offered(tools: tuple[Tool, ...]) -> int:
+    offered = [{"name": t.name, "description": t.description, "schema": t.schema} for t in tools]
+    return text_tokens(_json(offered)) if offered else 0
 
 
 def text_tokens(text: str) -> int:
