@@ -5,7 +5,6 @@ another suite or another version of formup are never mixed in.
 """
 
 import os
-import sys
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
@@ -14,6 +13,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from ..prompts.files import lock
 from ..tools.errors import InputError
 from ..tools.store import write_whole
 from ..tools.tool import violations
@@ -255,27 +255,15 @@ def held(folder: Path) -> Generator[None, None, None]:
     Raises:
         InputError: another runner holds it, or it cannot be made.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / LOCK).open("ab")
-    except OSError as error:
-        raise InputError(f"{folder} cannot be used: {error.strerror or error}.") from None
-    with file:
+    with ExitStack() as stack:
         try:
-            _lock(file.fileno())
-        except OSError:
+            folder.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context((folder / LOCK).open("ab"))
+            mine = lock(file.fileno())
+        except OSError as error:
+            raise InputError(f"{folder} cannot be used: {error.strerror or error}.") from None
+        if not mine:
             raise InputError(
                 f"Another runner works in {folder}; wait for it, or use another folder."
-            ) from None
+            )
         yield
-
-
-def _lock(handle: int) -> None:
-    if sys.platform == "win32":
-        import msvcrt
-
-        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

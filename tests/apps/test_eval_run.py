@@ -127,7 +127,7 @@ def test_a_planted_regression_of_ten_points_is_blocked(
     assert planted(TASKS, TRIALS, lost, comparisons=400).blocked > 0.75 * 400  # power .8
     run: list[Any] = ["eval", "run", suite, "--method", "agent", "--model", "obedient"]
     more: list[Any] = ["--prompt", GOOD, "--prompt", BAD, "--prompts", forgetful]
-    assert formup(*run, *more, "--trials", TRIALS, "--out", tmp_path / "both") == 0
+    assert formup(*run, *more, "--trials", str(TRIALS), "--out", tmp_path / "both") == 0
     rows = read_rows(tmp_path / "both")
     rates = {p: [bool(r.sr) for r in rows if r.prompt == p] for p in (GOOD, BAD)}
     assert {len(successes) for successes in rates.values()} == {TRIALS * TASKS}
