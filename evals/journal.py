@@ -19,11 +19,13 @@ from ..tools.store import write_whole
 from ..tools.tool import violations
 from .trials import Name, Sha, Trial, TrialRow, canonical
 
+USUAL = "edges"
+"""The descriptor that goes without saying."""
 ROWS, MANIFEST, LOCK = "trials.jsonl", "manifest.json", ".lock"
 
 
 class Arm(BaseModel):
-    """What is compared: a method with its prompt, tools and model."""
+    """What is compared: a method with its prompt, tools, model and descriptor of shapes."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -32,6 +34,7 @@ class Arm(BaseModel):
     sha256: Sha | None
     tools: Sha | None
     model: Name
+    descriptor: Name | None = None
 
     @classmethod
     def of(cls, trial: Trial) -> Self:
@@ -42,13 +45,15 @@ class Arm(BaseModel):
             sha256=trial.prompt_sha,
             tools=trial.tools_sha,
             model=trial.model,
+            descriptor=trial.descriptor,
         )
 
     @property
     def name(self) -> str:
-        """Method, prompt with the beginning of its hash, model."""
+        """Method, prompt with the beginning of its hash, model, descriptor if not the usual one."""
         told = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
-        return f"{self.method}{told} {self.model}"
+        shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
+        return f"{self.method}{told} {self.model}{shapes}"
 
 
 class Manifest(BaseModel):

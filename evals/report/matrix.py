@@ -10,7 +10,7 @@ from ...tools.errors import InputError
 from ..cells import TOTAL, Cell, cells
 from ..compare import compare
 from ..comparison import Comparison, Difference
-from ..journal import Arm
+from ..journal import USUAL, Arm
 from ..trials import TrialRow
 from .markup import Content, Html, joined, tag
 from .read import Side
@@ -95,6 +95,7 @@ def named(called: str, arm: Arm) -> Html:
     """The head of an arm's row."""
     facts = [f"{arm.prompt}#{(arm.sha256 or '')[:12]}"] if arm.prompt else []
     facts += [] if arm.model in ("none", arm.method) else [arm.model]
+    facts += [arm.descriptor] if arm.descriptor not in (None, USUAL) else []
     return tag(
         "th",
         tag("b", f"{called}: {arm.method}" if called else arm.method),

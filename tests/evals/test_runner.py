@@ -40,10 +40,11 @@ def test_a_trial_is_known_by_all_it_depends_on() -> None:
         "prompt_sha": "9" * 64,
         "tools_sha": "9" * 64,
         "model": "other",
+        "descriptor": "matrix",
     }
     others = [FIRST.model_copy(update={name: value}) for name, value in changes.items()]
     keys = {Trial.model_validate(other.model_dump()).key for other in others}
-    assert len({FIRST.key, *keys}) == 9
+    assert len({FIRST.key, *keys}) == 10
 
 
 def test_arms_meet_the_same_seed() -> None:
