@@ -139,7 +139,7 @@ def _difference(a: Sequence[TrialRow], b: Sequence[TrialRow], names: Sequence[st
     found = [told[name] if name in told else _within(a, b, name) for name in names]
     tokens = "" if made.tokens is None else f"{100 * made.tokens:+.0f} %"
     cost = sum(row.cost_usd for row in b) - sum(row.cost_usd for row in a)
-    spent = [tokens, f"{cost:+.4f}" if cost else "0", ""]
+    spent = [tokens, f"{cost:+.4f}" if cost else "", ""]
     return tag(
         "tr",
         tag("th", tag("b", "B − A"), tag("span", "points"), scope="row"),
