@@ -28,6 +28,7 @@ from .graders.graded import VERSION, Graded
 from .graders.grading import Attempt, grade_attempt
 from .journal import USUAL
 from .obedient import ObedientModel
+from .pace import Paced, pace_of
 from .pointed import written_positions
 from .policies import POLICIES, positions
 from .suites.tasks import SuiteTask
@@ -58,6 +59,7 @@ class Method:
         prompt: id@vNNN, None for the current one of the model's own.
         descriptor: edges, edges+vertices or matrix.
         library: where prompts are.
+        rate: requests per minute in each process at most; None for no limit.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Method:
     prompt: str | None = None
     descriptor: Descriptor = "edges"
     library: PromptLibrary = SHIPPED
+    rate: float | None = None
 
     def facts(self, base_url: str | None) -> dict[str, Any]:
         """What a trial says of its arm.
@@ -90,6 +93,12 @@ class Method:
         Raises:
             InputError: no such model or prompt, or one that writes no coordinates alone.
         """
+        agent = self._agent(seed, base_url)
+        if self.rate is not None:
+            agent.model = Paced(agent.model, pace_of(self.model, self.rate))
+        return agent
+
+    def _agent(self, seed: int, base_url: str | None) -> Agent:
         model: str | Model = ObedientModel(seed) if self.model == OBEDIENT else self.model
         url = base_url if isinstance(model, str) and model != "offline" else None
         if self.name != "alone":

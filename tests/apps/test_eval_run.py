@@ -185,6 +185,8 @@ def test_a_task_with_a_wrong_truth_is_not_added(tmp_path: Path) -> None:
         (["--budget", "-1"], "--budget '-1'"),
         (["--shard", "3/2"], "--shard '3/2'"),
         (["--descriptor", "poem"], "poem"),
+        (["--rate", "x=5"], "--rate 'x=5' cannot be used; give MODEL=N.*run: none"),
+        (["--method", "agent", "--model", "obedient", "--rate", "obedient=0"], "N above 0"),
     ],
 )
 def test_what_cannot_be_run_is_said(

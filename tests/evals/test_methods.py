@@ -125,6 +125,22 @@ def test_an_agent_that_makes_no_call_is_invalid_and_one_that_asks_is_not(
     assert (asked.status, asked.feedback) == ("fail", "question: Which one?")
 
 
+def test_requests_to_a_model_keep_its_pace(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        slept.append(seconds)
+
+    monkeypatch.setattr("formup.evals.pace.asyncio.sleep", sleep)
+    arm = Method("agent", "obedient", "former@v003", rate=0.01)
+    work, trials = work_of(folder, arm)
+    assert [work(trial).status for trial in trials[:2]] == ["pass", "pass"]
+    assert slept[0] == 0
+    assert len(slept) >= 6  # replies of both trials, one after the other
+    assert slept == pytest.approx([6000 * i for i in range(len(slept))], abs=600)
+    assert pickle.loads(pickle.dumps(arm)) == arm
+
+
 def test_work_can_be_given_to_other_processes(folder: Path, tmp_path: Path) -> None:
     work, trials = work_of(folder, method("circle", None, None, "edges"))
     again = pickle.loads(pickle.dumps(work))
