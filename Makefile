@@ -5,9 +5,9 @@ PHOTOS := evals/photos/images
 OUT := formup-runs/demo
 PEERS := pydantic_ai openai_agents langgraph smolagents
 ROUNDS ?= 80
-SERVERS := transformers litellm
+SERVERS := transformers litellm ray
 
-.PHONY: demo test test-servers check bench bench-loop clean
+.PHONY: demo test test-servers check bench bench-evals bench-loop clean
 
 demo: .venv/.ready
 	@$(BIN)/formup run $(PHOTOS)/cars_two.jpg "Surround the red car at the corners" -n 4 \
@@ -23,9 +23,14 @@ demo: .venv/.ready
 test: .venv/.ready-dev
 	$(BIN)/pytest -q -n auto --ignore tests/servers
 
-# Models are asked at servers that others wrote, each in an environment of its own.
+# Models are asked at servers that others wrote, trials are run on a Ray cluster, each in an
+# environment of its own.
 test-servers: .venv/.ready-dev $(SERVERS:%=.venv/servers/%/.ready)
 	FORMUP_TEST_SERVERS=.venv/servers $(BIN)/pytest -q tests/servers
+
+.venv/servers/ray/.ready: pyproject.toml constraints.txt
+	@$(call environment,$(@D),-c constraints.txt -e '.[ray]')
+	@touch $@
 
 .venv/servers/%/.ready: tests/servers/%.txt
 	@$(call environment,$(@D),-r $<)
@@ -42,6 +47,11 @@ bench: .venv/.ready-dev
 	@for what in bench bench_sampling bench_assignment bench_cages; do \
 	  echo "== $$what"; $(BIN)/python -m formup.evals.$$what || exit 1; echo; \
 	done
+
+# What the gate blocks and how often it errs; what the runner costs, beside Inspect's.
+bench-evals: .venv/.ready-dev .venv/bench/trials_inspect/.ready
+	$(BIN)/python -m formup.evals.false_blocks
+	$(BIN)/python -m formup.evals.bench_runner --inspect .venv/bench/trials_inspect/bin/python
 
 # Loops of other agent frameworks beside ours, each in an environment of its own.
 bench-loop: .venv/.ready-dev $(PEERS:%=.venv/bench/%/.ready)

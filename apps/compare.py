@@ -1,5 +1,6 @@
 """`formup eval compare`, `gate` and `merge`: two versions side by side, over folders of trials."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import typer
@@ -28,45 +29,42 @@ STYLE = {
 }
 
 
-def compare(
-    a: o.OldRun,
-    b: o.NewRun,
-    arm_a: o.OldArm = None,
-    arm_b: o.NewArm = None,
-    metric: o.MetricName = "sr",
-    margin: o.Margin = f"{MARGIN:g}",
-    as_json: o.Json = False,
-    out: o.ReportFile = None,
-) -> None:
-    """Whether B is better or worse than A, or how many trials would settle it."""
-    made = _made((a, arm_a), (b, arm_b), metric, margin, out)
-    if as_json:
-        print(made.model_dump_json(indent=2))  # noqa: T201
-        return
-    console = _console()
-    _show(console, made)
-    _conclude(console, made.outcome, (), made.overall.settled_by, made.overall)
+def _command(concluded: Callable[[Console, Comparison], int]) -> Callable[..., None]:
+    """The command that compares two runs and ends as `concluded` says, with its exit code."""
 
-
-def gate(
-    a: o.OldRun,
-    b: o.NewRun,
-    arm_a: o.OldArm = None,
-    arm_b: o.NewArm = None,
-    metric: o.MetricName = "sr",
-    margin: o.Margin = f"{MARGIN:g}",
-    as_json: o.Json = False,
-    out: o.ReportFile = None,
-) -> None:
-    """Whether B may replace A: exit code 0 pass, 1 block, 3 inconclusive."""
-    made = _made((a, arm_a), (b, arm_b), metric, margin, out)
-    if as_json:
-        print(made.model_dump_json(indent=2))  # noqa: T201
-    else:
-        console = _console()
+    def command(
+        a: o.OldRun,
+        b: o.NewRun,
+        arm_a: o.OldArm = None,
+        arm_b: o.NewArm = None,
+        metric: o.MetricName = "sr",
+        margin: o.Margin = f"{MARGIN:g}",
+        as_json: o.Json = False,
+        out: o.ReportFile = None,
+    ) -> None:
+        made = _made((a, arm_a), (b, arm_b), metric, margin, out)
+        console = Console(highlight=False, soft_wrap=True, quiet=as_json)
+        if as_json:
+            print(made.model_dump_json(indent=2))  # noqa: T201
         _show(console, made)
-        _conclude(console, made.verdict, made.reasons, made.settled_by, made.overall)
-    raise typer.Exit(EXIT[made.verdict])
+        raise typer.Exit(concluded(console, made))
+
+    command.__doc__ = concluded.__doc__
+    return command
+
+
+@_command
+def compare(console: Console, made: Comparison) -> int:
+    """Whether B is better or worse than A, or how many trials would settle it."""
+    _conclude(console, made.outcome, (), made.overall.settled_by, made.overall)
+    return 0
+
+
+@_command
+def gate(console: Console, made: Comparison) -> int:
+    """Whether B may replace A: exit code 0 pass, 1 block, 3 inconclusive."""
+    _conclude(console, made.verdict, made.reasons, made.settled_by, made.overall)
+    return EXIT[made.verdict]
 
 
 def merge_shards(shards: o.Shards, out: o.MergedFolder) -> None:
@@ -211,7 +209,3 @@ def _points(share: float) -> str:
 
 def _p(value: float) -> str:
     return f"{value:.3f}" if value >= 0.001 else "<.001"
-
-
-def _console() -> Console:
-    return Console(highlight=False, soft_wrap=True)

@@ -31,6 +31,10 @@ RunFolder = Annotated[
 ]
 Shard = Annotated[str | None, typer.Option("--shard", help="i/n: the i-th of n parts.")]
 Budget = Annotated[str | None, typer.Option("--budget", help="Most to spend, USD.")]
+RateList = Annotated[
+    list[str] | None,
+    typer.Option("--rate", help="MODEL=N: requests a minute at most, over all jobs; repeatable."),
+]
 Jobs = Annotated[str, typer.Option("--jobs", help="Processes at once.")]
 NewFolder = Annotated[
     Path, typer.Argument(metavar="FOLDER", help="Pictures with an annotations.json.")

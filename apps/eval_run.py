@@ -2,9 +2,9 @@
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,6 +19,7 @@ from ..evals.check_tasks import check_task
 from ..evals.executors import executor
 from ..evals.journal import Arm, read_rows
 from ..evals.methods import Method, SuiteWork, arm_key, method, trials_of
+from ..evals.runner import Sweep
 from ..evals.suites.gallery import Hung, hang
 from ..evals.suites.kept import ATTEMPTS, PICTURES, keep_suite
 from ..evals.suites.ledger import NAME as LEDGER
@@ -53,6 +54,7 @@ def run_suite(
     out: e.RunFolder = None,
     shard: e.Shard = None,
     budget: e.Budget = None,
+    rate: e.RateList = None,
     jobs: e.Jobs = "1",
 ) -> None:
     """Run a suite: successes of trials by category and setup, with intervals and the chance level.
@@ -60,11 +62,11 @@ def run_suite(
     Several models, prompts and descriptors are run side by side. A killed run is gone on with by
     naming its folder again. The split test shows scores only, and each look at it is written down.
     """
-    arms = _arms(method, model, prompt, descriptor, PromptLibrary(prompts))
-    made = [arm.facts(base_url) for arm in arms]  # what cannot be asked is found before the work
-    count = inputs.whole("--trials", trials, least=1)
     workers = inputs.whole("--jobs", jobs, least=1)
-    limit = inputs.dollars("--budget", budget)
+    paces = {name: n / workers for name, n in inputs.rates("--rate", rate, model or []).items()}
+    arms = _arms(method, model, prompt, descriptor, PromptLibrary(prompts), paces)
+    made = [arm.facts(base_url) for arm in arms]  # what cannot be asked is found before the work
+    count, limit = inputs.whole("--trials", trials, least=1), inputs.dollars("--budget", budget)
     loaded = load_suite(suite, split)
     folder, levels = out or _fresh(loaded.name), chances(loaded.tasks)
     with ExitStack() as stack:
@@ -87,6 +89,11 @@ def run_suite(
         runs_on = executor("serial" if workers == 1 else "pool", workers)
         done = sweep(planned, work, folder, executor=runs_on, budget_usd=limit, shard=shard)
     _show(loaded, folder, planned, levels)
+    _end(done)
+
+
+def _end(done: Sweep) -> None:
+    """Exit code 4 where something stopped the run before its end."""
     if done.stopped is not None:
         print(f"formup: stopped: {done.stopped}", file=sys.stderr)  # noqa: T201
         raise typer.Exit(4)
@@ -128,10 +135,14 @@ def _arms(
     prompts: list[str] | None,
     descriptors: list[str] | None,
     library: PromptLibrary,
+    paces: Mapping[str, float],
 ) -> list[Method]:
     """Every model with every prompt and descriptor."""
     return [
-        method(name, model, prompt, inputs.descriptor(descriptor), library)
+        replace(
+            method(name, model, prompt, inputs.descriptor(descriptor), library),
+            rate=paces.get(model or ""),
+        )
         for model in models or [None]
         for prompt in prompts or [None]
         for descriptor in descriptors or ["edges"]

@@ -169,6 +169,29 @@ def share(name: str, text: str | None) -> float | None:
     return value
 
 
+def rates(name: str, texts: list[str] | None, models: Sequence[str]) -> dict[str, float]:
+    """Numbers above 0 by model, from MODEL=N.
+
+    Args:
+        models: those there are.
+
+    Raises:
+        InputError: not of that form, or of another model.
+    """
+    found: dict[str, float] = {}
+    for text in texts or []:
+        model, _, number = text.rpartition("=")
+        value = _number(number)
+        if model not in models or value is None or not value > 0:
+            known = ", ".join(models) or "none"
+            raise InputError(
+                f"{name} {text!r} cannot be used; give MODEL=N, N above 0, such as "
+                f"openai:NAME=60. Models of this run: {known}."
+            )
+        found[model] = value
+    return found
+
+
 def dollars(name: str, text: str | None) -> float | None:
     """An amount of money in US dollars.
 

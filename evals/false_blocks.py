@@ -1,4 +1,4 @@
-"""`python -m formup.evals.false_blocks`: how often the gate blocks a version that is no worse.
+"""`python -m formup.evals.false_blocks`: how often the gate blocks versions, no worse and worse.
 
 Seeded comparisons of simulated versions go through the gate itself. Rates of tasks come from a beta
 distribution with ICC .3; tasks whose rate is .99 or more are the ones that must pass. Of the
@@ -23,6 +23,8 @@ TOKENS, TOKENS_SD = 3000.0, 0.1
 """Mean tokens of a trial, and the relative spread of a task's mean."""
 ALWAYS = 0.99
 REGRESSION = 0.10
+PLANTED = ((12, 10), (12, 20), (12, 30), (30, 10), (60, 10))
+"""Tasks and trials of each at which a lapse planted on purpose is looked for."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,34 @@ def _versions(
     )
 
 
+def planted(
+    tasks: int, trials: int, share: float, *, comparisons: int = COMPARISONS, seed: int = 0
+) -> Blocked:
+    """Put a version through the gate that fails in a share of trials which the old one all passes.
+
+    The lapse befalls any trial alike, as those of the test model do (evals/obedient.py).
+
+    Args:
+        share: of trials that lapse.
+    """
+    random = np.random.default_rng([seed, tasks, trials, round(1000 * share)])
+    none, all_right = np.zeros((2, tasks)), np.ones(tasks)
+    verdicts = list[str]()
+    for _ in range(comparisons):
+        kept = 1 - random.binomial(trials, share, tasks) / trials
+        paired = Paired(
+            tasks=tuple(map(str, range(tasks))),
+            pairs=np.full(tasks, float(trials)),
+            score=np.stack([all_right, kept]),
+            invalid=none,
+            tokens=none + TOKENS,
+            must_pass=np.zeros(tasks, dtype=bool),
+        )
+        verdicts.append(gate(paired).verdict)
+    blocked, passed = verdicts.count("block"), verdicts.count("pass")
+    return Blocked(tasks, trials, share, blocked, passed, comparisons)
+
+
 def main() -> None:
     """Print the rates; exit code 1 if false blocks are not compatible with 5 % or less."""
     began = time.perf_counter()
@@ -96,6 +126,10 @@ def main() -> None:
     _print(f"equal on average, tasks differ by {TASK_SD:g}", uneven)
     lost = [simulate(tasks, trials, REGRESSION) for tasks, trials in SIZES]
     _print(f"{100 * REGRESSION:.0f} points worse on every task", lost)
+    worse = [planted(tasks, trials, REGRESSION) for tasks, trials in PLANTED]
+    _print(
+        f"a lapse in {REGRESSION:.0%} of the trials of a version that else always succeeds", worse
+    )
     print(f"{time.perf_counter() - began:.1f} s")  # noqa: T201
     sys.exit(int(any(row.interval.low > 0.05 for row in [*rows, *uneven])))
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 from shapely.geometry import LineString, Polygon
 
+from ..tools.geometry.cages import cage
 from ..tools.geometry.outline import FloatArray, distances
 from ..tools.geometry.sampling import min_spacing, nearest
 from .suite import Task
@@ -82,40 +83,77 @@ def _truth(task: Task) -> Polygon:
 
 def _boundary(task: Task, points: FloatArray, result: Grade) -> None:
     rule, target = task.success, Polygon(task.target.polygon)
-    low, high = rule["band_px"]
-    near = float(distances(target, points).min())
-    far = float(distances(target.convex_hull, points).max())
-    _limit(result, near < low, False, f"{near:.1f} px from the target, {low} needed")
-    _limit(result, far > high, False, f"{far:.1f} px from the target, {high} allowed")
+    _in_band(task, points, result)
     loop = points[around(target, points)]
-    gaps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
-    widest = float(gaps.max()) if len(loop) > 1 else float("inf")
+    widest = float(gaps(loop).max()) if len(loop) > 1 else float("inf")
     most = rule["max_gap_px"]
     _limit(result, widest > most, False, f"gap of {widest:.0f} px, {most} allowed")
+    all_round = goes_round(task.target.outline.centre, loop)
+    _limit(result, not all_round, False, "the robots do not go round it")
     if rule.get("even") and len(loop) > 2:
         _even(_gaps_along(target, loop, task), result)
 
 
+def _cage(task: Task, points: FloatArray, result: Grade) -> None:
+    _in_band(task, points, result)
+    state = cage(task.target.outline.filled, points, escapes=False).state
+    _limit(result, state != "caged", False, "it is not certified that it cannot get out")
+
+
+def _in_band(task: Task, points: FloatArray, result: Grade) -> None:
+    target, (low, high) = Polygon(task.target.polygon), task.success["band_px"]
+    near = float(distances(target, points).min())
+    far = float(distances(target.convex_hull, points).max())
+    _limit(result, near < low, False, f"{near:.1f} px from the target, {low} needed")
+    _limit(result, far > high, False, f"{far:.1f} px from the target, {high} allowed")
+
+
 def around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
-    """Order of the points along the target's convex hull, nearer ones first where that ties."""
-    hull = LineString(shapely.get_coordinates(target.convex_hull))
-    station = shapely.line_locate_point(hull, shapely.points(points))
-    return np.lexsort((distances(hull, points), station))
+    """Order of robots around a target: along its outline or its hull, which closes better.
+
+    Along the outline, taken at their mean distance from it, robots that follow a recess come in
+    turn; along the convex hull those that bridge one.
+    """
+    lines = (middle_line(target, points), LineString(shapely.get_coordinates(target.convex_hull)))
+    orders = [np.lexsort((distances(line, points), stations(line, points))) for line in lines]
+    return min(orders, key=lambda order: float(gaps(points[order]).max(initial=0.0)))
+
+
+def middle_line(target: Polygon, points: FloatArray) -> LineString:
+    """The outline at the mean distance of points from it."""
+    return target.buffer(max(float(np.mean(distances(target, points))), 1.0)).exterior
+
+
+def stations(line: LineString, points: FloatArray) -> FloatArray:
+    """Arc length of the place of a line that is nearest to each point, (m,), px."""
+    return np.asarray(shapely.line_locate_point(line, shapely.points(points)), dtype=float)
+
+
+def gaps(loop: FloatArray) -> FloatArray:
+    """Distance of each robot of a loop to the next, the last one's to the first, (m,), px."""
+    return np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+
+
+def goes_round(centre: tuple[float, float], loop: FloatArray) -> bool:
+    """Whether the polygon of the robots winds round a point of the target: a crowd does not."""
+    x, y = (loop - centre).T
+    turns = np.diff(np.arctan2(y, x), append=np.arctan2(y[0], x[0]))
+    return round(float(((turns + np.pi) % (2 * np.pi) - np.pi).sum() / (2 * np.pi))) != 0
 
 
 def _gaps_along(target: Polygon, loop: FloatArray, task: Task) -> FloatArray:
     """Gaps along a loop in mid band; where the picture cuts it, the widest is that cut."""
-    middle = target.buffer(max(float(np.mean(distances(target, loop))), 1.0)).exterior
-    station = np.sort(shapely.line_locate_point(middle, shapely.points(loop)))
-    gaps = np.diff(station, append=station[0] + middle.length)
+    middle = middle_line(target, loop)
+    station = np.sort(stations(middle, loop))
+    along = np.diff(station, append=station[0] + middle.length)
     width, height = task.size
     frame = shapely.box(0, 0, width - 1, height - 1)
-    return gaps if frame.contains(middle) else np.sort(gaps)[:-1]
+    return along if frame.contains(middle) else np.sort(along)[:-1]
 
 
-def _even(gaps: FloatArray, result: Grade) -> None:
-    mean = max(float(gaps.mean()), 1e-9)
-    low, high = gaps.min() / mean, gaps.max() / mean
+def _even(lengths: FloatArray, result: Grade) -> None:
+    mean = max(float(lengths.mean()), 1e-9)
+    low, high = lengths.min() / mean, lengths.max() / mean
     uneven = bool(low < STRICT_GAPS[0] or high > STRICT_GAPS[1])
     _limit(result, False, uneven, f"uneven: gaps {low:.2f} to {high:.2f} of their mean")
 
@@ -207,6 +245,7 @@ def _center(task: Task, points: FloatArray, result: Grade) -> None:
 
 _RULES: dict[str, Callable[[Task, FloatArray, Grade], None]] = {
     "boundary": _boundary,
+    "cage": _cage,
     "inside": _inside,
     "corners": _corners,
     "side": _side,

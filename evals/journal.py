@@ -5,7 +5,6 @@ another suite or another version of formup are never mixed in.
 """
 
 import os
-import sys
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
@@ -14,16 +13,19 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from ..prompts.files import lock
 from ..tools.errors import InputError
 from ..tools.store import write_whole
 from ..tools.tool import violations
 from .trials import Name, Sha, Trial, TrialRow, canonical
 
+USUAL = "edges"
+"""The descriptor that goes without saying."""
 ROWS, MANIFEST, LOCK = "trials.jsonl", "manifest.json", ".lock"
 
 
 class Arm(BaseModel):
-    """What is compared: a method with its prompt, tools and model."""
+    """What is compared: a method with its prompt, tools, model and descriptor of shapes."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -32,6 +34,7 @@ class Arm(BaseModel):
     sha256: Sha | None
     tools: Sha | None
     model: Name
+    descriptor: Name | None = None
 
     @classmethod
     def of(cls, trial: Trial) -> Self:
@@ -42,13 +45,15 @@ class Arm(BaseModel):
             sha256=trial.prompt_sha,
             tools=trial.tools_sha,
             model=trial.model,
+            descriptor=trial.descriptor,
         )
 
     @property
     def name(self) -> str:
-        """Method, prompt with the beginning of its hash, model."""
+        """Method, prompt with the beginning of its hash, model, descriptor if not the usual one."""
         told = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
-        return f"{self.method}{told} {self.model}"
+        shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
+        return f"{self.method}{told} {self.model}{shapes}"
 
 
 class Manifest(BaseModel):
@@ -255,27 +260,15 @@ def held(folder: Path) -> Generator[None, None, None]:
     Raises:
         InputError: another runner holds it, or it cannot be made.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / LOCK).open("ab")
-    except OSError as error:
-        raise InputError(f"{folder} cannot be used: {error.strerror or error}.") from None
-    with file:
+    with ExitStack() as stack:
         try:
-            _lock(file.fileno())
-        except OSError:
+            folder.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context((folder / LOCK).open("ab"))
+            mine = lock(file.fileno())
+        except OSError as error:
+            raise InputError(f"{folder} cannot be used: {error.strerror or error}.") from None
+        if not mine:
             raise InputError(
                 f"Another runner works in {folder}; wait for it, or use another folder."
-            ) from None
+            )
         yield
-
-
-def _lock(handle: int) -> None:
-    if sys.platform == "win32":
-        import msvcrt
-
-        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl
-
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

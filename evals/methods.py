@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from shapely.geometry import Polygon
 
@@ -26,7 +26,9 @@ from ..tools.tool import Tool
 from ..tools.workspace import Descriptor, Settings
 from .graders.graded import VERSION, Graded
 from .graders.grading import Attempt, grade_attempt
+from .journal import USUAL
 from .obedient import ObedientModel
+from .pace import Paced, pace_of
 from .pointed import written_positions
 from .policies import POLICIES, positions
 from .suites.tasks import SuiteTask
@@ -42,6 +44,8 @@ NAMED = 80
 """Characters of a task's id in the names of its files."""
 NO_MODEL = {"rules": "offline", **dict.fromkeys(POLICIES, "none")}
 OBEDIENT = "obedient"
+DESCRIBED = ("rules", "agent")
+"""Methods with tools, which put shapes into words."""
 SHIPPED = PromptLibrary()
 
 
@@ -55,6 +59,7 @@ class Method:
         prompt: id@vNNN, None for the current one of the model's own.
         descriptor: edges, edges+vertices or matrix.
         library: where prompts are.
+        rate: requests per minute in each process at most; None for no limit.
     """
 
     name: str
@@ -62,11 +67,7 @@ class Method:
     prompt: str | None = None
     descriptor: Descriptor = "edges"
     library: PromptLibrary = SHIPPED
-
-    @property
-    def called(self) -> str:
-        """The name in results: the usual descriptor goes without saying."""
-        return self.name if self.descriptor == "edges" else f"{self.name}/{self.descriptor}"
+    rate: float | None = None
 
     def facts(self, base_url: str | None) -> dict[str, Any]:
         """What a trial says of its arm.
@@ -75,14 +76,15 @@ class Method:
             InputError: no such model or prompt.
         """
         if self.name in POLICIES:
-            return {"method": self.called, "model": self.model}
+            return {"method": self.name, "model": self.model}
         agent = self.agent(0, base_url)
         return {
-            "method": self.called,
+            "method": self.name,
             "prompt": agent.prompt and agent.prompt.name,
             "prompt_sha": agent.prompt and agent.prompt.sha256,
             "tools_sha": _tools_sha(agent.offered) if agent.tools else None,
             "model": agent.model.name,
+            "descriptor": self.descriptor if self.name in DESCRIBED else None,
         }
 
     def agent(self, seed: int, base_url: str | None) -> Agent:
@@ -91,6 +93,12 @@ class Method:
         Raises:
             InputError: no such model or prompt, or one that writes no coordinates alone.
         """
+        agent = self._agent(seed, base_url)
+        if self.rate is not None:
+            agent.model = Paced(agent.model, pace_of(self.model, self.rate))
+        return agent
+
+    def _agent(self, seed: int, base_url: str | None) -> Agent:
         model: str | Model = ObedientModel(seed) if self.model == OBEDIENT else self.model
         url = base_url if isinstance(model, str) and model != "offline" else None
         if self.name != "alone":
@@ -115,6 +123,8 @@ def method(
     """
     if name not in METHODS:
         raise InputError(f"Unknown method {name!r}. There are: {', '.join(METHODS)}.")
+    if descriptor != USUAL and name not in DESCRIBED:
+        raise InputError(f"--descriptor goes with the methods rules and agent, not with {name}.")
     if name in NO_MODEL:
         given = [o for o, v in (("--model", model), ("--prompt", prompt)) if v is not None]
         if given:
@@ -189,7 +199,7 @@ class SuiteWork:
 
 def arm_key(trial: Trial) -> str:
     """What a trial says of its arm, as text."""
-    return " ".join([trial.method, trial.prompt or "-", trial.model])
+    return " ".join([trial.method, trial.prompt or "-", trial.model, trial.descriptor or "-"])
 
 
 def kept_as(trial: Trial) -> str:
@@ -235,8 +245,9 @@ def _attempt(run: Run, arm: Method) -> Attempt:
     report = run.report
     if arm.name == "alone":
         written = written_positions(report.message)
-        if written is None and _is_empty(report.message):
-            return Attempt("impossible", said=report.message, declined=True)
+        declined = _declined(report.message) if written is None else None
+        if declined:
+            return Attempt(declined, said=report.message, declined=True)
         return Attempt("deployed" if written else "failed", written, written, said=report.message)
     given_up = isinstance(run.outcome, Answered) and isinstance(run.outcome.messages[-1], Result)
     return Attempt(
@@ -249,13 +260,16 @@ def _attempt(run: Run, arm: Method) -> Attempt:
     )
 
 
-def _is_empty(text: str) -> bool:
-    """Whether a model alone has written that no robot shall be placed."""
+def _declined(text: str) -> Literal["question", "impossible"] | None:
+    """What a model alone has done that writes that no robot shall be placed; else None."""
     whole = text[text.find("{") : text.rfind("}") + 1]
     try:
-        return json.loads(whole)["positions"] == []
+        said: dict[str, Any] = json.loads(whole)
+        if said["positions"] != []:
+            return None
+        return "question" if said.get("question") else "impossible"
     except (ValueError, KeyError, TypeError, RecursionError):
-        return False
+        return None
 
 
 def _about(run: Run) -> tuple[Polygon, ...]:

@@ -84,8 +84,10 @@ def _group(goal: Task, where: str, width: float) -> Group:
     band = ((low + high) / 2 - spread, (low + high) / 2 + spread)
     if kind == "side":
         return _group_of("along", n, clearance=band, side=name)
+    if kind == "cage":
+        return _group_of("cage", n, clearance=band, closure="escape-proof")
     return _group_of("cage" if rule.get("closed") else "around", n, clearance=band)
 
 
-def _group_of(relation: Relation, robots: int, **lengths: Any) -> Group:
-    return Group(relation=relation, targets=("t1",), robots=robots, **lengths)
+def _group_of(relation: Relation, robots: int, **more: Any) -> Group:
+    return Group(relation=relation, targets=("t1",), robots=robots, **more)

@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from io import BytesIO
 
 from PIL import Image
@@ -44,8 +45,7 @@ def spent(messages: History, system: str = "", tools: Sequence[Tool] = ()) -> Sp
         system: the prompt that every request began with.
         tools: those every request offered.
     """
-    offered = [{"name": t.name, "description": t.description, "schema": t.offered} for t in tools]
-    prefix = text_tokens(system) + (text_tokens(_json(offered)) if tools else 0)
+    prefix = text_tokens(system) + _offered(tuple(tools))
     sent, requests, paid, output = prefix, 0, 0, 0
     for message in messages:
         size = _size(message)
@@ -54,6 +54,12 @@ def spent(messages: History, system: str = "", tools: Sequence[Tool] = ()) -> Sp
         sent += size
     saved = (1 - CACHED) * prefix * requests if prefix >= CACHEABLE else 0
     return Spent(requests, paid, output, paid - round(saved))
+
+
+@lru_cache(maxsize=8)  # a sweep offers the same tools in every trial
+def _offered(tools: tuple[Tool, ...]) -> int:
+    offered = [{"name": t.name, "description": t.description, "schema": t.offered} for t in tools]
+    return text_tokens(_json(offered)) if offered else 0
 
 
 def text_tokens(text: str) -> int:

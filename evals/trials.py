@@ -31,6 +31,7 @@ class Trial(BaseModel):
         prompt_sha: SHA-256 of the prompt's text.
         tools_sha: SHA-256 of the schemas of the tools offered.
         model: provider:name, or offline.
+        descriptor: how shapes are put into words, such as edges; None where none are.
         category: of the task, such as caging; results are also told by it.
         setup: of the task, such as hidden; results are also told by it.
         must_pass: the task is one that always succeeds.
@@ -46,6 +47,7 @@ class Trial(BaseModel):
     prompt_sha: Sha | None = None
     tools_sha: Sha | None = None
     model: Name
+    descriptor: Name | None = None
     category: str = ""
     setup: str = ""
     must_pass: bool = False
@@ -64,7 +66,7 @@ class Trial(BaseModel):
     @property
     def order(self) -> tuple[Any, ...]:
         """By task, trial, then arm: the order of compared results."""
-        arm = (self.method, self.prompt or "", self.model)
+        arm = (self.method, self.prompt or "", self.model, self.descriptor or "")
         return (self.task, self.trial, *arm, self.key)
 
 

@@ -98,13 +98,13 @@ def _held(path: Path) -> BinaryIO | None:
     with ExitStack() as stack:
         file = stack.enter_context(path.open("ab"))
         with suppress(FileNotFoundError):
-            if _lock(file.fileno()) and os.path.samestat(os.fstat(file.fileno()), path.stat()):
+            if lock(file.fileno()) and os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 stack.pop_all()
                 return file
     return None
 
 
-def _lock(handle: int) -> bool:
+def lock(handle: int) -> bool:
     """Whether the lock of an open file could be had; the system keeps it until it is closed."""
     try:
         if sys.platform == "win32":

@@ -5,8 +5,7 @@ Pictures are not stored but named, with their hash; reading refuses one that has
 
 import hashlib
 import json
-import os
-import tempfile
+import secrets
 from pathlib import Path
 from typing import Any, cast
 
@@ -206,19 +205,19 @@ def restore(stored: Stored, picture: Picture | None, settings: Settings) -> Work
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file at once or not at all.
+    """Write a file at once or not at all, readable to whom the person's umask allows.
 
     Raises:
         InputError: it cannot be written there.
     """
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        part = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
         try:
-            with os.fdopen(handle, "wb") as file:
+            with part.open("xb") as file:
                 file.write(data)
-            Path(name).replace(path)
+            part.replace(path)
         except BaseException:
-            Path(name).unlink(missing_ok=True)
+            part.unlink(missing_ok=True)
             raise
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None

@@ -146,6 +146,8 @@ def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
     }
     if relation == "along":
         group["side"] = reading.side or "long"
+    if relation == "cage" and reading.escape_proof:
+        group["closure"] = "escape-proof"
     if relation == "between":
         group["layout"] = reading.layout
     if reading.clearance is not None:

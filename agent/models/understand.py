@@ -51,6 +51,7 @@ class Reading:
     robot_radius: float | None
     unscaled: tuple[str, ...]
     beyond: tuple[str, ...]
+    escape_proof: bool
 
 
 def understand(instruction: str, metres_per_pixel: float | None = None) -> Reading:
@@ -77,6 +78,7 @@ def understand(instruction: str, metres_per_pixel: float | None = None) -> Readi
         robot_radius=lengths.radius,
         unscaled=lengths.unscaled,
         beyond=(*_beyond(words, relations, side), *lengths.beyond, *_foreign_units(numbers)),
+        escape_proof=any(_found(p, words) for p in _vocabulary()["escape_proof"]),
     )
 
 

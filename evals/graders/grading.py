@@ -16,13 +16,14 @@ from ..suite import Task, Thing
 from .graded import Graded, Part, distinct
 from .lines import centre, corners, line_between, side
 from .region import region
-from .ring import ring
+from .ring import escape_proof, ring
 
 SAME = 0.5
 """Overlap (intersection over union) above which an outline found is the thing meant."""
 Rule = Callable[[Task, FloatArray, NDArray[np.bool_]], Part]
 RULES: dict[str, Rule] = {
     "boundary": ring,
+    "cage": escape_proof,
     "inside": region,
     "corners": corners,
     "side": side,

@@ -10,7 +10,7 @@ from ...tools.errors import InputError
 from ..cells import TOTAL, Cell, cells
 from ..compare import compare
 from ..comparison import Comparison, Difference
-from ..journal import Arm
+from ..journal import USUAL, Arm
 from ..trials import TrialRow
 from .markup import Content, Html, joined, tag
 from .read import Side
@@ -95,6 +95,7 @@ def named(called: str, arm: Arm) -> Html:
     """The head of an arm's row."""
     facts = [f"{arm.prompt}#{(arm.sha256 or '')[:12]}"] if arm.prompt else []
     facts += [] if arm.model in ("none", arm.method) else [arm.model]
+    facts += [arm.descriptor] if arm.descriptor not in (None, USUAL) else []
     return tag(
         "th",
         tag("b", f"{called}: {arm.method}" if called else arm.method),
@@ -138,7 +139,7 @@ def _difference(a: Sequence[TrialRow], b: Sequence[TrialRow], names: Sequence[st
     found = [told[name] if name in told else _within(a, b, name) for name in names]
     tokens = "" if made.tokens is None else f"{100 * made.tokens:+.0f} %"
     cost = sum(row.cost_usd for row in b) - sum(row.cost_usd for row in a)
-    spent = [tokens, f"{cost:+.4f}" if cost else "0", ""]
+    spent = [tokens, f"{cost:+.4f}" if cost else "", ""]
     return tag(
         "tr",
         tag("th", tag("b", "B − A"), tag("span", "points"), scope="row"),

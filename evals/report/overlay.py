@@ -125,12 +125,19 @@ def _robots(kept: Kept, size: tuple[int, int], radius: float) -> Html:
         if max(abs(x1 - x2), abs(y1 - y2)) > 0.5
     ]
     for i, (point, right) in enumerate(zip(observed, kept.right, strict=True), start=1):
-        title = tag("title", f"robot {i}, {'right' if right else 'wrong'}, {_at(point)}")
-        x, y = _within(point, size)
-        disc = tag("circle", cx=x, cy=y, r=radius)
-        cross = None if right else _cross(x, y, radius * 0.55, "cross")
-        marks.append(tag("g", title, disc, cross, class_="right" if right else "wrong"))
+        kind = "right" if right else "wrong"
+        title = tag("title", f"robot {i}, {kind}, {_at(point)}")
+        marks.append(robot(_within(point, size), radius, kind, title))
     return joined(ways, marks)
+
+
+def robot(place: Point, radius: float, kind: str, title: Html | None = None) -> Html:
+    """The mark of a robot that stands `right` or `wrong`; its lines are as wide as it is large."""
+    x, y = place
+    disc = tag("circle", cx=x, cy=y, r=radius, stroke_width=round(0.22 * radius, 2))
+    line = round(0.3 * radius, 2)
+    cross = _cross(x, y, radius * 0.5, "cross", line) if kind == "wrong" else None
+    return tag("g", title, disc, cross, class_=kind)
 
 
 def _disc(point: Point, size: tuple[int, int], radius: float) -> dict[str, str | float]:
@@ -138,9 +145,10 @@ def _disc(point: Point, size: tuple[int, int], radius: float) -> dict[str, str |
     return {"cx": x, "cy": y, "r": radius * 0.6, "class_": "planned"}
 
 
-def _cross(x: float, y: float, arm: float, kind: str) -> Html:
+def _cross(x: float, y: float, arm: float, kind: str, width: float | None = None) -> Html:
     a, b, c, d = (round(value, 1) for value in (x - arm, y - arm, x + arm, y + arm))
-    return tag("path", d=f"M{a:g} {b:g}L{c:g} {d:g}M{a:g} {d:g}L{c:g} {b:g}", class_=kind)
+    way = f"M{a:g} {b:g}L{c:g} {d:g}M{a:g} {d:g}L{c:g} {b:g}"
+    return tag("path", d=way, class_=kind, **({} if width is None else {"stroke_width": width}))
 
 
 def _within(point: Point, size: tuple[int, int]) -> Point:

@@ -12,6 +12,7 @@ from pathlib import Path
 from ..journal import read_manifest
 from .markup import Html, joined, tag
 from .matrix import compared, counted, matrix, verdict
+from .overlay import robot
 from .pictures import pictures, sprite
 from .read import Side
 from .tasks import cards
@@ -112,11 +113,11 @@ def _filter(side: Side) -> Html:
 
 
 def _legend() -> Html:
-    disc, slot = tag("circle", cx=12, cy=8, r=5), {"cx": 12, "cy": 8, "r": 6}
+    slot = {"cx": 12, "cy": 8, "r": 6}
     cross, line = "M9 5L15 11M9 11L15 5", {"x1": 2, "y1": 8, "x2": 22, "y2": 8}
     marks = {
-        "robot, right": tag("g", disc, class_="right"),
-        "robot, wrong": tag("g", disc, tag("path", d=cross, class_="cross"), class_="wrong"),
+        "robot, right": robot((12, 8), 6, "right"),
+        "robot, wrong": robot((12, 8), 6, "wrong"),
         "planned": tag("circle", cx=12, cy=8, r=4, class_="planned"),
         "true outline": tag("line", **line, class_="truth"),
         "outline it worked with": tag("line", **line, class_="found"),

@@ -18,6 +18,7 @@ import yaml
 from ...agent.report import Status
 from ...tools.errors import InputError
 from ...tools.store import write_whole
+from ..asks.caged import caged
 from ..asks.frontier import frontier
 from ..asks.inscribed import inscribed
 from ..asks.styled import styled
@@ -34,6 +35,7 @@ ASKS: dict[str, Callable[[int, float | None], Entry]] = {
     "own": lambda seed, scale: entry_of(tell(seed)),
     "styled": styled,
     "frontier": frontier,
+    "caged": lambda seed, scale: caged(seed),
     "unmet": lambda seed, scale: unmet(seed),
     "inscribed": lambda seed, scale: inscribed(seed),
 }

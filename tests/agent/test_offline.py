@@ -192,6 +192,34 @@ def test_lengths_that_are_none_to_keep_or_disagree_are_said_to_go_beyond() -> No
     assert understand("ring it, 7 feet away", 0.05).beyond == ("7 feet",)
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "no two closer than 24 px",
+        "No two robots closer than 24 px to each other.",
+        "no two may stand nearer than 24 pixels",
+        "At least 24 px between robots.",
+        "Distance between robots: at least 24 px.",
+        "Between any two robots there shall be at least 24 px.",
+        "at least 24 px apart",
+    ],
+)
+def test_a_distance_of_robots_from_each_other_is_none_from_the_thing(words: str) -> None:
+    reading = understand(f"Fill it with 6 robots. {words}")
+    assert (reading.min_spacing, reading.clearance, reading.beyond) == (24, None, ())
+    both = understand(f"Fill it with 6 robots, at least 8 px from its edge. {words}")
+    assert (both.min_spacing, both.clearance) == (24, 8)
+
+
+def test_robots_that_do_not_fit_so_far_apart_are_not_moved() -> None:
+    report = run("Fill it with 60 robots, no two closer than 50 px", pointed=[COIN])
+    assert report.status == "impossible"
+    report = run("Fill it with 6 robots, no two closer than 30 px", pointed=[COIN])
+    assert report.contract is not None
+    assert report.contract.groups[0].min_spacing == 30
+    assert report.status == "deployed"
+
+
 def test_every_instruction_of_the_suite_is_read_as_its_rule_means_it() -> None:
     kinds = {"inside": "inside", "corners": "corners", "line_between": "between"}
     for task in load_tasks():
@@ -242,6 +270,14 @@ def test_a_distance_that_cannot_be_kept_is_asked_about() -> None:
     report = run("Gather 3 robots at its centre, 14 px away", pointed=[COIN])
     assert report.status == "question"
     assert "at the centre of" in report.message
+
+
+def test_an_escape_proof_cage_is_one_that_is_certified() -> None:
+    for words, closure in (("an escape-proof cage", "escape-proof"), ("a cage", "ring")):
+        report = run(f"Make {words} of 8 robots", pointed=[COIN])
+        assert report.contract is not None
+        assert report.contract.groups[0].relation == "cage"
+        assert report.contract.groups[0].closure == closure
 
 
 def test_a_cage_of_two_is_impossible_and_it_says_why() -> None:

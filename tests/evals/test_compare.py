@@ -80,6 +80,7 @@ def test_the_report_is_what_promotion_reads() -> None:
         "sha256": f"{1:064x}",
         "tools": None,
         "model": "offline",
+        "descriptor": None,
     }
     assert report["b"]["prompt"] == "former@v002"
     assert (report["suite"], report["verdict"]) == (SUITE, "pass")

@@ -14,7 +14,7 @@ from formup.agent.messages import Call, Reply
 from formup.agent.model import Model
 from formup.agent.models.doubles import FunctionModel
 from formup.evals.executors import attempt, executor
-from formup.evals.journal import read_rows
+from formup.evals.journal import Arm, read_rows
 from formup.evals.methods import Method, SuiteWork, arm_key, method, trials_of
 from formup.evals.obedient import DUTIES, lapses_of
 from formup.evals.reference import reference
@@ -23,11 +23,12 @@ from formup.evals.suites.gallery import hang
 from formup.evals.suites.load import load_suite, write_suite
 from formup.evals.trials import Trial, TrialRow
 from formup.prompts import load_prompt
-from formup.tools.errors import ModelError
+from formup.tools.errors import InputError, ModelError
 
 sys.path.insert(0, str(Path(__file__).parent))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 
+FIRST = Trial(suite="0" * 64, task="t", trial=0, method="rules", model="offline")
 ASKED = {"question": "Which one?"}
 
 
@@ -87,6 +88,23 @@ def test_a_model_alone_is_graded_by_what_it_writes(
         assert (lost.status, lost.gcr) == ("model_invalid", 0.0)
 
 
+@pytest.mark.parametrize(
+    ("text", "status"),
+    [
+        ('{"positions": [], "question": "Which car?"}', "question"),
+        ('I cannot. {"positions": [], "reason": "no giraffe"}', "impossible"),
+        ('{"positions": []}', "impossible"),
+    ],
+)
+def test_a_model_alone_asks_and_refuses_as_it_is_told_to(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, text: str, status: str
+) -> None:
+    told = load_prompt("former-direct").text
+    assert all(f'{{"positions": [], "{key}": "..."}}' in told for key in ("question", "reason"))
+    row = row_of(folder, monkeypatch, "alone", Reply(text=text))
+    assert (row.status, row.feedback) == ("fail", f"{status}: {text}")
+
+
 def test_a_provider_that_fails_says_nothing_about_the_model(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -107,6 +125,22 @@ def test_an_agent_that_makes_no_call_is_invalid_and_one_that_asks_is_not(
     assert (asked.status, asked.feedback) == ("fail", "question: Which one?")
 
 
+def test_requests_to_a_model_keep_its_pace(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    slept: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        slept.append(seconds)
+
+    monkeypatch.setattr("formup.evals.pace.asyncio.sleep", sleep)
+    arm = Method("agent", "obedient", "former@v003", rate=0.01)
+    work, trials = work_of(folder, arm)
+    assert [work(trial).status for trial in trials[:2]] == ["pass", "pass"]
+    assert slept[0] == 0
+    assert len(slept) >= 6  # replies of both trials, one after the other
+    assert slept == pytest.approx([6000 * i for i in range(len(slept))], abs=600)
+    assert pickle.loads(pickle.dumps(arm)) == arm
+
+
 def test_work_can_be_given_to_other_processes(folder: Path, tmp_path: Path) -> None:
     work, trials = work_of(folder, method("circle", None, None, "edges"))
     again = pickle.loads(pickle.dumps(work))
@@ -117,8 +151,18 @@ def test_work_can_be_given_to_other_processes(folder: Path, tmp_path: Path) -> N
 
 def test_a_descriptor_is_part_of_the_arm() -> None:
     facts = [Method("rules", "offline", None, d).facts(None) for d in ("edges", "matrix")]
-    assert [fact["method"] for fact in facts] == ["rules", "rules/matrix"]
-    assert facts[0]["tools_sha"] == facts[1]["tools_sha"]
+    assert [fact.pop("descriptor") for fact in facts] == ["edges", "matrix"]
+    assert facts[0] == facts[1]
+    trials = [FIRST.model_copy(update={"descriptor": d}) for d in ("edges", "matrix")]
+    assert len({Trial(**trial.model_dump()).key for trial in trials}) == 2
+    assert [Arm.of(trial).name for trial in trials] == ["rules offline", "rules offline matrix"]
+    assert method("circle", None, None, "edges").facts(None) == {
+        "method": "circle",
+        "model": "none",
+    }
+    for name in ("circle", "alone"):
+        with pytest.raises(InputError, match="--descriptor goes with the methods rules and agent"):
+            method(name, None, None, "matrix")
 
 
 def test_the_test_model_goes_by_the_sentences_of_its_prompt() -> None:

@@ -40,10 +40,11 @@ def test_a_trial_is_known_by_all_it_depends_on() -> None:
         "prompt_sha": "9" * 64,
         "tools_sha": "9" * 64,
         "model": "other",
+        "descriptor": "matrix",
     }
     others = [FIRST.model_copy(update={name: value}) for name, value in changes.items()]
     keys = {Trial.model_validate(other.model_dump()).key for other in others}
-    assert len({FIRST.key, *keys}) == 9
+    assert len({FIRST.key, *keys}) == 10
 
 
 def test_arms_meet_the_same_seed() -> None:
@@ -295,13 +296,6 @@ def equal_to_serial(tmp_path: Path, other: Executor) -> None:
 
 def test_a_pool_gives_the_same_bytes(tmp_path: Path) -> None:
     equal_to_serial(tmp_path, Pool(2))
-
-
-@pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra formup[ray]")
-@pytest.mark.filterwarnings("default")
-def test_ray_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", str(HERE))
-    equal_to_serial(tmp_path, Ray(workers=2))
 
 
 @pytest.mark.skipif(find_spec("ray") is not None, reason="Ray is installed")

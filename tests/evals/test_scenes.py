@@ -23,6 +23,7 @@ from formup.evals.scenes.paint import draw
 from formup.evals.scenes.things import Ground, Look
 from formup.evals.suite import Task, load_tasks
 from formup.tools.geometry.outline import FloatArray
+from PIL import Image
 from shapely.geometry import Point, Polygon
 
 SEEDS = range(108)
@@ -85,7 +86,13 @@ def case(seed: int) -> Case:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_scenes(DRAWN, tmp_path_factory.mktemp("scenes")).parent
+    """The scenes as write_scenes writes them, but for the pictures, which are blank."""
+    made = tmp_path_factory.mktemp("scenes")
+    entries = [entry_of(case(seed).story) for seed in DRAWN]
+    for entry in entries:
+        Image.new("RGB", (entry["width"], entry["height"])).save(made / entry["image"])
+    (made / "annotations.json").write_text(json.dumps(entries), encoding="utf-8")
+    return made
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +105,16 @@ def plain(task: Task) -> Task:
     where, _, side = str(task.success["where"]).partition(":")
     words = PLAIN["cage" if task.success.get("closed") else where]
     return replace(task, instruction=words.format(n=task.robots, side=side))
+
+
+def test_scenes_are_written_with_their_pictures(folder: Path, tmp_path: Path) -> None:
+    some = (3, 14)
+    written = json.loads(write_scenes(some, tmp_path).read_text("utf-8"))
+    entries = json.loads((folder / "annotations.json").read_text("utf-8"))
+    assert written == [entries[seed] for seed in some]
+    for seed, entry in zip(some, written, strict=True):
+        with Image.open(tmp_path / entry["image"]) as image:
+            assert image.tobytes() == make_scene(seed)[0].tobytes()
 
 
 def test_every_family_in_every_cell(tasks: list[Task], folder: Path) -> None:

@@ -24,6 +24,7 @@ from formup.evals.suites.load import load_suite, schema, seeds, shipped, write_s
 from formup.evals.suites.tasks import Drawing, Suite
 from formup.tools.errors import InputError
 from formup.tools.formation.named import named_lengths
+from formup.tools.geometry.cages import cage
 from shapely.geometry import Point
 
 SPLIT = {"formation-dev": ("train", "dev", "test")}
@@ -108,9 +109,12 @@ def test_the_development_suite_is_broad_and_split_by_family() -> None:
 
 def test_the_frontier_has_what_it_says() -> None:
     tasks = loaded("frontier").tasks
-    assert min(task.robots or 0 for task in tasks) >= 20
-    assert max(task.robots or 0 for task in tasks) > 80
+    cages = [task for task in tasks if task.goals[0].success["where"] == "cage"]
+    others = [task for task in tasks if task not in cages]
+    assert min(task.robots or 0 for task in others) >= 20
+    assert max(task.robots or 0 for task in others) > 80
     assert sum(len(task.goals) > 1 for task in tasks) == 12 + 4
+    assert len(cages) == 12
     assert any(task.goals[0].target.holes for task in tasks)
     assert sum(bool(task.goals[0].success.get("closed")) for task in tasks) == 12 + 4
     metric = [task for task in tasks if task.metres_per_pixel]
@@ -175,6 +179,17 @@ def test_metres_in_a_rule_take_a_scale_and_stand_alone(
     (tmp_path / "annotations.json").write_text(json.dumps(entries))
     with pytest.raises(InputError, match="band_m" if not extra else "breaks the photos format"):
         load_tasks(tmp_path)
+
+
+def test_a_right_escape_proof_cage_has_2_px_to_spare_and_most_hold_what_has_recesses() -> None:
+    goals = [task.goals[0] for task in loaded("frontier").tasks]
+    cages = [goal for goal in goals if goal.success["where"] == "cage"]
+    for goal in cages:
+        smaller = goal.target.outline.filled.buffer(-2)
+        assert cage(smaller, reference(goal), escapes=False).state == "caged", goal.id
+    hulls = [goal.target.outline.filled.convex_hull.area for goal in cages]
+    filled = [goal.target.outline.filled.area for goal in cages]
+    assert sum(area < 0.8 * hull for area, hull in zip(filled, hulls, strict=True)) == 9
 
 
 def test_where_nothing_is_to_be_placed_moving_is_wrong() -> None:

@@ -1,14 +1,17 @@
 """Trials for the tests of the runner, importable by the processes that run them.
 
-Run as a script it is a sweep to be killed: FOLDER, then seconds that each trial takes.
+Run as a script it is a sweep to be killed: FOLDER, then seconds that each trial takes; with `ray`
+after them, one on Ray in which a provider is down.
 """
 
 import random
 import sys
 import time
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
+from formup.evals.executors import Ray
 from formup.evals.runner import run_trials
 from formup.evals.trials import Trial, TrialRow
 from formup.tools.errors import ModelError
@@ -58,4 +61,9 @@ def sweep(tasks: int = 4, tries: int = 3, *, suite: str = SUITE, model: str = "m
 
 
 if __name__ == "__main__":
-    run_trials(sweep(8, 10), Coin(float(sys.argv[2])), Path(sys.argv[1]))
+    folder, seconds, *more = sys.argv[1:]
+    if more == ["ray"]:
+        broken = import_module("trial_work").Coin(broken="t2")  # as workers know it, not __main__
+        run_trials(sweep(8, 10), broken, Path(folder), executor=Ray(workers=2))
+    else:
+        run_trials(sweep(8, 10), Coin(float(seconds)), Path(folder))

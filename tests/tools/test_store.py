@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -117,3 +118,14 @@ def test_files_are_written_whole_or_not_at_all(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["x"]
     with pytest.raises(InputError, match="cannot be written"):
         write_whole(tmp_path / "nowhere" / "x", b"")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no umask elsewhere")
+def test_others_may_read_what_the_umask_lets_them(tmp_path: Path) -> None:
+    for mask in (0o022, 0o077):
+        before = os.umask(mask)
+        try:
+            write_whole(tmp_path / "x", b"one")
+        finally:
+            os.umask(before)
+        assert (tmp_path / "x").stat().st_mode & 0o777 == 0o666 & ~mask
