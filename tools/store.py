@@ -207,10 +207,16 @@ def restore(stored: Stored, picture: Picture | None, settings: Settings) -> Work
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file at once or not at all, readable to whom the person's umask allows.
 
+    What is no file, such as /dev/stdout, is written to and stays what it is; a link is followed.
+
     Raises:
         InputError: it cannot be written there.
     """
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            path.write_bytes(data)
+            return
+        path = path.resolve() if path.is_symlink() else path
         part = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
         try:
             with part.open("xb") as file:

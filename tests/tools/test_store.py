@@ -120,6 +120,21 @@ def test_files_are_written_whole_or_not_at_all(tmp_path: Path) -> None:
         write_whole(tmp_path / "nowhere" / "x", b"")
 
 
+@pytest.mark.skipif(os.name != "posix", reason="no such devices elsewhere")
+def test_devices_and_links_stay_what_they_are(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write_whole(tmp_path / "pipe", b"one")
+    assert os.read(reader, 9) == b"one"
+    os.close(reader)
+    assert (tmp_path / "pipe").is_fifo()
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    (tmp_path / "file").write_bytes(b"before")
+    write_whole(tmp_path / "link", b"after")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "file").read_bytes() == b"after"
+
+
 @pytest.mark.skipif(os.name != "posix", reason="no umask elsewhere")
 def test_others_may_read_what_the_umask_lets_them(tmp_path: Path) -> None:
     for mask in (0o022, 0o077):
