@@ -97,8 +97,7 @@ def _one(thing: Reference, history: History) -> Found | Step:
     if reply is None:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
-    told = not thing.unknown or thing.query  # who adds words nobody understands sees several
-    alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and query and told)
+    alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and _is_told(thing))
     if reply["settled"] and (alone or not _says_little(thing, _is_clear(reply))):
         return Found(matches[0]["id"], thing.said, tuple(matches[0].get("reasons", ())))
     if matches:
@@ -136,6 +135,22 @@ def _trouble(thing: Reference) -> str:
     return ""
 
 
+def _is_told(thing: Reference) -> bool:
+    """Whether the words fit what stands out most for what it is, not for its place among others.
+
+    Who adds words nobody understands sees several; of a kind that nothing measures, what is the
+    second from the left or the largest may be of another kind.
+    """
+    if not thing.query:
+        return not thing.unknown and bool(thing.whole_query)
+    ranks_alone = set(thing.query) == {"picks"} and _ranked(thing)
+    return not (ranks_alone and thing.weak and thing.whole_query == thing.query)
+
+
+def _ranked(thing: Reference) -> bool:
+    return any(p["by"] not in SINGLE for p in thing.query.get("picks", ()))
+
+
 def _is_clear(reply: dict[str, Any]) -> bool:
     """Whether the match stands out in a picture that is not full of patches."""
     return reply["things"] <= CROWDED and reply["candidates"][0]["salience"] >= FAINT
@@ -149,7 +164,7 @@ def _says_little(thing: Reference, clear: bool) -> bool:
     """
     if thing.unknown and not thing.query:
         return True
-    ranked = any(p["by"] not in SINGLE for p in thing.query.get("picks", ()))
+    ranked = _ranked(thing)
     if thing.noun in ("any", ""):
         return not thing.query or (ranked and not clear)
     nouns = {name for name in thing.whole_query if name not in thing.query}

@@ -98,6 +98,7 @@ def test_the_thing_that_measures_single_out_is_taken(words: str, relation: str) 
         "Surround the dog",
         "Surround the coin box",
         "Surround the largest coin's shadow",
+        "Surround the largest stone",
         "Surround the head on the largest coin",
         "Surround the smallest coin, not the largest",
         "Surround the largest coin and the smallest coin",
