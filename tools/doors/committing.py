@@ -8,10 +8,8 @@ from ..errors import ToolError
 from ..fleet.deploy import Arrival
 from ..fleet.deploy import deploy as drive
 from ..fleet.simulated import SimulatedFleet
-from ..formation.caging import CageError
 from ..formation.contract import Contract, Group
-from ..formation.partial import Refusal, best_partial
-from ..formation.place import CapacityError
+from ..formation.partial import REFUSALS, Refusal, best_partial
 from ..formation.plan import Plan, make_plan
 from ..formation.wording import doubts
 from ..geometry.outline import distances
@@ -68,7 +66,7 @@ def propose_formation(
     places = positions if samples is None else _sampled(workspace, samples)
     try:
         plan = make_plan(held, workspace.scene.site(held), workspace.scene.version, places)
-    except (CapacityError, CageError) as error:
+    except REFUSALS as error:
         raise ToolError(f"{error}{_partial(workspace, held, error)}") from None
     _keep(workspace, plan)
     exact = workspace.exact[plan.id] = _exact(contract)
