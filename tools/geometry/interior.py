@@ -113,11 +113,13 @@ def ground(outline: Outline, margin: float, depth: float) -> BaseGeometry:
         margin: least distance from its boundary, px; kept at reflex corners and holes too.
         depth: greatest distance from it, px.
     """
-    deepest = outline.polygon.buffer(-min(depth, outline.perimeter), quad_segs=FINE_SEGMENTS)
     kept = outline.polygon.buffer(-margin * FINE_DIP, quad_segs=FINE_SEGMENTS)
     if kept.is_empty:  # a sliver has no round joins to make up for
         kept = outline.polygon.buffer(-margin, quad_segs=FINE_SEGMENTS)
-    return kept.difference(deepest)
+    x0, y0, x1, y1 = outline.bounds
+    if 2 * depth >= min(x1 - x0, y1 - y0):  # nothing is deeper, which GEOS takes long to find
+        return kept
+    return kept.difference(outline.polygon.buffer(-depth))
 
 
 @lru_cache(maxsize=4)  # whoever places robots has them checked next
