@@ -96,7 +96,7 @@ def _letters(text: str) -> Found:
 
 def _grid(text: str) -> Found:
     number = rf"(?:[0-9]{{1,4}}|{number_words()})"
-    size = rf"(?P<rows>{number})\s*(?:by|x|\N{{MULTIPLICATION SIGN}})\s*(?P<columns>{number})"
+    size = rf"(?P<rows>{number})\s*(?:by|x|\u00d7)\s*(?P<columns>{number})"
     grid = rf"an?\s+(?:{size}\s+grid|grid\s+of\s+{size.replace('P<', 'P<of_')}|grid)(?![\w-])"
     found = re.search(rf"(?i)(?:{MAKE}|{STAND}){grid}", text)
     if found is None:

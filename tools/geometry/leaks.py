@@ -73,11 +73,13 @@ def _links(cells: IndexArray, grid: Grid) -> IndexArray:
     pairs: list[IndexArray] = []
     for axis in range(3):
         beside = cells.copy()
-        beside[:, axis] += 1  # still in the grid: the domain keeps off its border
+        beside[:, axis] += 1
         beside[:, 0] %= grid.turns
+        there = beside[:, axis] < shape[axis]
+        beside[~there] = 0
         other = np.asarray(np.ravel_multi_index(tuple(beside.T), shape), dtype=np.intp)
         rank = np.minimum(np.searchsorted(ordered, other), len(keys) - 1)
-        found = np.flatnonzero(ordered[rank] == other)
+        found = np.flatnonzero(there & (ordered[rank] == other))
         pairs.append(np.stack([found, order[rank[found]]]))
     return np.concatenate(pairs, axis=1)
 
@@ -105,6 +107,7 @@ def _touching(cells: IndexArray, way: IndexArray, grid: Grid) -> BoolArray:
     steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     near = (way[:, None] + steps).reshape(-1, 3)
     near[:, 0] %= grid.turns
+    near[:, 1:] = np.clip(near[:, 1:], 0, np.array(grid.domain.shape) - 1)
     marked[tuple(near.T)] = True
     return marked[tuple(cells.T)]
 
