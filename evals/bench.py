@@ -6,8 +6,7 @@ OpenCV, shapely, scipy or Pillow on the same data; the ratio is what formup adds
 
 import asyncio
 import io
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -27,40 +26,52 @@ from ..tools.perception.image import load_picture, picture_from_array
 from ..tools.perception.prompts import TargetPrompt
 from ..tools.scene import Scene
 from ..tools.workspace import Workspace
+from .growth import Work, best, growth
 from .suite import load_tasks
 
 SIZE = (1920, 1080)
 REPEATS = 5
-ROBOTS, INSIDE, PROBES = 24, 24, 1000
-Work = Callable[[], object]
+ROBOTS, PROBES = 24, 1000
+SIDES = (0.25, 0.5, 1, 2)
+"""Sides of the pictures for the growth, by those of SIZE."""
+TEAMS = (6, 24, 96)
+PLACING = ("sample_along_edges", "sample_inside", "sample_shape", "propose_formation", "deploy")
 Case = tuple[str, dict[str, Any], tuple[str, Work]]
 """What is called, its arguments, and the bare calls in words and as a function."""
 
 
 def main() -> None:
-    """Print the table."""
-    workspace = _workspace()
+    """Print the table and how the times grow."""
+    workspace = _workspace(SIZE)
     print(f"{SIZE[0]} x {SIZE[1]} px, CPU milliseconds, best of {REPEATS}")  # noqa: T201
     print(f"{'tool':20} {'formup':>9} {'bare':>9} {'ratio':>7}  bare calls")  # noqa: T201
-    for name, arguments, (words, bare) in _cases(workspace):
-        tool = next(t for t in TOOLS if t.name == name.partition(" ")[0])
-
-        def call(tool: Any = tool, arguments: dict[str, Any] = arguments) -> object:
-            return asyncio.run(tool.call(_anew(workspace), arguments))
-
-        ours, theirs = _best(call), _best(bare)
+    for case in _cases(workspace):
+        name, _, (words, bare) = case
+        ours, theirs = _timed(workspace, case), best(bare, REPEATS)
         print(f"{name:20} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.1f}  {words}")  # noqa: T201
+    print(f"\n{'growth':28} fitted")  # noqa: T201
+    for line in _growths(workspace):
+        print(line, flush=True)  # noqa: T201
 
 
-def _best(work: Work) -> float:
-    """Least CPU milliseconds over the repeats, after one to warm up."""
-    work()
-    times: list[float] = []
-    for _ in range(REPEATS):
-        began = time.process_time()
-        work()
-        times.append(1000 * (time.process_time() - began))
-    return max(min(times), 1e-3)
+def _growths(workspace: Workspace) -> Iterator[str]:
+    """Every tool against the picture's pixels; those that place robots against their number."""
+    sizes = [(round(SIZE[0] * share), round(SIZE[1] * share)) for share in SIDES]
+    pixels = [width * height for width, height in sizes]
+    spaces = [_workspace(size) for size in sizes]
+    for cases in zip(*map(_cases, spaces), strict=True):
+        found = [_timed(w, case) for w, case in zip(spaces, cases, strict=True)]
+        yield growth(cases[0][0], "pixels", pixels, found)
+    for cases in zip(*(_cases(workspace, n) for n in TEAMS), strict=True):
+        if cases[0][0] in PLACING:
+            found = [_timed(workspace, case) for case in cases]
+            yield growth(cases[0][0], "robots", TEAMS, found)
+
+
+def _timed(workspace: Workspace, case: Case) -> float:
+    name, arguments, _ = case
+    tool = next(t for t in TOOLS if t.name == name.partition(" ")[0])
+    return best(lambda: asyncio.run(tool.call(_anew(workspace), arguments)), REPEATS)
 
 
 def _anew(workspace: Workspace) -> Workspace:
@@ -70,13 +81,13 @@ def _anew(workspace: Workspace) -> Workspace:
     return replace(workspace, scene=scene, found=None)
 
 
-def _workspace() -> Workspace:
-    """The two cars at 2 megapixels, the red one segmented as t1, the other as t2."""
+def _workspace(size: tuple[int, int]) -> Workspace:
+    """The two cars at a width and height, px, the red one segmented as t1, the other as t2."""
     task = next(t for t in load_tasks() if t.image.stem == "cars_two" and t.other)
     photo = load_picture(task.image)
-    scale = np.array([SIZE[0] / photo.width, SIZE[1] / photo.height])
+    scale = np.array(size) / (photo.width, photo.height)
     workspace = Workspace(
-        Scene(picture_from_array(np.asarray(cv2.resize(photo.pixels, SIZE), dtype=np.uint8)))
+        Scene(picture_from_array(np.asarray(cv2.resize(photo.pixels, size), dtype=np.uint8)))
     )
     segment = next(t for t in TOOLS if t.name == "segment")
     assert task.other is not None
@@ -87,10 +98,11 @@ def _workspace() -> Workspace:
     return replace(workspace, pointed=(TargetPrompt(id="t3", box=box),))  # for locate_object
 
 
-def _cases(workspace: Workspace) -> list[Case]:
+def _cases(workspace: Workspace, robots: int = ROBOTS) -> list[Case]:
+    size = workspace.scene.picture.width, workspace.scene.picture.height
     box = [round(v) for v in workspace.scene.target("t1").box]
-    group = {"relation": "around", "targets": ["t1"], "robots": ROBOTS}
-    probes = np.random.default_rng(0).uniform((0, 0), SIZE, (PROBES, 2))
+    group = {"relation": "around", "targets": ["t1"], "robots": robots}
+    probes = np.random.default_rng(0).uniform((0, 0), size, (PROBES, 2))
     propose = next(t for t in TOOLS if t.name == "propose_formation")
     plan = asyncio.run(propose.call(workspace, {"contract": {"groups": [group]}})).data["plan_id"]
     points = workspace.plans[plan].formation.points
@@ -108,17 +120,17 @@ def _cases(workspace: Workspace) -> list[Case]:
         ),
         (
             "sample_along_edges",
-            {"target": "t1", "n": ROBOTS},
+            {"target": "t1", "n": robots},
             ("shapely buffer, interpolate", _bare_ring(workspace)),
         ),
         (
             "sample_inside",
-            {"target": "t1", "n": INSIDE},
+            {"target": "t1", "n": robots},
             ("4 x 40 cKDTree queries of 6000 cells", _bare_inside(workspace)),
         ),
         (
             "sample_shape",
-            {"kind": "between", "n": 8, "targets": ["t1", "t2"]},
+            {"kind": "between", "n": robots // 3, "targets": ["t1", "t2"]},
             ("shapely difference, interpolate", _bare_between(workspace)),
         ),
         ("measure", {"a": "t1", "b": "t2"}, ("shapely distance", _bare_measure(workspace))),
@@ -230,7 +242,7 @@ def _bare_inside(workspace: Workspace) -> Work:
     x0, y0, x1, y1 = workspace.scene.target("t1").outline.bounds
     random = np.random.default_rng(0)
     cells = random.uniform((x0, y0), (x1, y1), (6000, 2))
-    robots = random.uniform((x0, y0), (x1, y1), (INSIDE, 2))
+    robots = random.uniform((x0, y0), (x1, y1), (ROBOTS, 2))
 
     def work() -> object:
         return [cKDTree(robots).query(cells) for _ in range(4 * 40)]
@@ -243,7 +255,7 @@ def _bare_between(workspace: Workspace) -> Work:
 
     def work() -> object:
         line = shapely.LineString([a.centroid, b.centroid]).difference(shapely.union(a, b))
-        shares = np.arange(8) / 7
+        shares = np.arange(ROBOTS // 3) / 7
         return [line.interpolate(float(share), normalized=True) for share in shares]
 
     return work

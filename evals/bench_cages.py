@@ -6,8 +6,7 @@ first grid halved once, and one labelling of what is free.
 """
 
 import itertools
-import time
-from collections.abc import Callable
+from collections.abc import Iterator
 
 import numpy as np
 import shapely
@@ -16,36 +15,77 @@ from shapely.affinity import translate
 from shapely.geometry import Polygon
 
 from ..tools.geometry.cages import QUICK, THOROUGH, cage
+from ..tools.geometry.configuration import flood
 from ..tools.geometry.configuration_grid import first_grid
 from ..tools.geometry.curves import ring
 from ..tools.geometry.outline import FloatArray, make_outline
 from ..tools.geometry.rigid import Obstacles, body_of
 from ..tools.geometry.sampling import along_curve
+from .growth import Work, best, growth, peak, times
 
 REPEATS = 5
 SIZE = 100.0
 COUNTS = (10, 30, 100, 300, 1000)
 FLOODED = (5, 6, 8, 12)
+CROWDS = (30, 60, 120, 240)
+VERTICES = (60, 300, 1500, 4500)
 ELL = ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3))
 TABLE = 192
 COPIES = 40
 """As many bodies, each a little aside, so that nothing is kept from the call before."""
-Work = Callable[[], object]
 
 
 def main() -> None:
     """Print the tables."""
     region = make_outline(np.asarray(ELL) * SIZE + 300).filled
-    turns = np.arange(60) / 60 * 2 * np.pi
-    coin = make_outline(np.stack([np.cos(turns), np.sin(turns)], axis=1) * SIZE + 300).filled
     print(f"CPU milliseconds, best of {REPEATS}; disc: 60 corners; flood: an L of 6 corners")  # noqa: T201
     print(f"{'test':32} {'formup':>9} {'bare':>9} {'ratio':>7}  state")  # noqa: T201
-    discs = [_disc(coin, n) for n in COUNTS]
+    discs = [_disc(_coin(60), n) for n in COUNTS]
     for n in FLOODED:
         for levels in (QUICK, THOROUGH):
             _flood(region, n, levels)
-    power = np.polyfit(np.log(COUNTS), np.log(discs), 1)[0]
-    print(f"growth of the disc test: time ~ robots to the power of {power:.2f}")  # noqa: T201
+    print(f"\n{'growth':28} fitted")  # noqa: T201
+    print(growth("disc", "robots", COUNTS, discs))  # noqa: T201
+    for line in _growths(region):
+        print(line, flush=True)  # noqa: T201
+
+
+def _growths(region: Polygon) -> Iterator[str]:
+    """One level of the flood, the disc test of ten robots."""
+
+    def crowd(n: int) -> Work:
+        return _level(region, _around(region, n))
+
+    def disc(vertices: int) -> Work:
+        coin = _coin(vertices)
+        robots = _around(coin, 10)
+        asides = itertools.cycle(np.arange(COPIES) / 8)
+
+        def work() -> object:
+            aside = next(asides)
+            return cage(translate(coin, aside), robots + np.array([aside, 0.0]), levels=0)
+
+        return work
+
+    def cornered(vertices: int) -> Work:
+        return _level(_coin(vertices), _around(_coin(vertices), 10))
+
+    yield growth("flood, a level", "robots", CROWDS, times(crowd, CROWDS, REPEATS))
+    yield growth("disc, 10 robots", "vertices", VERTICES, times(disc, VERTICES, REPEATS))
+    found = times(cornered, VERTICES, REPEATS)
+    yield growth("flood, a level, 10 robots", "vertices", VERTICES, found)
+    memory = [peak(crowd(n)) for n in CROWDS]
+    yield growth("flood, memory", "robots", CROWDS, memory, "MiB")
+
+
+def _coin(vertices: int) -> Polygon:
+    turns = np.arange(vertices) / vertices * 2 * np.pi
+    return make_outline(np.stack([np.cos(turns), np.sin(turns)], axis=1) * SIZE + 300).filled
+
+
+def _level(region: Polygon, robots: FloatArray) -> Work:
+    body, obstacles = body_of(region), Obstacles(robots, 0.0)
+    return lambda: flood(body, obstacles, 1, escapes=False)
 
 
 def _disc(region: Polygon, n: int) -> float:
@@ -59,8 +99,8 @@ def _disc(region: Polygon, n: int) -> float:
         disc = shapely.maximum_inscribed_circle(body)
         return disc, shapely.delaunay_triangles(places, only_edges=True), body.distance(places)
 
-    ours = _best(lambda: [cage(*next(turn), levels=0) for _ in range(inner)]) / inner
-    theirs = _best(lambda: [bare(*next(again)) for _ in range(inner)]) / inner
+    ours = best(lambda: [cage(*next(turn), levels=0) for _ in range(inner)], REPEATS) / inner
+    theirs = best(lambda: [bare(*next(again)) for _ in range(inner)], REPEATS) / inner
     _row(f"disc, {n} robots", ours, theirs, cage(region, robots, levels=0).state)
     return ours
 
@@ -69,8 +109,9 @@ def _flood(region: Polygon, n: int, levels: int) -> None:
     robots = _around(region, n)
     found = cage(region, robots, levels=levels)
     how = f"{found.state}, by the {found.test}" if found.test else found.state
-    ours = _best(lambda: cage(region, robots, levels=levels))
-    _row(f"flood, {n} robots, {levels} levels", ours, _best(_bare_flood(region, robots)), how)
+    ours = best(lambda: cage(region, robots, levels=levels), REPEATS)
+    bare = best(_bare_flood(region, robots), REPEATS)
+    _row(f"flood, {n} robots, {levels} levels", ours, bare, how)
 
 
 def _around(region: Polygon, n: int) -> FloatArray:
@@ -99,16 +140,6 @@ def _bare_flood(region: Polygon, robots: FloatArray) -> Work:
         return label(free)
 
     return work
-
-
-def _best(work: Work) -> float:
-    work()
-    times: list[float] = []
-    for _ in range(REPEATS):
-        began = time.process_time()
-        work()
-        times.append(1000 * (time.process_time() - began))
-    return max(min(times), 1e-3)
 
 
 def _row(name: str, ours: float, theirs: float, state: str) -> None:

@@ -5,8 +5,7 @@ how fast the time grows with the number of robots and of vertices.
 """
 
 import itertools
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import shapely
@@ -21,6 +20,7 @@ from ..tools.geometry.lloyd import cells_of, grid
 from ..tools.geometry.outline import FloatArray, Outline, make_outline, nearest_segments
 from ..tools.geometry.rings import equal_chords
 from ..tools.geometry.sampling import along_curve, nearest
+from .growth import Work, best, growth, peak, times
 
 REPEATS = 3
 SIZE = 12_000.0
@@ -29,7 +29,6 @@ FINE = 1_000_000
 """Cells that the energy is summed over."""
 HEXAGON = 5 / (18 * 3**0.5)
 """Energy of a hexagonal lattice, by area squared over the number of robots (Fejes Toth)."""
-Work = Callable[[], object]
 
 
 def main() -> None:
@@ -38,7 +37,9 @@ def main() -> None:
     print(f"CPU milliseconds, best of {REPEATS}; an outline of {VERTICES} vertices")  # noqa: T201
     _placing(outline)
     _checking(outline)
-    _growth()
+    print(f"\n{'growth':28} fitted")  # noqa: T201
+    for line in _growth():
+        print(line, flush=True)  # noqa: T201
 
 
 def bumpy(vertices: int) -> Outline:
@@ -55,16 +56,6 @@ def energy_ratio(outline: Outline, points: FloatArray) -> float:
     return mean * outline.area / (HEXAGON * outline.area**2 / len(points))
 
 
-def _best(work: Work) -> float:
-    work()
-    times: list[float] = []
-    for _ in range(REPEATS):
-        began = time.process_time()
-        work()
-        times.append(1000 * (time.process_time() - began))
-    return min(times)
-
-
 def _placing(outline: Outline) -> None:
     plain = make_outline(shapely.get_coordinates(outline.filled.simplify(SIZE / 200)))
     loop = ring(outline, 100, 200)
@@ -72,20 +63,21 @@ def _placing(outline: Outline) -> None:
     rows: list[tuple[str, Work, Work]] = [
         (
             f"around, 8, {few} vertices",
-            lambda: along_curve(ring(plain, 100, 200), 8),
+            _eight(plain),
             _bare_ring(plain, 8),
         ),
-        ("around, 8", lambda: along_curve(ring(outline, 100, 200), 8), _bare_ring(outline, 8)),
+        ("around, 8", _eight(outline), _bare_ring(outline, 8)),
         ("8 on the ring alone", lambda: along_curve(loop, 8), _bare_places(loop, 8)),
         (f"{MANY} on the ring alone", lambda: along_curve(loop, MANY), _bare_places(loop, MANY)),
         ("100 at equal chords", lambda: equal_chords(loop, 100), _bare_places(loop, 100)),
     ]
     print(f"{'placing':28} {'formup':>10} {'bare':>10}")  # noqa: T201
     for name, work, bare in rows:
-        print(f"{name:28} {_best(work):10.2f} {_best(bare):10.2f}")  # noqa: T201
+        print(f"{name:28} {best(work, REPEATS):10.2f} {best(bare, REPEATS):10.2f}")  # noqa: T201
     for n in (6, 50, 100, 1000, MANY):
         ratio = energy_ratio(outline, inside(outline, n, 10, SIZE, 0.0))
-        ours, theirs = _best(_inside(outline, n)), _best(_bare_lloyd(outline, n))
+        ours = best(_inside(outline, n), REPEATS)
+        theirs = best(_bare_lloyd(outline, n), REPEATS)
         print(f"{f'inside, {n}':28} {ours:10.2f} {theirs:10.2f}   energy {ratio:.3f}")  # noqa: T201
 
 
@@ -121,6 +113,10 @@ def _bare_lloyd(outline: Outline, n: int) -> Work:
     return work
 
 
+def _eight(outline: Outline) -> Work:
+    return lambda: along_curve(ring(outline, 100, 200), 8)
+
+
 def _inside(outline: Outline, n: int) -> Work:
     """Places robots inside; each time a little deeper, so that nothing is kept from the last."""
     margins = itertools.count(10, 1e-6)
@@ -129,15 +125,21 @@ def _inside(outline: Outline, n: int) -> Work:
 
 def _checking(outline: Outline) -> None:
     print(f"\ncheck of {MANY:18} {'formup':>10} {'bare':>10} {'ratio':>7}")  # noqa: T201
-    site = Site({"t1": outline}, SIZE, SIZE)
     for relation in ("around", "inside"):
-        group = Group.model_validate({"relation": relation, "targets": ["t1"], "robots": MANY})
-        contract = with_defaults(Contract(groups=(group,)), site.outlines, site.room)
-        points = place(contract, site)
-        assert certify(points, contract, site).certified
+        work, points = _checked(relation, outline, MANY)
         bare = _bare_around(outline, points) if relation == "around" else _bare_in(outline, points)
-        ours, theirs = _best(lambda c=contract, p=points: certify(p, c, site)), _best(bare)
+        ours, theirs = best(work, REPEATS), best(bare, REPEATS)
         print(f"{relation:28} {ours:10.1f} {theirs:10.1f} {ours / theirs:7.1f}")  # noqa: T201
+
+
+def _checked(relation: str, outline: Outline, n: int) -> tuple[Work, FloatArray]:
+    """The check of places that hold, and these."""
+    site = Site({"t1": outline}, SIZE, SIZE)
+    group = Group.model_validate({"relation": relation, "targets": ["t1"], "robots": n})
+    contract = with_defaults(Contract(groups=(group,)), site.outlines, site.room)
+    points = place(contract, site)
+    assert certify(points, contract, site).certified
+    return lambda: certify(points, contract, site), points
 
 
 def _bare_around(outline: Outline, points: FloatArray) -> Work:
@@ -164,23 +166,29 @@ def _bare_in(outline: Outline, points: FloatArray) -> Work:
     return work
 
 
-def _growth() -> None:
-    """Fit time ~ size ** exponent over a decade and a half."""
-    outline, counts = bumpy(VERTICES), np.array([300, 1000, 3000, 10_000])
-    loop, vertices = ring(outline, 100, 200), np.array([300, 1000, 3000])
-    shapes = [bumpy(int(v)) for v in vertices]
-    rows = {
-        "along, robots": (counts, [_best(lambda n=n: along_curve(loop, int(n))) for n in counts]),
-        "inside, robots": (counts, [_best(_inside(outline, int(n))) for n in counts]),
-        "around 8, vertices": (
-            vertices,
-            [_best(lambda o=o: along_curve(ring(o, 100, 200), 8)) for o in shapes],
-        ),
+def _growth() -> Iterator[str]:
+    """Time and memory against the number of robots and of vertices."""
+    outline, counts, corners = bumpy(VERTICES), (300, 1000, 3000, MANY), (300, 1000, 3000)
+    loop = ring(outline, 100, 200)
+    by_robots: dict[str, Callable[[int], Work]] = {
+        "along": lambda n: lambda: along_curve(loop, n),
+        "inside": lambda n: _inside(outline, n),
+        "check of around": lambda n: _checked("around", outline, n)[0],
+        "check of inside": lambda n: _checked("inside", outline, n)[0],
     }
-    print("\ngrowth: time ~ size to the power of")  # noqa: T201
-    for name, (sizes, times) in rows.items():
-        power = np.polyfit(np.log(sizes), np.log(times), 1)[0]
-        print(f"{name:28} {power:10.2f}")  # noqa: T201
+    by_vertices: dict[str, Callable[[int], Work]] = {
+        "around 8": lambda v: _eight(bumpy(v)),
+        "inside 100": lambda v: _inside(bumpy(v), 100),
+        "check of 1000 around": lambda v: _checked("around", bumpy(v), 1000)[0],
+        "check of 1000 inside": lambda v: _checked("inside", bumpy(v), 1000)[0],
+    }
+    for name, work in by_robots.items():
+        yield growth(name, "robots", counts, times(work, counts, REPEATS))
+    for name, work in by_vertices.items():
+        yield growth(name, "vertices", corners, times(work, corners, REPEATS))
+    for name, work in by_robots.items():
+        found = [peak(work(n)) for n in counts]
+        yield growth(f"{name}, memory", "robots", counts, found, "MiB")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from ...tools.formation.lengths import also_metres
 from ..messages import Call, History, Reply, Result, User
 from ..model import Request
 from ..task import Task, read_task
+from .forms import ENCLOSING, READING, Form, faced_in, form_in
 from .refer import Reading as Words
 from .refer import references
 from .understand import Reading, understand
@@ -50,15 +51,17 @@ class OfflinePlanner:
 def _begin(task: Task, history: History) -> Reply:
     """Propose a formation, or find and ask what is missing."""
     pointed = bool(_target_ids(task))
-    spoken = Words((), task.instruction) if pointed else references(task.instruction)
+    form, told = form_in(task.instruction)
+    spoken, faced = _spoken(told, pointed)
     answers = _spoken_answers(history)
     reading = understand(". ".join([spoken.rest, *answers]), task.metres_per_pixel)
     bare = [int(a) for a in answers if a.strip().isascii() and a.strip().isdecimal()]
-    robots = task.robots or reading.robots or next(iter(bare), None)
-    question = _open_question(task, reading, robots)
+    said = reading.robots or (form.robots if form else None)
+    robots = task.robots or said or next(iter(bare), None)
+    things = 2 if "between" in reading.relations or faced else 1
+    question = _unfit(reading, form, faced, robots) or _open_question(task, reading, robots, things)
     if question or robots is None:
         return _call(history, "ask_user", {"question": question or "How many robots?"})
-    things = 2 if "between" in reading.relations else 1
     prompts = [p for p in task.pointed if p["id"] not in task.targets]
     if not pointed:
         found = find(spoken.things, things, history)
@@ -68,14 +71,71 @@ def _begin(task: Task, history: History) -> Reply:
             {"id": f"t{i}", "candidate": f.candidate, "label": _label(f.said)}
             for i, f in enumerate(found, start=1)
         ]
-    ids = list(dict.fromkeys([*task.targets, *(p["id"] for p in prompts)]))
-    contract: dict[str, Any] = {"groups": [_group(reading, robots, ids[:things])]}
+    ids = list(dict.fromkeys([*task.targets, *(p["id"] for p in prompts)]))[:things]
+    contract: dict[str, Any] = {"groups": [_group(reading, robots, ids)]}
+    if faced:
+        contract["groups"] = [_facing(reading, robots, ids)]
+    elif form:
+        contract = {"groups": [_drawn(reading, form, robots, ids, history)], "reading": READING}
     if reading.robot_radius is not None:
         contract["robot_radius"] = reading.robot_radius
     if task.metres_per_pixel is not None:
         contract["unit"] = "px"
-    arguments = {"contract": contract, "targets": prompts}
-    return _call(history, "propose_formation", arguments)
+    return _call(history, "propose_formation", {"contract": contract, "targets": prompts})
+
+
+def _spoken(told: str, pointed: bool) -> tuple[Words, bool]:
+    """The things an instruction speaks of, what is left of it, and whether a side faces one."""
+    main, faced = faced_in(told)
+    if faced is None:
+        return (Words((), told) if pointed else references(told)), False
+    if pointed:
+        return Words((), f"{main} {faced.partition(' ')[2]}"), True
+    first, second = references(main), references(faced)
+    rest = f"{first.rest} {second.rest.removeprefix('it')}"
+    return Words((*first.things, *second.things), rest), True
+
+
+def _unfit(reading: Reading, form: Form | None, faced: bool, robots: int | None) -> str | None:
+    """What to ask where a form has no place by the thing, or a side that faces it is no side."""
+    if reading.beyond:
+        return None
+    if faced and (form or reading.relations != ("along",) or reading.side is not None):
+        return (
+            "The offline rules know of one thing that faces another only the side that robots "
+            "line up along. Which side is meant?"
+        )
+    if form is None:
+        return None
+    if form.robots is not None and robots not in (None, form.robots):
+        return f"{form.said} takes {form.robots} robots, {robots} were named. Which?".capitalize()
+    if form.where(reading.relations, reading.side, 0) is None:
+        around = ", around" if form.shape["kind"] in ENCLOSING else ""
+        return (
+            f"Where is {form.said} meant to be? Inside a thing{around}, or left, right, above or "
+            "below."
+        )
+    return None
+
+
+def _drawn(
+    reading: Reading, form: Form, robots: int, targets: list[str], history: History
+) -> dict[str, Any]:
+    where = form.where(reading.relations, reading.side, _refusals(history))
+    group = _plain(reading, robots, targets) | {
+        "relation": "shape",
+        "shape": form.shape | {"where": where},
+    }
+    return group | _distance(reading, deep=where == "inside")
+
+
+def _facing(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
+    group = _plain(reading, robots, targets[:1])
+    return group | {"relation": "along", "facing": targets[1]} | _distance(reading, deep=False)
+
+
+def _refusals(history: History) -> int:
+    return sum(isinstance(m, Result) and m.name == "propose_formation" for m in history)
 
 
 def _left_off(result: Result, history: History) -> str:
@@ -104,9 +164,12 @@ def _label(said: str) -> str:
     return said.split(" ", 1)[-1][:MAX_LABEL]
 
 
-def _open_question(task: Task, reading: Reading, robots: int | None) -> str | None:
-    """What has to be asked before a thing is looked for, or None."""
-    things = len(_target_ids(task))
+def _open_question(task: Task, reading: Reading, robots: int | None, used: int) -> str | None:
+    """What has to be asked before a number of things is looked for, or None."""
+    return _which_arrangement(reading) or _how_many(reading, robots) or _which_things(task, used)
+
+
+def _which_arrangement(reading: Reading) -> str | None:
     if reading.beyond:
         said = " and ".join(reading.beyond)
         return (
@@ -120,15 +183,21 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
     where = DISTANCELESS.get(next(iter(reading.relations)))
     if reading.clearance is not None and where:
         return f"No distance is kept to what robots stand {where}. Which arrangement is meant?"
+    return None
+
+
+def _how_many(reading: Reading, robots: int | None) -> str | None:
     if robots is None and reading.odd_count:
         return f"How many robots? {reading.odd_count!r} names no whole number above 0."
     if robots is not None and robots > MAX_ROBOTS:
         return f"How many robots? {robots:,} are more than the {MAX_ROBOTS:,} that can be placed."
-    if not robots:
-        return "How many robots? Say it in the words or with -n."
-    if "between" in reading.relations and things == 1:
-        return "Between which two things? Point at both: --point X,Y --point X,Y."
-    used = 2 if "between" in reading.relations else 1
+    return None if robots else "How many robots? Say it in the words or with -n."
+
+
+def _which_things(task: Task, used: int) -> str | None:
+    things = len(_target_ids(task))
+    if things == 1 and used == 2:
+        return "Which two things? Point at both: --point X,Y --point X,Y."
     if things > used:
         named = ", ".join(_target_ids(task))
         return f"{things} things were pointed at ({named}), the arrangement is about {used}. Which?"
@@ -137,25 +206,36 @@ def _open_question(task: Task, reading: Reading, robots: int | None) -> str | No
 
 def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
     (relation,) = reading.relations
-    group: dict[str, Any] = {
-        "relation": relation,
-        "targets": targets,
-        "robots": robots,
-        "fit": reading.fit,
-        "spacing": "even" if relation == "cage" else reading.spacing,
-    }
+    group = _plain(reading, robots, targets) | {"relation": relation}
+    if relation == "cage":
+        group["spacing"] = "even"
     if relation == "along":
         group["side"] = reading.side or "long"
     if relation == "cage" and reading.escape_proof:
         group["closure"] = "escape-proof"
     if relation == "between":
         group["layout"] = reading.layout
-    if reading.clearance is not None:
-        most = FARTHEST if relation == "inside" else reading.clearance + 1
-        group["clearance"] = [reading.clearance, most]
-    if reading.min_spacing is not None:
-        group["min_spacing"] = reading.min_spacing
-    return group
+    if relation in ("between", "centre"):
+        return group
+    return group | _distance(reading, deep=relation == "inside")
+
+
+def _plain(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
+    group: dict[str, Any] = {
+        "targets": targets,
+        "robots": robots,
+        "fit": reading.fit,
+        "spacing": reading.spacing,
+    }
+    apart = reading.min_spacing
+    return group if apart is None else group | {"min_spacing": apart}
+
+
+def _distance(reading: Reading, *, deep: bool) -> dict[str, Any]:
+    """The clearance that is named; inside the least, which leaves open how deep."""
+    if reading.clearance is None:
+        return {}
+    return {"clearance": [reading.clearance, FARTHEST if deep else reading.clearance + 1]}
 
 
 def _target_ids(task: Task) -> list[str]:
@@ -164,6 +244,8 @@ def _target_ids(task: Task) -> list[str]:
 
 def _after_proposal(task: Task, result: Result, history: History) -> Reply:
     if result.error:
+        if "There is no room" in result.text and _may_move_on(task, history):
+            return _begin(task, history)
         if "Insufficient segmentation accuracy" in result.text:
             return _call(history, "ask_user", {"question": result.text})
         return _impossible(history, result.text)
@@ -174,6 +256,15 @@ def _after_proposal(task: Task, result: Result, history: History) -> Reply:
     if task.deploy:
         return _call(history, "deploy", {"plan_id": plan["plan_id"]})
     return Reply(text=f"{_planned(plan, history)} Nothing was moved.")
+
+
+def _may_move_on(task: Task, history: History) -> bool:
+    """Whether a form beside a thing, with no room on one side of it, has another to be tried."""
+    form, told = form_in(task.instruction)
+    reading = understand(_spoken(told, bool(_target_ids(task)))[0].rest)
+    if form is None or reading.side is not None:
+        return False
+    return form.where(reading.relations, None, _refusals(history)) is not None
 
 
 def _impossible(history: History, said: str, plan_id: str | None = None) -> Reply:

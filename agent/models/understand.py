@@ -181,7 +181,7 @@ def _unbeaten(relations: list[str]) -> list[str]:
 def _count(text: str) -> tuple[int | None, str | None]:
     """A number of robots in the words, or what stands there but is none."""
     lowered = text.lower()
-    number = rf"(?<![\w.])-?[0-9][0-9,.]*|{_number_words()}"
+    number = rf"(?<![\w.])-?[0-9][0-9,.]*|{number_words()}"
     nouns = "|".join(rf"{noun}s?" for noun in _vocabulary()["robots"] if noun != "one")
     found = re.search(
         rf"({number}|\bmany|\bseveral|\bsome)(?:\s+[a-z-]+)?\s*(?:{nouns})\b", lowered
@@ -197,7 +197,7 @@ def _count(text: str) -> tuple[int | None, str | None]:
     if found is None:
         return None, None
     word = next(group for group in found.groups() if group)
-    value = _number(word.strip())
+    value = whole_number(word.strip())
     return (value, None) if value is not None else (None, found[0].strip())
 
 
@@ -212,12 +212,13 @@ def _loose_count(text: str, number: str, nouns: str) -> str | None:
     return found[0].strip() if found else None
 
 
-def _number_words() -> str:
+def number_words() -> str:
+    """A pattern for a number in words."""
     names = "|".join(_vocabulary()["numbers"])
     return rf"\bhalf\s+a\s+dozen\b|\b(?:{names})(?:[\s-]+(?:{names}))*\b"
 
 
-def _number(word: str) -> int | None:
+def whole_number(word: str) -> int | None:
     """Digits, or words that multiply and add up: four hundred, twenty-five, half a dozen."""
     if re.fullmatch(r"[0-9]+|[0-9]{1,3}(?:,[0-9]{3})+", word):
         return int(word.replace(",", ""))
@@ -246,5 +247,5 @@ def _beyond(words: Words, relations: list[str], side: str | None) -> tuple[str, 
 def _foreign_units(text: str) -> list[str]:
     """Lengths in units that are not read, such as 3 feet."""
     units = "|".join(_vocabulary()["units"])
-    amount = rf"(?:[0-9][0-9.,]*|{_number_words()}|\bhalf\s+an?|\ban?)"
+    amount = rf"(?:[0-9][0-9.,]*|{number_words()}|\bhalf\s+an?|\ban?)"
     return re.findall(rf"{amount}\s*(?:{units})s?\b", text.lower())

@@ -68,7 +68,7 @@ def test_words_name_one_arrangement(words: str, relation: str) -> None:
         "Do not surround it, line up on its left",
         "Don't cage it, just line up above it",
         "surround it 3 metres away",
-        "form a triangle around it",
+        "form a heart around it",
         "three along the left and three along the right",
         "flank it on both long sides",
         "protect the left side of the house",

@@ -8,11 +8,9 @@ from ..errors import ToolError
 from ..fleet.deploy import Arrival
 from ..fleet.deploy import deploy as drive
 from ..fleet.simulated import SimulatedFleet
-from ..formation.caging import CageError
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
 from ..formation.lengths import contract_in_pixels, with_metres
-from ..formation.partial import Refusal, best_partial
-from ..formation.place import CapacityError
+from ..formation.partial import REFUSALS, Refusal, best_partial
 from ..formation.plan import Plan, make_plan
 from ..formation.wording import doubts
 from ..geometry.outline import distances
@@ -97,8 +95,7 @@ def _planned(workspace: Workspace, held: Contract, places: Any) -> Plan:
     try:
         return make_plan(held, scene.site(held), scene.version, places)
     except ToolError as error:
-        short = isinstance(error, CapacityError | CageError)
-        less = _partial(workspace, held, error) if short else ""
+        less = _partial(workspace, held, error) if isinstance(error, REFUSALS) else ""
         raise ToolError(f"{scene.told(str(error))}{less}") from None
 
 

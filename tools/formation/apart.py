@@ -32,7 +32,11 @@ class Stand:
 
 
 class CrowdedError(ToolError):
-    """Two groups would stand in each other's way."""
+    """Two groups would stand in each other's way.
+
+    Attributes:
+        first, second: their places in the contract, from 0.
+    """
 
     def __init__(self, first: int, second: int, apart: float, need: float) -> None:
         super().__init__(
@@ -40,6 +44,7 @@ class CrowdedError(ToolError):
             f"other; {need:.1f} px or more are needed, and no other places were found. Give one of "
             "the groups another clearance, or fewer robots."
         )
+        self.first, self.second = first - 1, second - 1
 
 
 def need(first: Group, second: Group) -> float:

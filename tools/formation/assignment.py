@@ -41,6 +41,8 @@ ROUNDS = 6
 WARM_ROUNDS = 2
 """Rounds after which the exact method takes over; prices to start from make it several times
 faster."""
+CONFINED_ROUNDS, SAVED = 12, 1e-5
+"""With a longest way to keep to: more rounds, as long as each saves this share of the cost."""
 REACH_SLACK = 1e-9
 """Share of the longest way by which rounding may make a way seem longer."""
 METHODS: Mapping[Objective, Method] = MappingProxyType(
@@ -145,8 +147,7 @@ def _exact(
     from scipy.spatial.distance import cdist
 
     if len(goals) > BASE:
-        for _ in range(WARM_ROUNDS):
-            matching = exchanged(goals, starts, matching, reach)
+        matching = _warmed(goals, starts, matching, reach)
     elif reach is None:
         return matching.robots  # exact as it is
     cost = cdist(goals, starts, "sqeuclidean") - matching.prices
@@ -154,6 +155,20 @@ def _exact(
     if reach:
         cost[reach.beyond(goals[:, None], starts)] = np.inf
     return np.asarray(linear_sum_assignment(cost)[1], dtype=np.intp)
+
+
+def _warmed(
+    goals: FloatArray, starts: FloatArray, matching: Matching, reach: Reach | None
+) -> Matching:
+    """The matching after rounds of exchanges, for the sake of its prices."""
+    before = squares(goals, starts, matching.robots)
+    for done in range(1, CONFINED_ROUNDS + 1):
+        matching = exchanged(goals, starts, matching, reach)
+        now = squares(goals, starts, matching.robots)
+        if done >= WARM_ROUNDS and (reach is None or now > (1 - SAVED) * before):
+            break
+        before = now
+    return matching
 
 
 def _nearly(

@@ -119,6 +119,7 @@ def _outside(part: Part, audit: Audit) -> None:
     if part.group.relation == "along" and part.group.edges is None:
         beyond = distances(part.outline.envelope, part.points) - part.radius
     least, greatest = part.clearance
+    most = (greatest + part.radius) * ROUND_JOIN_DIP - part.radius  # a ring there is a polyline
     audit.least("min_clearance_px", clearance.min())
     audit.greatest("max_clearance_px", clearance.max())
     name = part.group.targets[0]
@@ -133,7 +134,7 @@ def _outside(part: Part, audit: Audit) -> None:
                 least,
                 f"is {value:.1f} px from {name}; {least:.1f} px or more are needed",
             )
-        elif far > greatest * ROUND_JOIN_DIP + TOLERANCE and part.group.relation != "corners":
+        elif far > most + TOLERANCE and part.group.relation != "corners":
             audit.robot(
                 "too_far",
                 i,

@@ -3,8 +3,9 @@
 Whatever comes of it is certified by the same checker, and says of itself what it falls short of.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
+from .apart import CrowdedError
 from .caging import CageError, escape_proof
 from .contract import Contract, Group, with_defaults
 from .lengths import also_metres
@@ -15,6 +16,9 @@ ROUNDS = 60
 """Times that robots are taken out of one group or another."""
 TENTH = 10
 """Clearances are tried in steps of a tenth of a pixel."""
+LESS = tuple(k / 12 for k in range(1, 12))
+"""Shares of two groups' robots taken out in search of places where they are not in each other's
+way."""
 COARSE = 5
 """Halvings of a clearance for an escape-proof cage, each of which may take a second or more."""
 ROUND = frozenset({"around", "cage"})
@@ -22,7 +26,11 @@ OPEN = 1000.0
 """A greatest clearance from here on, px, only says that there is none."""
 
 
-Refusal = CapacityError | CageError
+Refusal = CapacityError | CageError | CrowdedError
+REFUSALS = (CapacityError, CageError, CrowdedError)
+"""What is raised where a contract cannot be met in full, to catch."""
+Attempt = Callable[[Contract], Plan]
+Counts = tuple[int, int]
 
 
 def best_partial(
@@ -53,33 +61,99 @@ def best_partial(
     return fewer or _nearer(contract, full, attempt, site.metres_per_pixel)
 
 
-def _fewer(full: Contract, attempt: Callable[[Contract], Plan]) -> Plan | None:
+def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
     """As many robots as fit, group after group."""
-    smaller = full
+    smaller, names = full, list(range(len(full.groups)))
     for _ in range(ROUNDS):
         try:
             plan = attempt(smaller)
+        except CrowdedError as error:
+            fewer = _parted(smaller, (error.first, error.second), attempt)
+            if fewer is None:
+                names.pop(error.second)
+                fewer = _without(smaller, error.second)
         except (CapacityError, CageError) as error:
-            fits = error.fits
-            if fits < (3 if error.group.relation == "cage" else 1):
-                return None
-            changed = error.group.model_copy(update={"robots": fits})
-            smaller = _with(smaller, smaller.groups.index(error.group), changed)
-            continue
-        if not plan.verdict.certified or smaller == full:
+            fewer = _counted(smaller, {smaller.groups.index(error.group): error.fits})
+        else:
+            short = plan.verdict.certified and smaller != full
+            return _marked(plan, _shortfall(full, smaller, names)) if short else None
+        if fewer is None:
             return None
-        asked, placed = full.robots, smaller.robots
-        have = "has a place" if placed == 1 else "have places"
-        sentence = f"{placed} of the {asked} robots {have}."
-        return _marked(plan, Shortfall(asked=asked, placed=placed, sentence=sentence))
+        smaller = fewer
     return None
 
 
+def _counted(contract: Contract, robots: Mapping[int, int]) -> Contract | None:
+    """The contract with other numbers of robots in some groups; None where one has too few."""
+    groups = list(contract.groups)
+    for index, count in robots.items():
+        if count < (3 if groups[index].relation == "cage" else 1):
+            return None
+        groups[index] = groups[index].model_copy(update={"robots": count})
+    return contract.model_copy(update={"groups": tuple(groups)})
+
+
+def _parted(contract: Contract, pair: tuple[int, int], attempt: Attempt) -> Contract | None:
+    """Fewer robots in two groups that crowd each other: most of those found that do not.
+
+    The second group gives way, or the first, or both by the same share.
+    """
+    first, second = pair
+    n, m = (contract.groups[index].robots for index in pair)
+    before = contract.model_copy(update={"groups": contract.groups[: second + 1]})
+
+    def works(counts: Counts) -> bool:
+        smaller = _counted(before, dict(zip(pair, counts, strict=True)))
+        return smaller is not None and _tried(attempt, smaller) is not None
+
+    def share(k: int) -> Counts:
+        return n - k, max(round(m * (1 - k / n)), 1)
+
+    ways = (
+        _fewest_less(lambda k: (n, m - k), m, works),
+        _fewest_less(lambda k: (n - k, m), n, works),
+        _fewest_less(share, n, works),
+    )
+    counts = max((c for c in ways if c is not None), key=sum, default=None)
+    return counts and _counted(contract, {first: counts[0], second: counts[1]})
+
+
+def _fewest_less(
+    counts: Callable[[int], Counts], most: int, works: Callable[[Counts], bool]
+) -> Counts | None:
+    """The counts with the fewest robots taken out that work, as far as halving finds them."""
+    tried = sorted({k for share in LESS if 0 < (k := round(share * most)) < most})
+    high = next((k for k in tried if works(counts(k))), None)
+    if high is None:
+        return None
+    low = max((k for k in tried if k < high), default=0)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if works(counts(middle)) else (middle, high)
+    return counts(high)
+
+
+def _without(contract: Contract, index: int) -> Contract:
+    groups = (*contract.groups[:index], *contract.groups[index + 1 :])
+    return contract.model_copy(update={"groups": groups})
+
+
+def _shortfall(full: Contract, smaller: Contract, names: list[int]) -> Shortfall:
+    """What is short, given which groups are left, from 0."""
+    asked, placed = full.robots, smaller.robots
+    have = "has a place" if placed == 1 else "have places"
+    left = dict(zip(names, smaller.groups, strict=True))
+    counts = [(left[i].robots if i in left else 0, g.robots) for i, g in enumerate(full.groups)]
+    each = [
+        f"{few} of {all_} in group {i}" for i, (few, all_) in enumerate(counts, 1) if few < all_
+    ]
+    where = f": {', '.join(each)}" if len(counts) > 1 else ""
+    sentence = f"{placed} of the {asked} robots {have}{where}."
+    return Shortfall(asked=asked, placed=placed, sentence=sentence)
+
+
 def _nearer(
-    stated: Contract,
-    full: Contract,
-    attempt: Callable[[Contract], Plan],
-    metres_per_pixel: float | None,
+    stated: Contract, full: Contract, attempt: Attempt, metres_per_pixel: float | None
 ) -> Plan | None:
     """All robots at the greatest clearance that can be held, of the first group it helps.
 
@@ -111,7 +185,7 @@ def _nearer(
 def _greatest(
     full: Contract,
     index: int,
-    attempt: Callable[[Contract], Plan],
+    attempt: Attempt,
     suits: Callable[[Plan], bool] = lambda plan: True,
 ) -> Plan | None:
     """The plan at the greatest clearance of a group that certifies and suits, found by halving."""
@@ -146,10 +220,10 @@ def _scaled(group: Group, share: float) -> Group:
     return group.model_copy(update={"clearance": (round(least * share, 3), far)})
 
 
-def _tried(attempt: Callable[[Contract], Plan], contract: Contract) -> Plan | None:
+def _tried(attempt: Attempt, contract: Contract) -> Plan | None:
     try:
         plan = attempt(contract)
-    except (CapacityError, CageError):
+    except REFUSALS:
         return None
     return plan if plan.verdict.certified else None
 

@@ -60,11 +60,20 @@ def place(contract: Contract, site: Site, sound: Sound = lambda group, points: T
     for group in contract.groups:
         stand = Stand(group, _place_group(group, site, contract.robot_radius))
         clash = conflict(stand, stands)
-        if clash is not None:
-            others = _otherwise(group, stands, site, contract.robot_radius)
-            stand = _elsewhere(others, group, stands, clash, sound)
+        solid = _foreign(contract, group, site)
+        if clash is not None or _stands_on(solid, stand.points, contract.robot_radius):
+            stand = _elsewhere(contract, stand, stands, site, clash, sound)
         stands.append(stand)
     return np.concatenate([stand.points for stand in stands])
+
+
+def _foreign(contract: Contract, group: Group, site: Site) -> list[Polygon]:
+    """What a group's robots may not stand on, other than its own targets."""
+    return [site.outlines[t].filled for t in contract.solid_targets if t not in group.targets]
+
+
+def _stands_on(solid: list[Polygon], points: FloatArray, radius: float) -> bool:
+    return any(bool((distances(thing, points) <= radius).any()) for thing in solid if len(points))
 
 
 def reference_curve(group: Group, site: Site, radius: float, offset: float | None = None) -> Curve:
@@ -150,22 +159,29 @@ def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
 
 
 def _elsewhere(
-    places: Iterator[FloatArray],
-    group: Group,
+    contract: Contract,
+    stand: Stand,
     earlier: list[Stand],
-    clash: tuple[int, float, float],
+    site: Site,
+    clash: tuple[int, float, float] | None,
     sound: Sound,
 ) -> Stand:
-    """The group's robots at other places, clear of those placed before.
+    """The group's robots at other places, off others' targets and clear of robots placed before.
+
+    Where none are found off others' targets it stays as it is, which the checker tells of.
 
     Raises:
-        CrowdedError: none were found.
+        CrowdedError: none were found clear of the others, with whom it clashes.
     """
-    for points in places:
-        stand = Stand(group, points)
-        full = len(points) == group.robots
-        if full and conflict(stand, earlier) is None and sound(group, points):
-            return stand
+    group, radius = stand.group, contract.robot_radius
+    solid = _foreign(contract, group, site)
+    for points in _otherwise(group, earlier, site, radius):
+        other = Stand(group, points)
+        free = len(points) == group.robots and conflict(other, earlier) is None
+        if free and not _stands_on(solid, points, radius) and sound(group, points):
+            return other
+    if clash is None:
+        return stand
     index, apart, least = clash
     raise CrowdedError(index + 1, len(earlier) + 1, apart, least)
 

@@ -9,6 +9,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -80,7 +81,7 @@ def cage(
     between = widest_link(points, centre) if walls is None else None
     gap = None
     if between is not None:
-        gap = float(np.linalg.norm(points[between[0]] - points[between[1]])) - 2 * radius
+        gap = math.dist(*points[list(between)].tolist()) - 2 * radius
     known = (2 * depth, gap, between)
     if not len(points):
         return Cage("not certified", None, *known)
@@ -114,7 +115,8 @@ def widest_link(points: FloatArray, centre: FloatArray) -> tuple[int, int] | Non
     those at its ends. If c lies in a closed simple polygon of such links it cannot leave it.
     Links are sought among the edges of the Delaunay triangulation, which hold such a ring
     wherever discs of that radius leave c no way out (Edelsbrunner 1995). They are added by length
-    until one closes a loop that winds about c; the loop is then checked as a polygon.
+    until one closes a loop that winds about c. Seen from c it goes round one way only, or is
+    checked as a polygon.
 
     Args:
         points: (n, 2).
@@ -131,13 +133,27 @@ def widest_link(points: FloatArray, centre: FloatArray) -> tuple[int, int] | Non
     forest = _Forest(len(points))
     near: list[list[int]] = [[] for _ in points]
     for (i, j), angle in zip(links.tolist(), angles, strict=True):
-        if abs(forest.join(i, j, angle)) > math.pi:
-            loop = shapely.polygons(points[_way(near, i, j)])
-            if shapely.is_valid(loop) and shapely.contains_xy(loop, *centre):
-                return i, j
+        winds = abs(forest.join(i, j, angle)) > math.pi
+        if winds and _holds(points[_way(near, i, j)] - centre):
+            return i, j
         near[i].append(j)
         near[j].append(i)
     return None
+
+
+def _holds(loop: FloatArray) -> bool:
+    """Whether a polygon (n, 2) is simple and the origin lies in it."""
+    places = loop.tolist()
+    turns = [
+        math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+        for (ax, ay), (bx, by) in pairwise([*places, places[0]])
+    ]
+    if min(turns) > MARGIN and max(turns) < math.pi - MARGIN:  # star-shaped, so it is
+        return sum(turns) < 3 * math.pi  # once round, not more often
+    if max(turns) < -MARGIN and min(turns) > MARGIN - math.pi:
+        return sum(turns) > -3 * math.pi
+    polygon = shapely.polygons(loop)
+    return bool(shapely.is_valid(polygon) and shapely.contains_xy(polygon, 0.0, 0.0))
 
 
 class _Forest:

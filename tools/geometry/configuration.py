@@ -6,6 +6,7 @@ follows from a flood: a way out counts only once its moves are checked continuou
 """
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from .configuration_grid import Grid, IndexArray, component, first_grid, halved
 from .escape import way_out
+from .leaks import leaks
 from .outline import FloatArray, largest_part
 from .rigid import Body, Obstacles
 
@@ -26,6 +28,8 @@ DETAIL, MAX_CORNERS = 0.002, 48
 WALL_POINTS = 400
 SEARCHED = (1, 2)
 """Levels on which a way out is looked for: before them it is too coarse, after them too slow."""
+FOLLOWED = 1
+"""Level from which one way is followed to the last one, which leaks for certain if that does."""
 
 
 @dataclass(frozen=True)
@@ -58,22 +62,34 @@ def flood(body: Body, obstacles: Obstacles, levels: int, *, escapes: bool = True
     table = _distance_table(body, obstacles.radius)
     grid = first_grid(body, obstacles)
     alive = np.broadcast_to(grid.domain, (grid.turns, *grid.domain.shape))
+    sure = np.zeros(alive.shape, dtype=bool)
+    last = levels - 1
     for level in range(levels):
-        cells = np.nonzero(alive)
-        gap = _gaps(table, obstacles, grid, cells)
-        free = np.zeros(alive.shape, dtype=bool)
-        free[cells] = gap > -np.inf
-        reached = component(free, grid.seed(body.pivot))
+        room = np.where(sure, _farthest(table, grid), -np.inf)
+        cells = np.nonzero(alive & ~sure)
+        room[cells] = _gaps(table, obstacles, grid, cells)
+        reached = component(room > -np.inf, grid.seed(body.pivot))
         if not reached[:, grid.border].any():
             return Flood(bool(reached.any()))
+        room[~reached] = -np.inf
         if escapes and level in SEARCHED:
-            room = np.full(alive.shape, -np.inf)
-            room[cells] = gap
-            path = way_out(body, obstacles, grid, np.where(reached, room, -np.inf))
+            path = way_out(body, obstacles, grid, room)
             if path is not None:
                 return Flood(False, path)
+        if level == FOLLOWED < last and leaks(
+            partial(_gaps, table, obstacles), grid, room, body.pivot, last - level
+        ):
+            last = max(SEARCHED) if escapes else level
+        if level == last:
+            break
+        sure = halved(room > _farthest(table, grid) + table.slack)
         grid, alive = grid.halved(), halved(reached)
     return Flood(False)
+
+
+def _farthest(table: "_Table", grid: Grid) -> float:
+    """How far at most a robot near the body moves, as the body sees it, within a cell, px."""
+    return grid.side / np.sqrt(2) + grid.angle / 2 * table.reach
 
 
 @dataclass(frozen=True)

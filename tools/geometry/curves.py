@@ -15,12 +15,17 @@ from shapely.geometry.base import BaseGeometry
 
 from .outline import WALKED, FloatArray, Outline, distances, largest_part, nearest_segments
 
-QUAD_SEGMENTS = 24
-ROUND_JOIN_DIP = 1 / math.cos(1.5 * math.pi / (4 * QUAD_SEGMENTS))
-"""A round join is a polyline inside the true arc; offsetting this much further makes up for it.
 
-GEOS rounds the number of chords of an arc, so that one chord may span half as much again.
-"""
+def round_join_dip(quad_segments: int) -> float:
+    """By how much further to offset with round joins, which are polylines inside the true arc.
+
+    GEOS rounds the number of chords of an arc, so that one chord may span half as much again.
+    """
+    return 1 / math.cos(1.5 * math.pi / (4 * quad_segments))
+
+
+QUAD_SEGMENTS = 24
+ROUND_JOIN_DIP = round_join_dip(QUAD_SEGMENTS)
 FACING = math.radians(50)
 """How far a curve's outward normal may turn from a side's direction and still be that side."""
 SIDE_STEP = 400

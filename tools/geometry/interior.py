@@ -12,7 +12,7 @@ import shapely
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from .curves import QUAD_SEGMENTS, ROUND_JOIN_DIP, interpolate
+from .curves import interpolate, round_join_dip
 from .lattice import ALL_PHASES, Lattice, ideal_pitch, lattice_points, most, widest
 from .lloyd import MAX_CELLS, cells_of, grid, relax
 from .outline import FloatArray, Outline, largest_part, rectangle_of
@@ -32,6 +32,9 @@ RELAXED = 0.7
 """The closest pair after relaxing a lattice of thousands, as a share of its pitch; measured."""
 THIN = 0.25
 """Area over boundary length, px, below which a region is treated as a line."""
+FINE_SEGMENTS = 96
+FINE_DIP = round_join_dip(FINE_SEGMENTS)
+"""Margins wider than they need be take ground away: so fine, less than 1 part in 10,000 of them."""
 TURNS = (0.0, math.pi / 12, math.pi / 6)
 
 
@@ -51,14 +54,14 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
     Returns:
         (k, 2), k < n when no more fit.
     """
-    region = _region(outline, margin, depth)
+    region = ground(outline, margin, depth)
     if region.is_empty:
         return np.empty((0, 2))
     if region.area < THIN * region.length:
         return _on_axis(region, n, spacing)
-    reached = region.buffer(spacing / 2).area
+    reached = max(region.buffer(spacing / 2).area, region.area)  # GEOS grows nothing by 1e-200
     if n * spacing**2 * math.sqrt(3) / 2 < SURELY * reached:  # else they cannot all fit
-        even = _even(region, _region(outline, 0, depth), n)
+        even = _even(region, ground(outline, 0, depth), n)
         if min_spacing(even) >= spacing:
             return even.copy()
     turns = (_long_angle(region), *TURNS)
@@ -81,7 +84,7 @@ def yardstick(
     Returns:
         The distance of the closest pair, px, and (k, 2); k = 0 where nothing fits.
     """
-    region = _region(outline, margin, depth)
+    region = ground(outline, margin, depth)
     if n > MANY and region.area >= THIN * region.length:
         lattice = widest(region, n, [Lattice(_long_angle(region))])
         if len(lattice) == n:
@@ -102,13 +105,21 @@ def coverage_radius(outline: Outline, points: FloatArray, cells: FloatArray | No
     return float(nearest(points, sampled, 1)[0].max())
 
 
-def _region(outline: Outline, margin: float, depth: float) -> BaseGeometry:
-    """Where robots may stand: as deep inside as they must and no deeper than they may."""
-    deepest = outline.polygon.buffer(-min(depth, outline.perimeter))
-    kept = outline.polygon.buffer(-margin * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
+def ground(outline: Outline, margin: float, depth: float) -> BaseGeometry:
+    """Where robots may stand: as deep inside as they must and no deeper than they may.
+
+    Args:
+        outline: the region.
+        margin: least distance from its boundary, px; kept at reflex corners and holes too.
+        depth: greatest distance from it, px.
+    """
+    kept = outline.polygon.buffer(-margin * FINE_DIP, quad_segs=FINE_SEGMENTS)
     if kept.is_empty:  # a sliver has no round joins to make up for
-        kept = outline.polygon.buffer(-margin)
-    return kept.difference(deepest)
+        kept = outline.polygon.buffer(-margin, quad_segs=FINE_SEGMENTS)
+    x0, y0, x1, y1 = outline.bounds
+    if 2 * depth >= min(x1 - x0, y1 - y0):  # nothing is deeper, which GEOS takes long to find
+        return kept
+    return kept.difference(outline.polygon.buffer(-depth))
 
 
 @lru_cache(maxsize=4)  # whoever places robots has them checked next

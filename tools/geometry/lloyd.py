@@ -1,7 +1,8 @@
 """Lloyd's iteration to a centroidal Voronoi tessellation, on a square grid of cells.
 
 A step asks again only for the cells whose nearest robot may have changed: each cell carries an
-upper bound of the distance to its own robot and a lower bound of that to any other (Hamerly 2010).
+upper bound of the distance to its own robot and a lower bound of that to any other (Hamerly 2010);
+within half the way from its robot to the next one no other is nearer.
 Frame: image pixels, x right, y down.
 """
 
@@ -97,7 +98,11 @@ class _Owners:
         self._other -= furthest
         own = self._cells - points[self.index]
         distance = np.sqrt(own[:, 0] * own[:, 0] + own[:, 1] * own[:, 1])
-        self._ask(np.flatnonzero(distance >= self._other * (1 - ROUNDING)), points)
+        known = self._other
+        if len(points) > 1:  # nor is any point nearer than the one within half the way to the next
+            halves = nearest(points, points, 2)[0][:, 1] / 2
+            known = np.maximum(known, halves[self.index])
+        self._ask(np.flatnonzero(distance >= known * (1 - ROUNDING)), points)
 
     def _ask(self, which: NDArray[np.intp], points: FloatArray) -> None:
         if not len(which) or len(points) < 2:

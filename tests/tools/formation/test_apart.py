@@ -10,7 +10,7 @@ from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.place import Site
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.curves import Frame, ring
-from formup.tools.geometry.outline import make_outline
+from formup.tools.geometry.outline import distances, make_outline
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -61,6 +61,35 @@ def test_where_there_is_no_room_for_both_it_is_said_which() -> None:
     with pytest.raises(CrowdedError, match=r"group 1 and of group 2.*20.0 px or more") as caught:
         planned(10, ring_of, ring_of)
     assert "another clearance" in str(caught.value)
+
+
+THROUGH_A_POST: list[dict[str, object]] = [
+    {"relation": "around", "robots": 12, "fit": "wide"},
+    {"relation": "around", "robots": 12, "clearance": (30, 60)},
+    {"relation": "cage", "robots": 9, "fit": "wide"},
+]
+
+
+@pytest.mark.parametrize("ring_of", THROUGH_A_POST, ids=str)
+@pytest.mark.parametrize("radius", [0.0, 4.0])
+def test_a_ring_leaves_out_the_thing_another_group_stands_around(
+    ring_of: dict[str, object], radius: float
+) -> None:
+    alone = planned(radius, ring_of).formation.points
+    assert (distances(POST.filled, alone) <= radius).any()
+    post: dict[str, object] = {"relation": "around", "robots": 4, "targets": ("t2",)}
+    plan = planned(radius, ring_of, post | {"fit": "tight"})
+    assert plan.verdict.certified, plan.verdict.findings
+    assert (distances(POST.filled, plan.formation.points) > radius).all()
+
+
+def test_a_line_that_cannot_leave_it_out_is_told_of() -> None:
+    line: dict[str, object] = {"relation": "along", "side": "right", "clearance": (45, 60)}
+    post: dict[str, object] = {"relation": "around", "robots": 4, "targets": ("t2",)}
+    plan = planned(4, line | {"robots": 5}, post)
+    said = [f.sentence for f in plan.verdict.findings if f.code == "keep_out"]
+    assert said
+    assert all("t2" in sentence for sentence in said)
 
 
 @st.composite

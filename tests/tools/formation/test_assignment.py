@@ -101,6 +101,19 @@ def test_moving_all_places_together_changes_nobodys_place(
     assert np.array_equal(assign(starts, goals).robots, assign(starts, moved).robots)
 
 
+@given(st.integers(1, 40), seeds, st.floats(0, 6.3), st.floats(0.01, 100), st.booleans())
+@MANY
+def test_turned_enlarged_and_mirrored_together_everybody_takes_the_same_place(
+    n: int, seed: int, turn: float, size: float, mirror: bool
+) -> None:
+    c, s = np.cos(turn), np.sin(turn)
+    change = size * np.array([[c, s], [-s, c]]) @ np.diag([-1.0 if mirror else 1.0, 1.0])
+    starts, goals = team("scattered", n, seed)
+    one, other = assign(starts, goals), assign(starts @ change, goals @ change)
+    assert np.array_equal(one.robots, other.robots)
+    assert other.cost == pytest.approx(size**2 * one.cost, rel=1e-6)
+
+
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_the_same_again_is_the_same(shape: str, objective: assignment.Objective) -> None:

@@ -141,6 +141,29 @@ def test_turning_or_mirroring_the_whole_scene_changes_no_verdict(
     assert sorted(f.code for f in first.findings) == sorted(f.code for f in second.findings)
 
 
+@pytest.mark.parametrize("relation", RELATIONS)
+@pytest.mark.parametrize(("size", "shift"), [(1, (64, 12)), (2, (0, 0)), (3.5, (-20.25, 40.5))])
+def test_moving_or_enlarging_the_whole_scene_changes_no_verdict(
+    relation: str, size: float, shift: tuple[float, float]
+) -> None:
+    def moved(points: FloatArray) -> FloatArray:
+        return points * size + shift
+
+    here = Site({"t1": make_outline(RING + MIDDLE)}, WIDTH, HEIGHT)
+    # The picture's border has nothing to do with it where it is far away.
+    there = Site({"t1": make_outline(moved(RING + MIDDLE))}, WIDTH * 5, HEIGHT * 5)
+    plan = make_plan(Contract(groups=(grouped(relation, 6),), robot_radius=3), here, "s")
+    contract = Contract(groups=(grouped(relation, 6),), robot_radius=3 * size)
+    other = make_plan(contract, there, "s", moved(plan.formation.points))
+    assert plan.verdict.certified
+    assert other.verdict.certified, other.verdict.findings
+    wrong = plan.formation.points + np.where(np.arange(6)[:, None] == 1, (70, -45), 0)
+    first = certify(wrong, plan.formation.contract, here)
+    second = certify(moved(wrong), other.formation.contract, there)
+    assert first.certified == second.certified
+    assert sorted(f.code for f in first.findings) == sorted(f.code for f in second.findings)
+
+
 def test_a_target_that_parts_the_picture_is_not_surrounded_from_one_side() -> None:
     site = Site({"t1": square(180, -20, 220, 320)}, 400, 300)
     left = [(150.0, float(y)) for y in np.linspace(10, 290, 6)]

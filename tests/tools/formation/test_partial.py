@@ -8,6 +8,7 @@ import pytest
 from formup.tools.doors import TOOLS
 from formup.tools.errors import ToolError
 from formup.tools.fleet.deploy import Arrival
+from formup.tools.formation.apart import CrowdedError
 from formup.tools.formation.caging import CageError
 from formup.tools.formation.check import certify
 from formup.tools.formation.contract import Contract, Group
@@ -34,7 +35,7 @@ def partial(*groups: dict[str, object], radius: float = RADIUS) -> Plan:
     try:
         make_plan(wanted, SITE, "s")
         refusal = None
-    except (CapacityError, CageError) as error:
+    except (CapacityError, CageError, CrowdedError) as error:
         refusal = error
     plan = best_partial(wanted, SITE, "s", refusal)
     assert plan is not None and plan.partial is not None
@@ -73,6 +74,31 @@ def test_each_group_gets_what_fits() -> None:
     held = plan.formation.contract.groups
     assert (held[0].robots, plan.partial and plan.partial.asked) == (4, 305)
     assert 40 < held[1].robots < 300
+
+
+RING: dict[str, object] = {"relation": "around", "clearance": (20, 20)}
+CORNERS: dict[str, object] = {"relation": "corners", "robots": 4}
+IN_EACH_OTHERS_WAY: list[tuple[dict[str, object], dict[str, object], int]] = [
+    (RING | {"robots": 26}, RING | {"robots": 26}, 36),
+    (RING | {"robots": 26}, RING | {"robots": 10}, 28),
+    (RING | {"robots": 26}, RING | {"relation": "cage", "robots": 12}, 14),
+    (CORNERS, CORNERS, 4),
+    ({"relation": "inside", "robots": 30}, {"relation": "inside", "robots": 30}, 31),
+    ({"relation": "centre", "robots": 4}, {"relation": "centre", "robots": 4}, 4),
+]
+
+
+@pytest.mark.parametrize(("first", "second", "least"), IN_EACH_OTHERS_WAY, ids=str)
+def test_groups_that_crowd_each_other_give_way(
+    first: dict[str, object], second: dict[str, object], least: int
+) -> None:
+    with pytest.raises(CrowdedError):
+        make_plan(contract(first, second, radius=10), SITE, "s")
+    plan = partial(first, second, radius=10)
+    assert plan.partial is not None
+    assert least <= plan.partial.placed < plan.partial.asked
+    assert f"{plan.partial.placed} of the {plan.partial.asked} robots" in plan.partial.sentence
+    assert "in group" in plan.partial.sentence
 
 
 @pytest.mark.parametrize(
@@ -115,6 +141,17 @@ def test_the_id_covers_the_shortfall_and_whole_plans_keep_theirs() -> None:
     assert plan.partial is not None
     other = plan.partial.model_copy(update={"asked": 7})
     assert plan.model_copy(update={"partial": other}).id != plan.id
+
+
+def test_what_one_group_leaves_no_place_for_is_said_by_name() -> None:
+    work = workspace()
+    group = {"relation": "centre", "targets": ["t1"], "robots": 4}
+    said = r"group 1 and of group 2.*certified as partial: .*0 of 4 in group 2"
+    with pytest.raises(ToolError, match=said):
+        wanted = {"groups": [group, group], "robot_radius": 10}
+        call(work, "propose_formation", contract=wanted)
+    (plan,) = work.plans.values()
+    assert plan.partial is not None and plan.partial.asked == 8
 
 
 def workspace() -> Workspace:

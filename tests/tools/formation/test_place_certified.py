@@ -215,13 +215,16 @@ def test_between_two_targets_a_line_of_any_number_stands_on_the_way(n: int) -> N
     assert ((plan.formation.points[:, 0] > 390) & (plan.formation.points[:, 0] < 500)).all()
 
 
+@pytest.mark.parametrize("radius", [0.0, 2.0, 20.0])
 @pytest.mark.parametrize("clearance", [(20.0, 20.0), (5.0, 5.0), (60.0, 60.1)])
-def test_a_distance_asked_for_exactly_can_be_met(clearance: tuple[float, float]) -> None:
+def test_a_distance_asked_for_exactly_can_be_met(
+    clearance: tuple[float, float], radius: float
+) -> None:
     for relation in ({"relation": "around"}, {"relation": "along", "side": "left"}):
         group = Group.model_validate(
             relation | {"targets": ("t1",), "robots": 6, "clearance": clearance}
         )
-        check(group, 2.0, BRICK)
+        check(group, radius, BRICK)
 
 
 @pytest.mark.parametrize("radius", [100, 200, 300, 1000])
