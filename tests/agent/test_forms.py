@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.models.forms import faced_in, form_in
+from formup.agent.models.understand import understand
 from formup.agent.report import Report
 from formup.tools.perception.image import Picture, load_picture, picture_from_array
 from formup.tools.perception.prompts import TargetPrompt
@@ -75,6 +76,14 @@ def drawn(*boxes: tuple[int, int, int, int]) -> Picture:
     return picture_from_array(pixels)
 
 
+@pytest.mark.parametrize(
+    "words",
+    ["surround the clock face", "surround the grid", "surround the one pointing another way"],
+)
+def test_such_words_about_the_thing_are_no_form(words: str) -> None:
+    assert not understand(words).beyond
+
+
 def run(instruction: str, picture: Picture | None = None, **more: Any) -> Report:
     shown = load_picture(PHOTOS / "us_coins.jpg") if picture is None else picture
     return Agent().run(shown, instruction, **more).report
@@ -134,6 +143,7 @@ def test_the_side_of_one_thing_that_faces_another() -> None:
         ("surround it with 6 robots, facing outwards", "which way robots look"),
         ("spell hello above it with 20 robots", "do not carry out"),
         ("form a heart around it with 20 robots", "do not carry out"),
+        ("20 robots in a 3.5 by 4 grid inside it", "do not carry out"),
     ],
 )
 def test_what_is_not_understood_is_asked_about(words: str, said: str) -> None:
