@@ -69,9 +69,10 @@ def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
             plan = attempt(smaller)
         except CrowdedError as error:
             fewer = _parted(smaller, (error.first, error.second), attempt)
-            if fewer is None:
+            alone = _without(smaller, error.second)
+            if fewer is None or fewer.robots < alone.robots:
                 names.pop(error.second)
-                fewer = _without(smaller, error.second)
+                fewer = alone
         except (CapacityError, CageError) as error:
             fewer = _counted(smaller, {smaller.groups.index(error.group): error.fits})
         else:
