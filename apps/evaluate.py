@@ -169,16 +169,16 @@ def _show(rows: list[Row], mode: str, facts: dict[str, Any], out: Path | None) -
 def _print_costs(rows: list[Row]) -> None:
     """What each task took, and the medians."""
     table = Table(title="what each took", header_style="cyan", box=None)
-    for name in ("task", "requests", "tokens in", "cached", "out", "outcome", "strict"):
+    for name in ("task", "requests", "tokens in", "cached", "out", "outcome", "ok"):
         number = name in ("requests", "tokens in", "cached", "out")
-        table.add_column(name, justify="right" if number else "left", no_wrap=name == "task")
+        table.add_column(name, justify="right" if number else "left", no_wrap=True)
     spent = [(r.requests, r.input_tokens, r.cached_tokens, r.output_tokens) for r in rows]
     for row, counts in zip(rows, spent, strict=True):
         numbers = [f"{n:,}" for n in counts]
         table.add_row(row.task, *numbers, row.status, "yes" if row.strict else "no")
     if rows:
         middles = [f"{median(counts):,.0f}" for counts in zip(*spent, strict=True)]
-        strict = f"{sum(r.strict for r in rows)} of {len(rows)}"
+        strict = f"{sum(r.strict for r in rows)}/{len(rows)}"
         table.add_row("median", *middles, "", strict)
     Console(highlight=False).print(table)
 

@@ -160,7 +160,7 @@ def test_where_a_distance_is_named_the_outline_is_seen_first() -> None:
     assert len(made.images) == 1
     held = answer(work, "deploy", tell="They stand.")
     assert held.told is None
-    assert "t1 is to be kept a named distance from" in held.data["why"]
+    assert "t1 has an edge that a named distance is measured from" in held.data["why"]
     assert f"within about 3 px, deploy plan_id {made.data['plan_id']}" in held.data["why"]
     assert held.data["why"] == f"Look first: {made.data['look_first']}"
     assert work.arrivals == {}

@@ -210,8 +210,8 @@ def _to_see(workspace: Workspace, plan: Plan) -> str:
             return workspace.scene.told(
                 f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
                 f"about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with tell). "
-                f"Where it does not and yours does, propose again with {target.id} and `points` "
-                "on the thing there, or `negative` ones off it; else with a closer outline."
+                f"Where it does not and yours (dashed) does, propose again with {target.id} and "
+                "`points` on the thing there or `negative` ones off it; else with a closer outline."
             )
     return ""
 
@@ -219,7 +219,7 @@ def _to_see(workspace: Workspace, plan: Plan) -> str:
 def _doubt(target: Target) -> str:
     """Why a target has to be looked at."""
     if not doubtful(target):
-        return "is to be kept a named distance from"
+        return "has an edge that a named distance is measured from"
     if not target.missed:
         return f"was measured with confidence {target.confidence:.2f}"
     away = distances(target.outline.filled, np.asarray(target.missed))

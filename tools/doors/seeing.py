@@ -234,7 +234,9 @@ def _closer(scene: Scene, target: Target, plan: Plan | None = None) -> bytes:
     x0, y0, x1, y1 = target.box
     out = AROUND * max(x1 - x0, y1 - y0) + 2
     shown = replace(scene, targets=(target,)) if plan is None else scene
-    return draw_view(shown, plan=plan, region=(x0 - out, y0 - out, x1 + out, y1 + out))
+    region = (x0 - out, y0 - out, x1 + out, y1 + out)
+    drawn = () if target.source is None else target.source.outline or ()
+    return draw_view(shown, plan=plan, region=region, drawn=drawn)
 
 
 def parse_prompt(values: dict[str, Any]) -> TargetPrompt:

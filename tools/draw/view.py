@@ -14,8 +14,9 @@ import numpy as np
 from ..formation.plan import Plan
 from ..perception.attributes import Candidate
 from ..perception.image import Picture
+from ..perception.prompts import Point
 from ..scene import Box, Scene
-from .canvas import Canvas, Labels
+from .canvas import WHITE, Canvas, Labels
 from .overlay import draw_scene
 from .rulers import RULER, draw_rulers
 
@@ -40,6 +41,7 @@ def draw_view(
     plan: Plan | None = None,
     candidates: Sequence[Candidate] = (),
     region: Box | None = None,
+    drawn: Sequence[Point] = (),
 ) -> bytes:
     """The photograph with rulers along its right and lower edge, as a JPEG file.
 
@@ -48,6 +50,7 @@ def draw_view(
         plan: its robots are drawn.
         candidates: outlined and numbered, 3 for c3.
         region: x0, y0, x1, y1, a part to look at closer, image pixels; the rulers go with it.
+        drawn: vertices (x, y) of an outline somebody drew, which is dashed; none for none.
 
     Raises:
         ToolError: the plan names a target that the scene does not have.
@@ -58,6 +61,8 @@ def draw_view(
         picture, origin = _part(picture, region)
         long = CLOSER
     canvas = Canvas(picture, long, 1.0, (0, 0, RULER[2], RULER[3]), origin)
+    if drawn:
+        canvas.dashes([np.asarray([*drawn, drawn[0]], dtype=float)], WHITE, 1.0)
     draw_scene(canvas, scene, plan, candidates, Labels(canvas.photo))
     draw_rulers(canvas)
     file = BytesIO()
