@@ -234,8 +234,8 @@ class Workspace:
         plan = self.plans[plan_id]
         if plan.formation.scene_version != self.scene.version:
             raise ToolError(
-                f"Plan {plan_id} is void: what it is about was measured again since. Deploy one "
-                "proposed since, or propose this one again, with the outline it had."
+                f"Plan {plan_id} is void: what it is about was measured again since, or the scale "
+                "is another. Deploy one proposed since, or propose this again as it was."
             )
         return plan
 

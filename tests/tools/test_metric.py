@@ -151,7 +151,7 @@ def test_the_scale_is_part_of_what_is_certified_and_is_kept(tmp_path: Path) -> N
     assert back.scene.metres_per_pixel == SCALE
     assert answer(back, "deploy", plan_id=plan)["arrived"]
     other = restore(read_stored(path), None, Settings(metres_per_pixel=0.1))
-    with pytest.raises(ToolError, match="scene has changed"):
+    with pytest.raises(ToolError, match="or the scale is another"):
         answer(other, "deploy", plan_id=plan)
     assert replace(work.scene, metres_per_pixel=None).version != work.scene.version
     with pytest.raises(InputError, match="-2 metres per pixel"):
