@@ -7,7 +7,7 @@ import hashlib
 import json
 import secrets
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from pydantic import (
@@ -34,11 +34,18 @@ MAX_BYTES = 64 << 20
 
 class _Value(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
+    later: ClassVar[frozenset[str]] = frozenset()
+    """Fields that came later: left out where they say nothing, so that older digests hold."""
+
+    @model_serializer(mode="wrap")
+    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {k: v for k, v in standard(self).items() if k not in self.later or v}
 
 
 class StoredTarget(_Value):
     """A target with its outline as rings of points."""
 
+    later = frozenset({"source"})
     id: str
     label: str
     box: Box
@@ -50,31 +57,22 @@ class StoredTarget(_Value):
     holes: tuple[tuple[Point, ...], ...]
     source: TargetPrompt | None = None
 
-    @model_serializer(mode="wrap")
-    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without a source that there is not, as when none was kept: the digest stays the same."""
-        return {k: v for k, v in standard(self).items() if k != "source" or v is not None}
-
 
 class StoredImage(_Value):
     """Where the picture lies and what it must be, and its scale if that is known."""
 
+    later = frozenset({"metres_per_pixel"})
     path: str | None
     sha256: str
     width: int
     height: int
     metres_per_pixel: float | None = None
 
-    @model_serializer(mode="wrap")
-    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without a scale that is not known, as when there was none: the digest stays the same."""
-        written = standard(self)
-        return {k: v for k, v in written.items() if k != "metres_per_pixel" or v is not None}
-
 
 class Stored(_Value):
     """All of a workspace but its settings; `plan_id` names the plan a plan.json is for."""
 
+    later = frozenset({"unseen"})
     format: str = FORMAT
     digest: str = ""
     plan_id: str | None = None
@@ -84,6 +82,7 @@ class Stored(_Value):
     pointed: tuple[TargetPrompt, ...] = ()
     samples: dict[str, tuple[Point, ...]] = {}
     plans: dict[str, Plan] = {}
+    unseen: dict[str, tuple[str, ...]] = {}
 
     def sealed(self) -> "Stored":
         """The same with the digest of its content, by which an alteration shows."""
@@ -114,6 +113,7 @@ def store(
         if plan_id is None
         else {},
         plans=plans,
+        unseen={name: who for name, who in workspace.unseen.items() if name in plans},
     ).sealed()
 
 
@@ -200,6 +200,7 @@ def restore(stored: Stored, picture: Picture | None, settings: Settings) -> Work
         settings=settings,
         pointed=stored.pointed,
         plans=dict(stored.plans),
+        unseen=dict(stored.unseen),
         samples={name: np.asarray(p, dtype=float) for name, p in stored.samples.items()},
     )
 

@@ -164,6 +164,8 @@ def test_where_a_distance_is_named_the_outline_is_seen_first() -> None:
     assert f"within about 3 px, deploy plan_id {made.data['plan_id']}" in held.data["why"]
     assert held.data["why"] == f"Look first: {made.data['look_first']}"
     assert work.arrivals == {}
+    again = restore(store(work), work.scene.picture, work.settings)
+    assert answer(again, "deploy", tell="They stand.").data == held.data
     assert answer(work, "deploy", plan_id=made.data["plan_id"], tell="They stand.").told
 
 
