@@ -25,7 +25,7 @@ PLACES = {
     "inside": "inside",
     "between": "between",
     "centre": "at the centre of",
-    "shape": "as placed",
+    "shape": "in a form by",
 }
 GOING_ON = {
     "question": " --answer TEXT",

@@ -174,11 +174,12 @@ def violations(error: ValidationError) -> str:
         given = repr(item["input"])
         shown = given if len(given) <= 60 else given[:57] + "..."
         text = item["msg"].removeprefix("Value error, ")
-        lines.append(
-            f"{where}: {text} (got {shown})"
-            if item["type"] != "missing"
-            else f"{where}: is missing"
-        )
+        if item["type"] == "missing":
+            lines.append(f"{where}: is missing")
+        elif isinstance(item["input"], dict):  # the text names what of it is wrong
+            lines.append(f"{where}: {text}")
+        else:
+            lines.append(f"{where}: {text} (got {shown})")
     return "; ".join(dict.fromkeys(lines)) + "."
 
 

@@ -25,6 +25,8 @@ FARTHEST = 100_000
 """Inside, a length that is named is the least distance from the edge, px."""
 DISTANCELESS = {"between": "between", "centre": "at the centre of"}
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
+PLACE = re.compile(r"^propose_formation: contract\.groups\.0: ")
+"""Where in the arguments something is wrong, which says nothing to a person."""
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 
 
@@ -248,7 +250,7 @@ def _after_proposal(task: Task, result: Result, history: History) -> Reply:
             return _begin(task, history)
         if "Insufficient segmentation accuracy" in result.text:
             return _call(history, "ask_user", {"question": result.text})
-        return _impossible(history, result.text)
+        return _impossible(history, PLACE.sub("", result.text))
     plan = json.loads(result.text)
     if not plan["certified"]:
         said = [*plan["findings"], plan.get("partial", "")]

@@ -11,6 +11,13 @@ from dataclasses import dataclass
 from .describe import STRANGERS, Description, Reference
 from .phrases import HEADS, STOPS, Words, phrase, several, table
 
+CAGED = re.compile(
+    r"\bin(?:side|to)? an?(?: (?:escape[- ]proof|closed|tight))* cage\b"
+    r"(?: (?:made )?of \w+ robots)?",
+    re.IGNORECASE,
+)
+"""Says what robots are to make, not where a thing is."""
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -22,7 +29,8 @@ class Reading:
 
 def references(instruction: str) -> Reading:
     """Read the noun phrases of an instruction in English."""
-    words = _words(instruction)
+    made = CAGED.findall(instruction)
+    words = _words(CAGED.sub(" ", instruction))
     found: list[Reference] = []
     rest: list[str] = []
     at = 0
@@ -36,7 +44,7 @@ def references(instruction: str) -> Reading:
             owner = read[1] > at and words[read[1] - 1].endswith("'s")
             rest.append("its" if owner else "it")
             at = read[1]
-    return Reading(_without_echoes(found), " ".join(rest))
+    return Reading(_without_echoes(found), " ".join([*rest, *made]))
 
 
 def _words(text: str) -> list[str]:

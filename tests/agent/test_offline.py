@@ -9,6 +9,7 @@ import pytest
 from formup.agent.agent import Agent
 from formup.agent.messages import Reply
 from formup.agent.models import model_named
+from formup.agent.models.refer import references
 from formup.agent.models.understand import understand
 from formup.agent.outcomes import Answered, Paused
 from formup.agent.report import Report
@@ -280,10 +281,25 @@ def test_an_escape_proof_cage_is_one_that_is_certified() -> None:
         assert report.contract.groups[0].closure == closure
 
 
+@pytest.mark.parametrize(
+    ("words", "closure"),
+    [
+        ("Put the largest coin in an escape-proof cage with 4 robots", True),
+        ("Put the largest coin into a cage of 10 robots", False),
+    ],
+)
+def test_in_a_cage_says_what_to_make_and_not_which_thing(words: str, closure: bool) -> None:
+    spoken = references(words)
+    assert [thing.said for thing in spoken.things] == ["the largest coin"]
+    reading = understand(spoken.rest)
+    assert (reading.relations, reading.escape_proof) == (("cage",), closure)
+    assert reading.robots in (4, 10)
+
+
 def test_a_cage_of_two_is_impossible_and_it_says_why() -> None:
     report = run("Cage it", pointed=[COIN], settings=Settings(robots=2))
     assert report.status == "impossible"
-    assert "3 or more" in report.message
+    assert report.message == "a cage takes 3 or more robots, got 2."
 
 
 def test_an_answer_resumes_where_it_asked() -> None:

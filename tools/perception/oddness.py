@@ -126,7 +126,8 @@ def _judged(things: Things, members: IntArray, ranking: list[Odd], by: Oddness) 
 def _reason(things: Things, members: IntArray, odd: Odd) -> str:
     others = f"the {odd.group} things like it"
     if odd.aspect == "orientation":
-        return f"turned {odd.distance:.0f} degrees from {others}, they by up to {odd.spread:.0f}"
+        apart = f"those by {odd.spread:.0f} degrees at most"
+        return f"turned {odd.distance:.0f} degrees from {others}, {apart}"
     if odd.aspect == "colour":
         return (
             f"its colour is {odd.distance:.0f} CIE76 units from {others}, "
