@@ -19,6 +19,8 @@ CROWDED, FAINT = 20, 0.6
 """More things than this, or fainter ones, are rather patches than what people speak of."""
 MOST_ASKED = 24
 """Candidates that one question offers: more cannot be told apart on a picture."""
+MOST_QUOTED = 40
+"""Characters of an answer that a question repeats."""
 POINT = "point at it with --point X,Y, --box X0,Y0,X1,Y1 or --outline X1,Y1,X2,Y2,..."
 
 
@@ -40,7 +42,20 @@ class Step:
 
 
 def find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
-    """The candidates meant, as many as are needed, or what to do to learn them."""
+    """The candidates meant, as many as are needed, or what to do to learn them.
+
+    A question that is asked again says that the answer chose nothing.
+    """
+    found = _find(things, needed, history)
+    asked = [c for c in _calls(history) if c.name == "ask_user" and c.arguments.get("candidates")]
+    if isinstance(found, list) or found.name != "ask_user" or not asked:
+        return found
+    answer = next((m.text for m in history if _answers(m, asked[-1])), "")
+    question = f'"{answer[:MOST_QUOTED]}" chooses none of them. {found.arguments["question"]}'
+    return Step(found.name, found.arguments | {"question": question})
+
+
+def _find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
     chosen = [Found(name, "the chosen thing", ()) for name in chosen_candidates(history, needed)]
     if len(chosen) >= needed:
         return chosen[:needed]
