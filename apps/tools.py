@@ -61,7 +61,8 @@ def call_tool(
     try:
         result = asyncio.run(tool.call(workspace, arguments))
     except ToolError as error:
-        _save(workspace, state)  # such as a partial plan that the error names
+        if metres_per_pixel is None:  # another scale is not kept by what was refused
+            _save(workspace, state)  # such as a partial plan that the error names
         raise InputError(str(error)) from None
     data = dict(result.data)
     folder = state.parent if state else Path()

@@ -222,8 +222,12 @@ def merge(shards: Sequence[Path], into: Path) -> int:
     folder can be gone on with.
 
     Raises:
-        InputError: other suites or versions, results that contradict, or `into` has rows.
+        InputError: other suites or versions, results that contradict, `into` has rows, or a folder
+            is named twice.
     """
+    named = [folder.resolve() for folder in (*shards, into)]
+    if len(set(named)) < len(named):
+        raise InputError("A folder is named twice; merge different shards into a new folder.")
     with ExitStack() as stack:
         for folder in shards:
             read_manifest(folder)  # before a lock makes a folder that is not there

@@ -23,8 +23,8 @@ from .geometry.outline import FloatArray, Outline, distances
 from .perception.attributes import Candidate
 from .perception.candidates import find_candidates, segment_candidate
 from .perception.contours import outline_of_mask
-from .perception.drawn import straightened
-from .perception.prompts import Point, TargetPrompt
+from .perception.drawn import straightened, within
+from .perception.prompts import MAX_POINTS, Point, TargetPrompt
 from .perception.segmenters import segmenter_named, visible_vertices
 from .scene import Scene, Target
 
@@ -164,7 +164,14 @@ class Workspace:
         """The prompt, with the outline that its points correct if it has no way of its own."""
         known = next((t.source for t in self.scene.targets if t.id == prompt.id), None)
         if prompt.how == "point" and known is not None:
-            return known.mended_by(prompt)
+            mended = known.mended_by(prompt)
+            most = max(len(mended.points or ()), len(mended.negative))
+            if most > MAX_POINTS:
+                raise ToolError(
+                    f"{prompt.id} would have {most} points that correct its outline, "
+                    f"{MAX_POINTS} at most: draw a closer outline."
+                )
+            return mended
         if prompt.how == "point" and prompt.points is None:
             raise ToolError(
                 f"Negative points alone correct an outline that was drawn; {prompt.id} has none. "
@@ -205,7 +212,7 @@ class Workspace:
             outline = outline_of_mask(found.mask)
             if prompt.straight and prompt.outline is not None:
                 seen = visible_vertices(prompt.outline, *self.scene.picture.size)
-                outline = straightened(outline, seen)
+                outline = within(straightened(outline, seen), *self.scene.picture.size)
             return outline, found.confidence, found.parts
         candidate = self.candidate(prompt.candidate)
         return segment_candidate(lambda p: segmenter.run(pixels, p), candidate)

@@ -81,7 +81,8 @@ Found = tuple[Form, re.Match[str]] | None
 
 def _letters(text: str) -> Found:
     """Letters that are quoted, in capitals or alone, so that no other words are drawn."""
-    written = r"(?P<q>[\"'])(?P<quoted>[A-Za-z0-9 ]+)(?P=q)|(?P<plain>[A-Z0-9]+(?: [A-Z0-9]{2,})*)"
+    more = r"(?: [A-Z0-9]{2,}(?! ?(?:px|pixels?|c?m)\b))*"
+    written = rf"(?P<q>[\"'])(?P<quoted>[A-Za-z0-9 ]+)(?P=q)|(?P<plain>[A-Z0-9]+{more})"
     lead = (
         r"(?i:\b(?:spell|write)(?: out)?(?: the)?(?: words?| letters?| numbers?| digits?)?\s+|"
         rf"{MAKE}(?:the|an?) (?:word|letters?|number|digit)\s+|"

@@ -25,7 +25,7 @@ FARTHEST = 100_000
 """Inside, a length that is named is the least distance from the edge, px."""
 DISTANCELESS = {"between": "between", "centre": "at the centre of"}
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
-PLACE = re.compile(r"^propose_formation: contract\.groups\.0: ")
+PLACE = re.compile(r"^propose_formation: contract\.groups\.0[\w.]*: ")
 """Where in the arguments something is wrong, which says nothing to a person."""
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 

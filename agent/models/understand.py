@@ -245,7 +245,8 @@ def _beyond(words: Words, relations: list[str], side: str | None) -> tuple[str, 
 
 
 def _foreign_units(text: str) -> list[str]:
-    """Lengths in units that are not read, such as 3 feet."""
+    """Lengths that are not read: in other units, such as 3 feet, or amounts such as fifty px."""
     units = "|".join(_vocabulary()["units"])
-    amount = rf"(?:[0-9][0-9.,]*|{number_words()}|\bhalf\s+an?|\ban?)"
-    return re.findall(rf"{amount}\s*(?:{units})s?\b", text.lower())
+    amount = rf"(?:[0-9][0-9.,/]*(?:e[0-9]+)?|\u00bd|{number_words()}|\bhalf\s+an?|\ban?)"
+    spoken = rf"{amount}[\s-]*(?:{units})s?\b|\b[a-z-]+[\s-]+(?:pixels?|px|met(?:re|er)s?|km)\b"
+    return re.findall(spoken, text.lower())

@@ -9,6 +9,7 @@ import pytest
 from formup.agent.agent import Agent
 from formup.agent.messages import Reply
 from formup.agent.models import model_named
+from formup.agent.models.forms import form_in
 from formup.agent.models.refer import references
 from formup.agent.models.understand import understand
 from formup.agent.outcomes import Answered, Paused
@@ -294,6 +295,36 @@ def test_in_a_cage_says_what_to_make_and_not_which_thing(words: str, closure: bo
     reading = understand(spoken.rest)
     assert (reading.relations, reading.escape_proof) == (("cage",), closure)
     assert reading.robots in (4, 10)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "twenty-five px away",
+        "fifteen pixels away",
+        "a dozen px away",
+        "1e2 px away",
+        "two and a half metres away",
+        "\u00bd m away",
+        "2 km away",
+        "1/2 m away",
+        "1 m 50 away",
+        "-5 px away",
+        "minus 5 px away",
+        "not 20 px away",
+    ],
+)
+@pytest.mark.parametrize("scale", [None, 0.05])
+def test_lengths_that_are_not_read_are_never_left_out(words: str, scale: float | None) -> None:
+    reading = understand(f"surround it with 6 robots, {words}", scale)
+    assert reading.beyond, reading
+
+
+def test_a_length_is_no_letters() -> None:
+    form, rest = form_in("spell HELP 30 px above it with 25 robots")
+    assert form is not None
+    assert form.shape["text"] == "HELP"
+    assert "30 px" in rest
 
 
 def test_a_cage_of_two_is_impossible_and_it_says_why() -> None:

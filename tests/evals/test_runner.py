@@ -257,6 +257,9 @@ def test_shards_put_together_are_the_whole(tmp_path: Path) -> None:
     assert run_trials(sweep(), Coin(), tmp_path / "merged").scored == 24
     with pytest.raises(InputError, match="has trials already"):
         merge(folders, tmp_path / "merged")
+    for named, into in (([*folders, folders[0]], "new"), (folders, folders[0].name)):
+        with pytest.raises(InputError, match="named twice"):
+            merge(named, tmp_path / into)
 
 
 def test_merging_checks_what_it_is_given(tmp_path: Path) -> None:

@@ -169,7 +169,7 @@ def test_where_a_distance_is_named_the_outline_is_seen_first() -> None:
     assert answer(work, "deploy", plan_id=made.data["plan_id"], tell="They stand.").told
 
 
-def test_a_plan_that_was_shown_and_is_proposed_again_may_be_deployed_at_once() -> None:
+def test_a_plan_that_is_proposed_again_is_valid_again_and_deployed_by_its_id() -> None:
     work = workspace()
     groups = [{"relation": "around", "targets": ["t1"], "robots": 6, "clearance": [9, 9]}]
     first = answer(work, "propose_formation", contract={"groups": groups}, targets=[TARGET])
@@ -179,8 +179,23 @@ def test_a_plan_that_was_shown_and_is_proposed_again_may_be_deployed_at_once() -
         answer(work, "deploy", plan_id=first.data["plan_id"])
     again = answer(work, "propose_formation", contract={"groups": groups}, targets=[TARGET])
     assert again.data["plan_id"] == first.data["plan_id"]
-    assert again.images == ()
-    assert answer(work, "deploy", tell="They stand.").data["arrived"]
+    assert answer(work, "deploy", tell="They stand.").data["deployed"] is False
+    assert answer(work, "deploy", plan_id=again.data["plan_id"]).data["arrived"]
+
+
+def test_a_distance_the_person_fixed_has_the_outline_shown_first_too() -> None:
+    work = workspace(clearance=9)
+    made = propose(work)
+    assert len(made.images) == 1
+    assert answer(work, "deploy").data["deployed"] is False
+
+
+def test_so_many_points_correct_an_outline_at_most() -> None:
+    work = workspace()
+    answer(work, "segment", id="t1", outline=DRAWN, points=[[70, 50]] * 15)
+    with pytest.raises(ToolError, match=r"t1 would have 25 points .* 20 at most"):
+        answer(work, "segment", id="t1", points=[[70, 50]] * 10)
+    assert restore(store(work), work.scene.picture, work.settings).scene == work.scene
 
 
 def test_points_alone_correct_an_outline_that_was_drawn() -> None:

@@ -65,7 +65,7 @@ def propose_formation(
     places = positions if samples is None else _sampled(workspace, samples)
     plan = _planned(workspace, held, places)
     _keep(workspace, plan)
-    unseen = workspace.unseen[plan.id] = _unseen(workspace, plan, contract)
+    unseen = workspace.unseen[plan.id] = _unseen(workspace, held)
     data = _proposal(workspace, plan)
     if places is None and not plan.verdict.certified:
         found = _partial(workspace, held, None)
@@ -99,12 +99,10 @@ def _planned(workspace: Workspace, held: Contract, places: Any) -> Plan:
         raise ToolError(f"{scene.told(str(error))}{less}") from None
 
 
-def _unseen(workspace: Workspace, plan: Plan, contract: Contract) -> tuple[str, ...]:
-    """Targets whose outlines have to be seen before robots move: none of a plan shown before."""
-    if plan.id in workspace.unseen:
-        return ()
-    measured_from = {n for g in contract.groups if g.clearance is not None for n in g.targets}
-    named = map(workspace.scene.target, contract.target_ids)
+def _unseen(workspace: Workspace, held: Contract) -> tuple[str, ...]:
+    """Targets whose outlines have to be seen before robots move."""
+    measured_from = {n for g in held.groups if g.clearance is not None for n in g.targets}
+    named = map(workspace.scene.target, held.target_ids)
     return tuple(t.id for t in named if doubtful(t) or t.id in measured_from)
 
 

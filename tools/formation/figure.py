@@ -196,7 +196,8 @@ def _beside(
     width, height = sketch.size
     most = min(wide / width if width else math.inf, high / height if height else math.inf)
     if min(wide, high, most) <= 0:
-        raise ToolError(f"There is no room {where} {group.targets[0]} in the picture.")
+        place = f"{where} of" if where in ("left", "right") else where
+        raise ToolError(f"There is no room {place} {group.targets[0]} in the picture.")
     extent = (y1 - y0) / height if dx and height else (x1 - x0) / width if dy and width else most
     scale = min(extent, most) if width or height else 1.0
     apart = min_spacing(robots_on(sketch, group.robots)) * scale

@@ -8,6 +8,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from pydantic import ValidationError
+
 from ..errors import InputError, ToolError
 from .contract import MAX_LENGTH, Contract, Group, Unit
 
@@ -65,7 +67,7 @@ def contract_in_pixels(contract: Contract, metres_per_pixel: float | None) -> Co
         metres_per_pixel: of the picture; None where it has no scale.
 
     Raises:
-        ToolError: metres without a scale, or lengths of no unit with one.
+        ToolError: metres without a scale, lengths of no unit with one, or too small or large.
     """
 
     def px(length: float) -> float:
@@ -83,7 +85,14 @@ def contract_in_pixels(contract: Contract, metres_per_pixel: float | None) -> Co
         "robot_radius": px(contract.robot_radius),
         "unit": None if metres_per_pixel is None else "px",
     }
-    return contract.model_copy(update=update)
+    converted = contract.model_copy(update=update)
+    if contract.unit != "m":
+        return converted
+    try:
+        return Contract.model_validate(converted.model_dump())
+    except ValidationError as error:
+        found = "; ".join(e["msg"].removeprefix("Value error, ") for e in error.errors())
+        raise ToolError(f"The lengths cannot be used at this scale: {found} (in px).") from None
 
 
 def in_metres(pixels: float, metres_per_pixel: float) -> float:

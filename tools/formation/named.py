@@ -23,8 +23,8 @@ WORDS = {
     **{"four": 4.0, "five": 5.0, "six": 6.0, "seven": 7.0, "eight": 8.0, "nine": 9.0, "ten": 10.0},
 }
 LENGTH = re.compile(
-    rf"(?P<number>(?<![\w.,])(?:[0-9]{{1,3}}(?:,[0-9]{{3}})+|[0-9]+)(?:\.[0-9]+)?|"
-    rf"\b(?:{'|'.join(WORDS)}))[\s-]?"
+    rf"(?P<number>(?<![\w.,/])(?:[0-9]{{1,3}}(?:,[0-9]{{3}})+|[0-9]+)(?:\.[0-9]+)?|"
+    rf"(?<![\w-])(?:{'|'.join(WORDS)}))[\s-]?"
     rf"(?P<unit>\b(?:{'|'.join(u for u, *_ in UNITS)})|"
     rf"(?<=[0-9])(?:{'|'.join(u for u, *_ in UNITS)}))\b(?!\s*(?:/|per\b))"
 )
@@ -46,12 +46,14 @@ BEFORE: tuple[tuple[str, Of], ...] = (
         "most",
     ),
     (r"\b(?:radius|diameter)(?: of| is|\s*:)?\s*\Z", "something"),
+    (r"(?:\b(?:minus|not|and a half)|(?<![\w-])-)\s*\Z", "something"),
 )
 AFTER: tuple[tuple[str, Of], ...] = (
     (r"\A(?: or more)? (?:apart\b|(?:between|from|to) (?:(?:any two |the )?(?:robots|bots|drones)"
      r"|them\b|each other|one another|the next|neighbou?rs))", "apart"),
     (r"\A[\s-]*(?:in )?radius\b", "radius"),
     (r"\A[\s-]*(?:across|wide|in diameter|in size)\b", "across"),
+    (r"\A (?:[0-9]|and a half\b)", "something"),
     (r"\A[\s-]*(?:long|high|tall|deep|big|thick|between)\b", "something"),
 )  # fmt: skip
 """What stands before and after a length, and what that makes it; those before go first. "own" is

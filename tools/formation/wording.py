@@ -71,14 +71,18 @@ def _relations(text: str, contract: Contract) -> Iterator[str]:
             yield f"the instruction says {word!r}, but no group has the relation {names}"
 
 
+def _middle(clearance: tuple[float, float] | None) -> float | None:
+    return None if clearance is None else sum(clearance) / 2
+
+
 def _lengths(text: str, contract: Contract, scale: float) -> Iterator[str]:
     """Lengths of the words that the contract has not; forms have lengths of their own."""
     drawn = any(group.relation == "shape" for group in contract.groups)
     stated = [
         length
         for g in contract.groups
-        for length in (*(g.clearance or ()), sum(g.clearance or ()) / 2, g.min_spacing, g.max_gap)
-        if length
+        for length in (*(g.clearance or ()), _middle(g.clearance), g.min_spacing, g.max_gap)
+        if length is not None
     ]
     for named in named_lengths(text):
         px = named.px(scale)

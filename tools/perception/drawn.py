@@ -8,9 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LineString, Polygon, box
 
-from ..geometry.outline import FloatArray, Outline, distances, make_outline
+from ..geometry.outline import (
+    FloatArray,
+    Outline,
+    distances,
+    largest_part,
+    make_outline,
+    outline_of,
+)
 from . import grabcut as gc
 from .grabcut import Bytes, Mask, Point
 from .segment import Segmentation, segment_outline
@@ -84,6 +91,12 @@ def straightened(outline: Outline, vertices: Sequence[Point]) -> Outline:
     far = np.linalg.norm(np.asarray(corners) - drawn, axis=1) > 2 * STRAY * outline.size
     made = Polygon(np.where(far[:, None], drawn, corners))
     return make_outline(made.exterior.coords) if made.is_valid and made.area > 0 else outline
+
+
+def within(outline: Outline, width: int, height: int) -> Outline:
+    """What lies in the picture of an outline whose sides were laid out past its border."""
+    seen = largest_part(outline.polygon.intersection(box(-0.5, -0.5, width - 0.5, height - 0.5)))
+    return outline if seen is None or seen.equals(outline.polygon) else outline_of(seen)
 
 
 def _holds(region: Mask, point: Point) -> bool:

@@ -19,6 +19,8 @@ _FOUR = {"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems"
 Point = Annotated[tuple[_Number, _Number], WithJsonSchema(_PAIR)]
 Box = Annotated[tuple[_Number, _Number, _Number, _Number], WithJsonSchema(_FOUR)]
 
+MAX_POINTS = 20
+"""Points of a kind."""
 MIN_SIDE = 2.0
 """Smallest side of a box, px."""
 
@@ -39,12 +41,12 @@ class TargetPrompt(BaseModel):
     points: tuple[Point, ...] | None = Field(
         default=None,
         min_length=1,
-        max_length=20,
+        max_length=MAX_POINTS,
         description="Points (x, y) on it, px; with an outline or box, or for an id measured from "
         "an outline before, they correct it there",
     )
     negative: tuple[Point, ...] = Field(
-        default=(), max_length=20, description="Points (x, y) off it, px, in the same way"
+        default=(), max_length=MAX_POINTS, description="Points (x, y) off it, px, in the same way"
     )
     outline: tuple[Point, ...] | None = Field(
         default=None,

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from formup.tools.errors import ToolError
 from formup.tools.geometry.outline import make_outline
-from formup.tools.perception.drawn import segment_mended, straightened
+from formup.tools.perception.drawn import segment_mended, straightened, within
 from formup.tools.perception.grabcut import Bytes
 from formup.tools.perception.image import picture_from_array
 from formup.tools.perception.prompts import TargetPrompt
@@ -107,6 +107,17 @@ def test_lines_that_make_no_polygon_leave_it_as_measured() -> None:
     found = straightened(measured, needle)
     assert found.filled.is_valid
     assert found.area > 0
+
+
+def test_sides_that_would_lie_beyond_the_picture_end_at_its_border() -> None:
+    pixels = picture()
+    pixels[:60, :80] = (200, 40, 40)
+    work = Workspace(Scene(picture_from_array(pixels)))
+    rough = ((0, 0), (78, 1), (80, 59), (0, 61))
+    x0, y0, *_ = work.segment(TargetPrompt(outline=rough, straight=True)).box
+    assert min(x0, y0) >= -0.5
+    drawn = make_outline([(-5.0, -3.0), (300.0, -3.0), (300.0, 200.0), (-5.0, 200.0)])
+    assert within(drawn, 240, 140).bounds == (-0.5, -0.5, 239.5, 139.5)
 
 
 def test_straight_goes_with_an_outline_that_was_drawn() -> None:
