@@ -7,20 +7,15 @@ import hashlib
 import json
 import secrets
 from pathlib import Path
-from typing import Any, ClassVar, cast
+from typing import Any, cast
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    SerializerFunctionWrapHandler,
-    ValidationError,
-    model_serializer,
-)
+from pydantic import Field, ValidationError
 from pydantic_core import to_json
 
 from .errors import ImageError, InputError
 from .formation.plan import Plan
+from .formation.value import Value
 from .geometry.outline import make_outline
 from .perception.image import Picture, load_picture
 from .perception.prompts import Box, Point, TargetPrompt
@@ -32,17 +27,7 @@ FORMAT = "formup/1"
 MAX_BYTES = 64 << 20
 
 
-class _Value(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    later: ClassVar[frozenset[str]] = frozenset()
-    """Fields that came later: left out where they say nothing, so that older digests hold."""
-
-    @model_serializer(mode="wrap")
-    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {k: v for k, v in standard(self).items() if k not in self.later or v}
-
-
-class StoredTarget(_Value):
+class StoredTarget(Value):
     """A target with its outline as rings of points."""
 
     later = frozenset({"source"})
@@ -58,7 +43,7 @@ class StoredTarget(_Value):
     source: TargetPrompt | None = None
 
 
-class StoredImage(_Value):
+class StoredImage(Value):
     """Where the picture lies and what it must be, and its scale if that is known."""
 
     later = frozenset({"metres_per_pixel"})
@@ -69,7 +54,7 @@ class StoredImage(_Value):
     metres_per_pixel: float | None = None
 
 
-class Stored(_Value):
+class Stored(Value):
     """All of a workspace but its settings; `plan_id` names the plan a plan.json is for."""
 
     later = frozenset({"unseen"})
@@ -80,9 +65,9 @@ class Stored(_Value):
     image: StoredImage
     targets: tuple[StoredTarget, ...] = ()
     pointed: tuple[TargetPrompt, ...] = ()
-    samples: dict[str, tuple[Point, ...]] = {}
-    plans: dict[str, Plan] = {}
-    unseen: dict[str, tuple[str, ...]] = {}
+    samples: dict[str, tuple[Point, ...]] = Field(default_factory=dict)
+    plans: dict[str, Plan] = Field(default_factory=dict)
+    unseen: dict[str, tuple[str, ...]] = Field(default_factory=dict)
 
     def sealed(self) -> "Stored":
         """The same with the digest of its content, by which an alteration shows."""

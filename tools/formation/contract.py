@@ -8,15 +8,11 @@ centre r further away.
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
-    SerializerFunctionWrapHandler,
     WithJsonSchema,
-    model_serializer,
     model_validator,
 )
 
@@ -24,6 +20,7 @@ from ..errors import InputError
 from ..geometry.letters import letter_strokes
 from ..geometry.outline import Outline
 from ..geometry.shapes import Kind
+from .value import Value
 
 MAX_ROBOTS = 10_000
 MIN_SPACING = 2.0
@@ -54,17 +51,13 @@ def _numbers(count: int) -> WithJsonSchema:
 OUTSIDE: frozenset[str] = frozenset({"around", "cage", "corners", "along"})
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
 Pair = Annotated[tuple[Coordinate, Coordinate], _numbers(2)]
 Four = Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], _numbers(4)]
 Where = Literal["around", "inside", "on", "left", "right", "above", "below"]
 ENCLOSING: frozenset[Kind] = frozenset({"arc", "circle", "polygon", "star"})
 
 
-class ShapeSpec(_Frozen):
+class ShapeSpec(Value):
     """What robots draw, and where: in a box, by a target, or through points of their own."""
 
     kind: Kind
@@ -120,9 +113,10 @@ _FIELD_OF: dict[str, tuple[Kind, ...]] = {
 }
 
 
-class Group(_Frozen):
+class Group(Value):
     """One arrangement."""
 
+    later = frozenset({"facing", "shape", "walls"})
     relation: Relation = Field(
         description="around: even ring (surround, guard); cage: closed ring, nothing gets out; "
         "corners: one at each corner; along: beside one side or chosen edges; inside: spread "
@@ -182,12 +176,6 @@ class Group(_Frozen):
     )
     shape: ShapeSpec | None = Field(default=None, description="shape: a form drawn by the robots.")
 
-    @model_serializer(mode="wrap")
-    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without what later versions added and is not used: the hash of a plan stays the same."""
-        written = standard(self)
-        return {k: v for k, v in written.items() if v is not None or k not in _LATER}
-
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         problems = [*self._missing(), *self._misplaced()]
@@ -240,7 +228,6 @@ class Group(_Frozen):
                 yield f"{name} belongs to {only}, not to {self.relation}"
 
 
-_LATER = frozenset({"facing", "shape", "walls"})
 _ONLY_IN = {
     "side": "along",
     "edges": "along",
@@ -253,9 +240,10 @@ _ONLY_IN = {
 }
 
 
-class Contract(_Frozen):
+class Contract(Value):
     """All groups of a formation; robots are numbered through them in order, from 1."""
 
+    later = frozenset({"unit"})
     groups: tuple[Group, ...] = Field(min_length=1, max_length=50)
     robot_radius: Length = Field(default=0.0, description="Radius of a robot, px; 0 is a point.")
     unit: Unit | None = Field(
@@ -272,12 +260,6 @@ class Contract(_Frozen):
         max_length=300,
         description="Only where propose_formation doubts the contract: why it is what is meant.",
     )
-
-    @model_serializer(mode="wrap")
-    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without a unit where none is said: the hash of a plan without a scale stays the same."""
-        written = standard(self)
-        return {k: v for k, v in written.items() if k != "unit" or v is not None}
 
     @property
     def robots(self) -> int:

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
+from pydantic import BaseModel, ConfigDict
 
 from ..errors import ToolError
 from ..geometry.outline import FloatArray
 from .check import certify
 from .contract import Contract, Group, with_defaults
 from .place import Site, place
+from .value import Value
 from .verdict import Verdict
 
 DECIMALS = 3
@@ -73,23 +74,18 @@ class Shortfall(BaseModel):
         return f"clearance {self.clearance[0]:.1f} px, not {self.clearance_asked[0]:.1f} px"
 
 
-class Plan(BaseModel):
+class Plan(Value):
     """A formation with its verdict; only a certified one may be deployed.
 
     One that is partial is certified for less than was asked, and names what is missing.
     """
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(extra="ignore")
+    later = frozenset({"partial"})
 
     formation: Formation
     verdict: Verdict
     partial: Shortfall | None = None
-
-    @model_serializer(mode="wrap")
-    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A whole plan says nothing of a shortfall, as when there were none to be marked."""
-        written = standard(self)
-        return {k: v for k, v in written.items() if k != "partial" or v is not None}
 
     @property
     def id(self) -> str:
