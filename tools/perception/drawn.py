@@ -32,6 +32,8 @@ LEAST = 0.5
 """Where less than this share of a side was measured, the drawn one stays."""
 DRAWN = 0.5
 """How much the drawn side counts beside the measured one."""
+AGREED = 0.5
+"""Least overlap (intersection over union) of the polygon and what was measured."""
 SAMPLES = 120
 """Places of a side that are measured."""
 
@@ -76,7 +78,8 @@ def straightened(outline: Outline, vertices: Sequence[Point]) -> Outline:
         vertices: three or more (x, y), px, of a polygon with straight sides.
 
     Returns:
-        With as many corners, or `outline` itself where those lines make no polygon.
+        With as many corners, or `outline` itself where those lines make no polygon or one that is
+        another thing.
     """
     drawn = np.asarray(shapely.get_coordinates(shapely.normalize(Polygon(vertices))))[:-1]
     edge = outline.filled.exterior
@@ -90,7 +93,11 @@ def straightened(outline: Outline, vertices: Sequence[Point]) -> Outline:
     corners = [_crossing(lines[i - 1], line) for i, line in enumerate(lines)]
     far = np.linalg.norm(np.asarray(corners) - drawn, axis=1) > 2 * STRAY * outline.size
     made = Polygon(np.where(far[:, None], drawn, corners))
-    return make_outline(made.exterior.coords) if made.is_valid and made.area > 0 else outline
+    if not made.is_valid:
+        return outline
+    shared = made.intersection(outline.filled).area
+    agreed = shared >= AGREED * made.union(outline.filled).area
+    return make_outline(made.exterior.coords) if agreed else outline
 
 
 def within(outline: Outline, width: int, height: int) -> Outline:
