@@ -80,19 +80,26 @@ Found = tuple[Form, re.Match[str]] | None
 
 
 def _letters(text: str) -> Found:
-    """Letters that are quoted, in capitals or alone, so that no other words are drawn."""
+    """Letters that are quoted, in capitals or alone, so that no other words are drawn.
+
+    They are a pen's strokes, or a font's outlines where the words say outlined.
+    """
     more = r"(?: [A-Z0-9]{2,}(?! ?(?:px|pixels?|c?m)\b))*"
     written = rf"(?P<q>[\"'])(?P<quoted>[A-Za-z0-9 ]+)(?P=q)|(?P<plain>[A-Z0-9]+{more})"
+    signs = r"(?:outlined? )?(?:word|letter|number|digit)s?"
     lead = (
-        r"(?i:\b(?:spell|write)(?: out)?(?: the)?(?: words?| letters?| numbers?| digits?)?\s+|"
-        rf"{MAKE}(?:the|an?) (?:word|letters?|number|digit)\s+|"
-        rf"{STAND}(?:the|an?) (?:word|letters?|number|digit)\s+)"
+        rf"(?i:\b(?:spell|write)(?: out)?(?: the)?(?: {signs})?\s+|"
+        rf"{MAKE}(?:the|an?) {signs}\s+|{STAND}(?:the|an?) {signs}\s+)"
     )
-    found = re.search(rf"{lead}(?:{written})(?![\w'-])", text)
+    tail = r"(?i:\s+in (?:outline|outlined (?:letters|digits))(?![\w-]))?"
+    found = re.search(rf"{lead}(?:{written})(?![\w'-]){tail}", text)
     if found is None:
         return None
-    said = (found["quoted"] or found["plain"]).upper()
-    return Form({"kind": "letters", "text": said}, f"the letters {said}"), found
+    said = found["quoted"] or found["plain"]
+    if "outline" in found[0].replace(said, "", 1).lower():
+        form = Form({"kind": "outlined_letters", "text": said}, f"the outlined letters {said}")
+        return form, found
+    return Form({"kind": "letters", "text": said.upper()}, f"the letters {said.upper()}"), found
 
 
 def _grid(text: str) -> Found:

@@ -15,6 +15,7 @@ from formup.tools.workspace import Settings
 
 PHOTOS = Path(__file__).parent.parent.parent / "evals/photos/images"
 COIN = TargetPrompt(box=(176, 188, 292, 298))
+OUTLINED = {"kind": "outlined_letters"}
 
 
 @pytest.mark.parametrize(
@@ -28,6 +29,9 @@ COIN = TargetPrompt(box=(176, 188, 292, 298))
         ("spell out 'hi' left of it", {"kind": "letters", "text": "HI"}, None, "left of it"),
         ("write HELLO below it", {"kind": "letters", "text": "HELLO"}, None, "below it"),
         ("form the number 42 above it", {"kind": "letters", "text": "42"}, None, "above it"),
+        ("spell 'Go' in outlined letters above it", OUTLINED | {"text": "Go"}, None, "above it"),
+        ("form the outlined word GO below it", OUTLINED | {"text": "GO"}, None, "below it"),
+        ("write OUTLINE above it", {"kind": "letters", "text": "OUTLINE"}, None, "above it"),
         ("in a 3 by 4 grid beside it", {"kind": "grid", "rows": 3}, 12, "beside it"),
         ("make a 2x5 grid in it", {"kind": "grid", "rows": 2}, 10, "in it"),
         ("robots in a grid of two by six in it", {"kind": "grid", "rows": 2}, 12, "robots in it"),

@@ -37,6 +37,7 @@ def sampled(workspace: Workspace, name: str, **arguments: Any) -> FloatArray:
 
 FORMS: list[dict[str, Any]] = [
     {"kind": "letters", "text": "HI", "box": (20, 20, 280, 220)},
+    {"kind": "outlined_letters", "text": "Go!", "box": (20, 20, 280, 220)},
     {"kind": "star", "where": "on", "targets": ["t1"], "corners": 7},
     {"kind": "grid", "where": "left", "targets": ["t1"], "rows": 6},
     {"kind": "arc", "angles": (0, 90), "box": (10, 10, 200, 200)},
@@ -68,6 +69,7 @@ def test_a_sampled_form_is_certified_as_the_form_it_is(
         ({"kind": "line"}, "needs start and end"),
         ({"kind": "star", "where": "on"}, "takes 1 target"),
         ({"kind": "letters", "text": "no!", "box": (0, 0, 9, 9)}, "'!'"),
+        ({"kind": "outlined_letters", "text": "Ü", "box": (0, 0, 9, 9)}, "'Ü'"),
     ],
 )
 def test_forms_that_mean_nothing_are_refused(

@@ -133,7 +133,7 @@ def sample_shape(
         start: first point (x, y) of a line, image pixels, y down.
         end: last point (x, y) of a line, image pixels, y down.
         layout: between: line joins the targets, divider parts them.
-        text: letters: A-Z, 0-9, blanks.
+        text: letters: A-Z, 0-9, blanks; outlined: any ASCII.
         points: polyline: (x, y) in turn, image pixels.
         rows: grid: how many.
         corners: polygon, star: how many tips.

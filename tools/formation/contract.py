@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..geometry.letters import letter_strokes
 from ..geometry.outline import Outline
 from ..geometry.shapes import Kind
+from ..geometry.typeface import letter_outlines
 from .value import Value
 
 MAX_ROBOTS = 10_000
@@ -61,7 +62,9 @@ class ShapeSpec(Value):
     """What robots draw, and where: in a box, by a target, or through points of their own."""
 
     kind: Kind
-    text: str | None = Field(default=None, max_length=40, description="letters: A-Z, 0-9, blanks.")
+    text: str | None = Field(
+        default=None, max_length=40, description="letters: A-Z, 0-9, blanks; outlined: any ASCII."
+    )
     points: tuple[Pair, ...] | None = Field(
         default=None, min_length=2, max_length=500, description="line, polyline: (x, y) in turn."
     )
@@ -72,6 +75,11 @@ class ShapeSpec(Value):
     )
     box: Four | None = Field(default=None, description="x0, y0, x1, y1 to fit it into; or where.")
     where: Where | None = Field(default=None, description="By the target.")
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        return self.kind.replace("_", " ")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -84,9 +92,9 @@ class ShapeSpec(Value):
         for name, kinds in _FIELD_OF.items():
             if getattr(self, name) is not None and self.kind not in kinds:
                 yield f"{name} belongs to {' or '.join(kinds)}, not to {self.kind}"
-        if self.kind == "letters":
+        if self.kind in _FIELD_OF["text"]:
             try:
-                letter_strokes(self.text or "")
+                (letter_strokes if self.kind == "letters" else letter_outlines)(self.text or "")
             except InputError as error:
                 yield str(error).rstrip(".")
         if self.kind == "polyline" and self.points is None:
@@ -105,7 +113,7 @@ class ShapeSpec(Value):
 
 
 _FIELD_OF: dict[str, tuple[Kind, ...]] = {
-    "text": ("letters",),
+    "text": ("letters", "outlined_letters"),
     "points": ("line", "polyline"),
     "rows": ("grid",),
     "corners": ("polygon", "star"),

@@ -49,7 +49,7 @@ def on_figure(part: Part, figure: Sketch, audit: Audit) -> None:
 def _on_lines(part: Part, figure: Sketch, reach: float, audit: Audit) -> None:
     distance = distances(MultiLineString([LineString(x) for x in figure.lines]), part.points)
     assert part.group.shape is not None
-    name = f"the {part.group.shape.kind}"
+    name = f"the {part.group.shape.name}"
     for i in np.flatnonzero(distance > reach + TOLERANCE):
         text = f"is {distance[i]:.1f} px from {name}; {reach:.1f} px at most are allowed"
         audit.robot("off_curve", part.first + int(i), distance[i], reach, text)

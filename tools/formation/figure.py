@@ -21,6 +21,7 @@ from ..geometry.shapes import (
     grid_sketch,
     letters_sketch,
     line_sketch,
+    outlined_letters_sketch,
     polygon_sketch,
     polyline_sketch,
     star_sketch,
@@ -59,7 +60,7 @@ def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sket
     if not shapely.intersects_xy(box, points).all():
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         raise ToolError(
-            f"The {shape.kind} would reach from ({x0:.0f}, {y0:.0f}) to ({x1:.0f}, {y1:.0f}), out "
+            f"The {shape.name} would reach from ({x0:.0f}, {y0:.0f}) to ({x1:.0f}, {y1:.0f}), out "
             f"of the {site.width:g} x {site.height:g} px picture: place it elsewhere or smaller."
         )
     return placed
@@ -87,7 +88,7 @@ def place_figure(group: Group, shape: ShapeSpec, site: Site, radius: float) -> F
         else:
             too_many = middle
     size = " x ".join(f"{x:.0f}" for x in figure.size)
-    why = f"the {shape.kind} is {size} px and allows no more at {spacing:g} px"
+    why = f"the {shape.name} is {size} px and allows no more at {spacing:g} px"
     raise CapacityError(group, fits, why)
 
 
@@ -112,6 +113,7 @@ def _sketch(group: Group, shape: ShapeSpec) -> Sketch:
         "polygon": lambda: polygon_sketch(shape.corners or POLYGON_CORNERS),
         "star": lambda: star_sketch(shape.corners or STAR_TIPS),
         "letters": lambda: letters_sketch(shape.text or ""),
+        "outlined_letters": lambda: outlined_letters_sketch(shape.text or ""),
     }
     return made[shape.kind]()
 

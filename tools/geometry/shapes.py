@@ -13,8 +13,11 @@ import numpy as np
 from ..errors import InputError
 from .letters import arc, letter_strokes
 from .outline import FloatArray
+from .typeface import letter_outlines
 
-Kind = Literal["line", "arc", "circle", "grid", "polygon", "star", "letters", "polyline"]
+Kind = Literal[
+    "line", "arc", "circle", "grid", "polygon", "star", "letters", "outlined_letters", "polyline"
+]
 Box = tuple[float, float, float, float]
 WAIST = 0.5
 """Inner radius of a star by its outer: one of 5 points is a little fuller than a pentagram."""
@@ -125,12 +128,21 @@ def star_sketch(points: int) -> Sketch:
 
 
 def letters_sketch(text: str) -> Sketch:
-    """A line of letters and digits.
+    """A line of letters and digits, as a pen writes them.
 
     Raises:
         InputError: see `letter_strokes`.
     """
     return polyline_sketch(*letter_strokes(text))
+
+
+def outlined_letters_sketch(text: str) -> Sketch:
+    """A line of letters, digits and signs by the outlines of a font.
+
+    Raises:
+        InputError: see `letter_outlines`.
+    """
+    return polyline_sketch(*letter_outlines(text))
 
 
 def polyline_sketch(*lines: FloatArray) -> Sketch:

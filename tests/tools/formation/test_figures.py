@@ -5,12 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from formup.tools.errors import ToolError
 from formup.tools.formation.check import certify
 from formup.tools.formation.contract import Contract, Group
+from formup.tools.formation.figure import figure_of
 from formup.tools.formation.place import CapacityError, Site
 from formup.tools.formation.plan import Plan, make_plan
-from formup.tools.geometry.outline import make_outline
+from formup.tools.geometry.outline import FloatArray, make_outline
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -24,6 +26,7 @@ BOX = (60.0, 40.0, 560.0, 420.0)
 FORMS: list[dict[str, Any]] = [
     {"kind": "letters", "text": "UP", "box": BOX},
     {"kind": "letters", "text": "7", "where": "left"},
+    {"kind": "outlined_letters", "text": "a7", "where": "right"},
     {"kind": "letters", "text": "ok", "where": "inside"},
     {"kind": "star", "where": "around"},
     {"kind": "star", "where": "on", "corners": 6},
@@ -64,6 +67,15 @@ def test_every_form_is_certified_or_does_not_fit(
     assert len(plan.formation.points) == n
 
 
+def farthest_off(plan: Plan, places: FloatArray) -> FloatArray:
+    """The one of some places that is farthest from the drawn lines."""
+    (group,) = plan.formation.contract.groups
+    assert group.shape is not None
+    lines = figure_of(group, group.shape, SITE, plan.formation.contract.robot_radius).lines
+    drawing = shapely.MultiLineString([shapely.LineString(line) for line in lines])
+    return places[shapely.distance(drawing, shapely.points(places)).argmax()]
+
+
 @given(
     st.sampled_from([s for s in FORMS if s["kind"] != "grid"]), st.integers(8, 30),
     st.integers(0, 2**32 - 1),
@@ -78,8 +90,7 @@ def test_a_spoilt_form_is_not_certified(shape: dict[str, Any], n: int, seed: int
     random = np.random.default_rng(seed)
     pushed, stacked = points.copy(), points.copy()
     k = int(random.integers(n))
-    pushed[k] += (0, 45) if points[k, 1] < 240 else (0, -45)
-    pushed[k, 0] += 31
+    pushed[k] = farthest_off(plan, points[k] + 55 * np.stack([np.cos(T), np.sin(T)], axis=1))
     other = (k + 1 + int(random.integers(n - 1))) % n
     stacked[k] = points[other] + (0.5, 0)
     shuffled = points[random.permutation(n)]
@@ -124,6 +135,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"kind": "star"}, "either a box, or where"),
     ({"kind": "star", "box": BOX, "where": "on"}, "either a box, or where"),
     ({"kind": "grid", "where": "around"}, "go around a target, not grid"),
+    ({"kind": "outlined_letters", "text": "A\u00e9", "box": BOX}, "'\u00e9' cannot be drawn"),
     ({"kind": "star", "box": BOX, "text": "A"}, "text belongs to letters"),
     ({"kind": "polyline", "box": BOX}, "takes points"),
     ({"kind": "circle", "box": (9, 9, 3, 12)}, "x0 <= x1"),

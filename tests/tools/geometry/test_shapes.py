@@ -16,6 +16,7 @@ from formup.tools.geometry.shapes import (
     grid_sketch,
     letters_sketch,
     line_sketch,
+    outlined_letters_sketch,
     polygon_sketch,
     polyline_sketch,
     star_sketch,
@@ -34,8 +35,11 @@ SKETCHES = {
     "star": star_sketch(5),
     "UP": letters_sketch("UP"),
     "go 42": letters_sketch("go 42"),
+    "R8 in outline": outlined_letters_sketch("R8"),
     "zigzag": polyline_sketch(np.array([(0.0, 0), (30, 40), (60, 0), (90, 40), (20, 20)])),
 }
+NECK = {"R8 in outline": 25.0}
+"""Where a shape runs beside itself: how near, px, in BOX."""
 WALKS = {"A": 4, "E": 3, "H": 5, "I": 1, "K": 5, "O": 1, "P": 2, "Q": 3, "T": 3, "X": 4, "Y": 3,
          "4": 3, "6": 2, "8": 2, "9": 2}  # fmt: skip
 
@@ -85,7 +89,7 @@ def test_robots_stand_on_the_lines_and_no_gap_is_much_wider_than_another(name: s
     assert distances(lines_of(drawn), points).max() < 0.1
     if n >= 24:
         assert max(s.length for s in stretches(drawn.lines, points, 0.2)) <= 1.6 * length / n
-        assert min_spacing(points) > 0.3 * length / n
+        assert min_spacing(points) > 0.3 * min(length / n, NECK.get(name, length))
 
 
 @pytest.mark.parametrize("n", [10, 24, 60])
