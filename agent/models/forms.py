@@ -85,7 +85,7 @@ def _letters(text: str) -> Found:
     They are a pen's strokes, or a font's outlines where the words say outlined.
     """
     more = r"(?: [A-Z0-9]{2,}(?! ?(?:px|pixels?|c?m)\b))*"
-    written = rf"(?P<q>[\"'])(?P<quoted>[A-Za-z0-9 ]+)(?P=q)|(?P<plain>[A-Z0-9]+{more})"
+    written = rf"(?P<q>[\"'])(?P<quoted>[ !#-&(-~]+)(?P=q)|(?P<plain>[A-Z0-9]+{more})"
     signs = r"(?:outlined? )?(?:word|letter|number|digit)s?"
     lead = (
         rf"(?i:\b(?:spell|write)(?: out)?(?: the)?(?: {signs})?\s+|"
@@ -99,6 +99,8 @@ def _letters(text: str) -> Found:
     if "outline" in found[0].replace(said, "", 1).lower():
         form = Form({"kind": "outlined_letters", "text": said}, f"the outlined letters {said}")
         return form, found
+    if re.search("[^A-Za-z0-9 ]", said):
+        return None
     return Form({"kind": "letters", "text": said.upper()}, f"the letters {said.upper()}"), found
 
 

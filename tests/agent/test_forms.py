@@ -30,6 +30,7 @@ OUTLINED = {"kind": "outlined_letters"}
         ("write HELLO below it", {"kind": "letters", "text": "HELLO"}, None, "below it"),
         ("form the number 42 above it", {"kind": "letters", "text": "42"}, None, "above it"),
         ("spell 'Go' in outlined letters above it", OUTLINED | {"text": "Go"}, None, "above it"),
+        ("spell 'C3-PO!' in outline in it", OUTLINED | {"text": "C3-PO!"}, None, "in it"),
         ("form the outlined word GO below it", OUTLINED | {"text": "GO"}, None, "below it"),
         ("write OUTLINE above it", {"kind": "letters", "text": "OUTLINE"}, None, "above it"),
         ("in a 3 by 4 grid beside it", {"kind": "grid", "rows": 3}, 12, "beside it"),
@@ -55,6 +56,7 @@ def test_plain_wordings_name_a_form(
         "surround the cookie in the shape of a star",
         "surround the coin with a star on it",
         "spell hello above it",
+        "spell 'hello!' above it",
         "form a heart around it",
         "form a star of the coins",
         "make a 3.5 by 4 grid",
@@ -102,6 +104,7 @@ def run(instruction: str, picture: Picture | None = None, **more: Any) -> Report
         ("a dozen robots in a 3 by 4 grid inside it", "inside", 12),
         ("in a 2 by 3 grid beside it", "right", 6),
         ("surround it: form a hexagon of 12 robots", "around", 12),
+        ("spell 'R2-D2!' in outlined letters below it with 90 robots", "below", 90),
     ],
 )
 def test_a_form_is_placed_where_the_words_say(words: str, where: str, count: int) -> None:
