@@ -114,7 +114,7 @@ def _unfit(reading: Reading, form: Form | None, faced: bool, robots: int | None)
     if form.where(reading.relations, reading.side, 0) is None:
         around = ", around" if form.shape["kind"] in ENCLOSING else ""
         return (
-            f"Where is {form.said} meant to be? Inside a thing{around}, or left, right, above or "
+            f"Where are the robots to draw {form.said}? Inside a thing{around}, or left, right, above or "
             "below."
         )
     return None

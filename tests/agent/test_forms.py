@@ -143,8 +143,8 @@ def test_the_side_of_one_thing_that_faces_another() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("form a star with 10 robots", "Where is a star meant to be"),
-        ("spell A around it with 9 robots", "Where is the letters A meant to be"),
+        ("form a star with 10 robots", "Where are the robots to draw a star?"),
+        ("spell A around it with 9 robots", "Where are the robots to draw the letters A?"),
         ("9 robots in a 3 by 4 grid inside it", "takes 12 robots, 9 were named"),
         ("surround it with 6 robots, all facing the coin", "faces another only the side"),
         ("surround it with 6 robots, facing outwards", "which way robots look"),

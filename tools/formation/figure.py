@@ -88,7 +88,7 @@ def place_figure(group: Group, shape: ShapeSpec, site: Site, radius: float) -> F
         else:
             too_many = middle
     size = " x ".join(f"{x:.0f}" for x in figure.size)
-    why = f"the {shape.name} is {size} px and allows no more at {spacing:g} px"
+    why = f"no more stand {spacing:g} px apart on the {shape.name}, {size} px"
     raise CapacityError(group, fits, why)
 
 
