@@ -114,8 +114,8 @@ def _unfit(reading: Reading, form: Form | None, faced: bool, robots: int | None)
     if form.where(reading.relations, reading.side, 0) is None:
         around = ", around" if form.shape["kind"] in ENCLOSING else ""
         return (
-            f"Where are the robots to draw {form.said}? Inside a thing{around}, or left, right, above "
-            "or below."
+            f"Where are the robots to draw {form.said}? Inside a thing{around}, or left, right, "
+            "above or below."
         )
     return None
 
