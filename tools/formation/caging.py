@@ -28,6 +28,8 @@ class CageError(ToolError):
         way = (
             f"{needed} robots would do"
             if needed
+            else f"no more than {fits} have room there"
+            if fits
             else "no other number is known to do: allow a nearer clearance or take the closure ring"
         )
         super().__init__(

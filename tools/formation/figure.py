@@ -28,7 +28,7 @@ from ..geometry.shapes import (
 )
 from ..geometry.strokes import spread
 from .contract import Group, ShapeSpec, nominal
-from .site import CapacityError, Site
+from .site import CapacityError, Site, most_that_fit
 
 STAR_TIPS, POLYGON_CORNERS = 5, 6
 BESIDE = {"left": (-1, 0), "right": (1, 0), "above": (0, -1), "below": (0, 1)}
@@ -78,15 +78,17 @@ def place_figure(group: Group, shape: ShapeSpec, site: Site, radius: float) -> F
     points = robots_on(figure, group.robots)
     if min_spacing(points) >= spacing * (1 - 1e-6):
         return points
-    fits, too_many = 1, group.robots
-    while too_many - fits > 1:
-        middle = (fits + too_many) // 2
-        fewer = group.model_copy(update={"robots": middle})
-        drawn = robots_on(figure_of(fewer, shape, site, radius), middle)
-        if min_spacing(drawn) >= spacing * (1 - 1e-6):
-            fits = middle
-        else:
-            too_many = middle
+
+    def apart(n: int) -> bool:
+        fewer = group.model_copy(update={"robots": n})
+        drawn = robots_on(figure_of(fewer, shape, site, radius), n)
+        return min_spacing(drawn) >= spacing * (1 - 1e-6)
+
+    few, many = 1, group.robots
+    while many - few > 1:
+        middle = (few + many) // 2
+        few, many = (middle, many) if apart(middle) else (few, middle)
+    fits = most_that_fit(apart, few, group.robots)
     size = " x ".join(f"{x:.0f}" for x in figure.size)
     why = f"no more stand {spacing:g} px apart on the {shape.name}, {size} px"
     raise CapacityError(group, fits, why)

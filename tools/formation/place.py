@@ -26,7 +26,7 @@ from .apart import CrowdedError, Stand, clear, conflict, slid, without
 from .caging import caged_places, escape_proof
 from .contract import CENTRE_SHARE, OUTSIDE, Contract, Group, nominal
 from .figure import figure_of, place_figure
-from .site import CapacityError, Site
+from .site import CapacityError, Site, most_that_fit
 
 TOUCH = 1.0
 """Robots between two targets keep this far off them, px."""
@@ -35,6 +35,8 @@ MOST_AVOIDED = 20
 REFLEX = 1.5
 """A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
 square root of 2 in a right-angled reflex one."""
+DRAWN_BY_NUMBER = frozenset({"between", "centre"})
+"""Where the places depend on how many there are, so that some of them are none for fewer."""
 DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
 
 
@@ -219,23 +221,41 @@ def _offsets(group: Group, radius: float) -> tuple[float | None, ...]:
 
 
 def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
-    n, spacing = group.robots, group.min_spacing or 0.0
     if group.shape is not None:
         return place_figure(group, group.shape, site, radius)
     if group.relation == "shape" and group.line is None:
         raise ToolError("A free shape has no places of its own: give the positions.")
+    points, why = _as_many_as_fit(group, site, radius)
+    fits = len(points)
+    if fits == group.robots:
+        return points
+
+    def alone(n: int) -> bool:
+        fewer = group.model_copy(update={"robots": n})
+        return len(_as_many_as_fit(fewer, site, radius)[0]) == n
+
+    if group.relation in DRAWN_BY_NUMBER:
+        fits = most_that_fit(alone, fits, group.robots)
+    raise CapacityError(group, fits, why)
+
+
+def _as_many_as_fit(group: Group, site: Site, radius: float) -> tuple[FloatArray, str]:
+    """Places of the robots, or of those that fit, and why no more do."""
     if group.relation in ("corners", "inside", "centre"):
-        points, why = _place_at_target(group, site, radius)
-    else:
-        curve = reference_curve(group, site, radius)
-        if escape_proof(group):
-            outline = site.outlines[group.targets[0]]
-            return caged_places(group, outline, radius, site.frame(radius), curve)
-        points = _fit(curve, n, spacing)
-        why = f"the {curve.length:.0f} px that are left to stand on allow no more at {spacing:g} px"
-    if len(points) < n:
-        raise CapacityError(group, len(points), why)
-    return points
+        return _place_at_target(group, site, radius)
+    curve = reference_curve(group, site, radius)
+    if escape_proof(group):
+        outline = site.outlines[group.targets[0]]
+        return caged_places(group, outline, radius, site.frame(radius), curve), ""
+    spacing = group.min_spacing or 0.0
+    cut = (
+        ", cut open by the picture's border,"
+        if group.relation == "cage" and not curve.closed
+        else ""
+    )
+    left = f"the {curve.length:.0f} px that are left to stand on{cut}"
+    why = f"{left} allow no more at {spacing:g} px"
+    return _fit(curve, group.robots, spacing), why
 
 
 def _place_at_target(

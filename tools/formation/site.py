@@ -1,6 +1,6 @@
 """Where positions are judged: the targets' outlines and the picture; what does not fit there."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import shapely
@@ -46,6 +46,20 @@ class Site:
     def frame(self, radius: float) -> Frame:
         """Where robots of a radius stand wholly inside the picture."""
         return Frame(self.width, self.height, radius)
+
+
+MORE = 32
+"""Numbers tried above the estimate of how many robots fit."""
+
+
+def most_that_fit(fits: Callable[[int], bool], estimate: int, too_many: int) -> int:
+    """The greatest number of robots found that fit, a little above an estimate or below it.
+
+    Fewer robots do not always fit where more do: corners and tips that they take first may be
+    nearer to each other than the places that more of them share.
+    """
+    tried = range(min(too_many - 1, estimate + MORE), 0, -1)
+    return next((n for n in tried if fits(n)), 0)
 
 
 class CapacityError(ToolError):

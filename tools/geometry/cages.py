@@ -70,24 +70,26 @@ def cage(
         region: the object; its holes do not matter. Image pixels.
         robots: their centres, (n, 2), image pixels.
         radius: of each, px; 0 is a point.
-        walls: what else the object cannot pass. With walls, caged means that it cannot leave the
-            hull of the robots and itself, and only the configuration space is tried.
+        walls: what else the object cannot pass. Caged by the configuration space then means that
+            it cannot leave the hull of the robots and itself; the disc test leaves walls out, and
+            its gaps are given only where it is what certifies.
         levels: of the flood, QUICK to THOROUGH; 0 for the disc alone.
         escapes: whether to look for a way out, which takes longer than proving that there is none.
     """
     points = np.asarray(robots, dtype=float).reshape(-1, 2)
     filled = Polygon(region.exterior) if region.interiors else region
     centre, depth = _inscribed_disc(filled)
-    between = widest_link(points, centre) if walls is None else None
+    between = widest_link(points, centre)
     gap = None
     if between is not None:
         gap = math.dist(*points[list(between)].tolist()) - 2 * radius
-    known = (2 * depth, gap, between)
+    small = gap is not None and gap < 2 * depth * (1 - MARGIN)
+    known = (2 * depth, gap, between) if small or walls is None else (2 * depth, None, None)
     if not len(points):
         return Cage("not certified", None, *known)
     if shapely.dwithin(filled, shapely.multipoints(points), radius):
         return Cage("not certified", None, *known)
-    if gap is not None and gap < 2 * depth * (1 - MARGIN):
+    if small:
         return Cage("caged", "disc", *known)
     body, obstacles = body_of(filled), Obstacles(points, radius, walls)
     if len(points) > MOST_FLOODED or not levels or overlaps(body, obstacles):

@@ -26,6 +26,8 @@ TABLE = 192
 DETAIL, MAX_CORNERS = 0.002, 48
 """An outline of more corners is shrunk and simplified by this share of its reach."""
 WALL_POINTS = 400
+RUN = 24
+"""Points of a wall, one after the other, for which cells out of reach are left out together."""
 SEARCHED = (1, 2)
 """Levels on which a way out is looked for: before them it is too coarse, after them too slow."""
 FOLLOWED = 1
@@ -164,15 +166,19 @@ def _gaps(
     least = np.full(len(x), np.inf)
     step, turn = grid.side / np.sqrt(2), grid.angle / 2
     for points, radius in _points(table, obstacles, grid):
+        (x0, y0), (x1, y1) = points.min(axis=0) - table.reach, points.max(axis=0) + table.reach
+        close = np.flatnonzero((x > x0) & (x < x1) & (y > y0) & (y < y1) & (least > -np.inf))
+        cx, cy = x[close], y[close]
         for px, py in points:
-            dx, dy = px - x, py - y
+            dx, dy = px - cx, py - cy
             away = dx * dx + dy * dy
-            near = np.flatnonzero((away < table.reach**2) & (least > -np.inf))
-            c, s, dx, dy = cos[near], sin[near], dx[near], dy[near]
+            near = np.flatnonzero(away < table.reach**2)
+            cells, dx, dy = close[near], dx[near], dy[near]
+            c, s = cos[cells], sin[cells]
             distance = table(c * dx + s * dy, c * dy - s * dx) - radius
             bound = step + turn * np.sqrt(away[near])
             gap = np.where(distance + bound < 0, -np.inf, distance - table.slack)
-            least[near] = np.minimum(least[near], gap)
+            least[cells] = np.minimum(least[cells], gap)
     return least
 
 
@@ -195,10 +201,11 @@ def clearances(body: Body, robots: FloatArray, radius: float, grid: Grid) -> NDA
 
 
 def _points(table: _Table, obstacles: Obstacles, grid: Grid) -> list[tuple[FloatArray, float]]:
-    """Robots and their radius; points of the walls within reach and radius 0."""
+    """Robots and their radius; runs of points of the walls within reach and radius 0."""
     points = [(obstacles.robots, obstacles.radius)]
     if obstacles.walls is not None:
-        points.append((_wall_points(obstacles.walls, table.half, grid), 0.0))
+        walls = _wall_points(obstacles.walls, table.half, grid)
+        points += [(walls[i : i + RUN], 0.0) for i in range(0, len(walls), RUN)]
     return points
 
 

@@ -111,6 +111,31 @@ def test_the_pictures_border_is_a_wall_only_where_that_is_said() -> None:
         Group(relation="around", targets=("t1",), robots=4, walls=False)
 
 
+@pytest.mark.parametrize("side", [3.0, 60.0])
+@pytest.mark.parametrize("radius", [0.0, 5.0])
+def test_walls_never_take_more_robots(side: float, radius: float) -> None:
+    """What cages without walls does so with them: they only take ways away."""
+    thing = make_outline(
+        [(300, 200), (300 + side, 200), (300 + side, 200 + side), (300, 200 + side)]
+    )
+    needed: dict[bool | None, int] = {}
+    for walls in (None, True):
+        with pytest.raises(CageError) as caught:
+            planned(thing, 3, radius, closure="escape-proof", walls=walls)
+        assert caught.value.needed is not None
+        needed[walls] = caught.value.needed
+    assert needed[True] <= needed[None]
+    plan = planned(thing, needed[None], radius, closure="escape-proof", walls=True)
+    assert plan.verdict.certified
+
+
+def test_robots_that_have_no_room_on_the_ring_are_counted() -> None:
+    speck = make_outline([(300, 200), (303, 200), (303, 203), (300, 203)])
+    with pytest.raises(CageError, match=r"no more than [3-9] have room there") as caught:
+        planned(speck, 13, 5.0, closure="escape-proof")
+    assert planned(speck, caught.value.fits, 5.0, closure="escape-proof").verdict.certified
+
+
 def test_a_contract_that_says_nothing_of_walls_keeps_the_id_it_had() -> None:
     group = Group(relation="cage", targets=("t1",), robots=4)
     formation = Formation(

@@ -62,6 +62,9 @@ def test_every_form_is_certified_or_does_not_fit(
     except CapacityError as error:
         assert n > error.fits >= 1
         assert drawn(error.fits, shape, radius).verdict.certified
+        for more in range(error.fits + 1, min(n, error.fits + 12)):
+            with pytest.raises(CapacityError):
+                drawn(more, shape, radius)
         return
     assert plan.verdict.findings == ()
     assert len(plan.formation.points) == n
