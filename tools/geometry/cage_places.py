@@ -126,12 +126,16 @@ def _even_count(demand: Demand, at_least: int) -> int | None:
     """The fewest robots whose even ring the disc test certifies."""
     for curve in demand.curves:
         most = int(curve.length / demand.spacing) if demand.spacing > 0 else 1000
-        n = at_least
+        last, n = at_least - 1, at_least
         while n <= most:
-            if any(demand.state(points, 0) == "caged" for points in _even_rings(curve, n)):
-                return n
-            n = max(n + 1, int(n * 1.05))
+            if _disc_cages(demand, curve, n):
+                return next(k for k in range(last + 1, n + 1) if _disc_cages(demand, curve, k))
+            last, n = n, max(n + 1, int(n * 1.05))
     return None
+
+
+def _disc_cages(demand: Demand, curve: Curve, n: int) -> bool:
+    return any(demand.state(points, 0) == "caged" for points in _even_rings(curve, n))
 
 
 def _even_rings(curve: Curve, n: int) -> Iterator[FloatArray]:

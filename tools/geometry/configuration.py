@@ -173,12 +173,12 @@ def _gaps(
             dx, dy = px - cx, py - cy
             away = dx * dx + dy * dy
             near = np.flatnonzero(away < table.reach**2)
-            cells, dx, dy = close[near], dx[near], dy[near]
-            c, s = cos[cells], sin[cells]
+            index, dx, dy = close[near], dx[near], dy[near]
+            c, s = cos[index], sin[index]
             distance = table(c * dx + s * dy, c * dy - s * dx) - radius
             bound = step + turn * np.sqrt(away[near])
             gap = np.where(distance + bound < 0, -np.inf, distance - table.slack)
-            least[cells] = np.minimum(least[cells], gap)
+            least[index] = np.minimum(least[index], gap)
     return least
 
 
