@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from formup.tools.doors import TOOLS
 from formup.tools.errors import ToolError
 from formup.tools.geometry.outline import FloatArray, make_outline
 from formup.tools.perception.image import picture_from_array
 from formup.tools.scene import Scene, Target
 from formup.tools.tool import ToolResult
-from formup.tools.workspace import Workspace
+from formup.tools.workspace import Settings, Workspace
 
 
 @pytest.fixture
@@ -68,6 +69,7 @@ def test_a_sampled_form_is_certified_as_the_form_it_is(
         ({"kind": "circle"}, "either a box, or where"),
         ({"kind": "line"}, "needs start and end"),
         ({"kind": "star", "where": "on"}, "takes 1 target"),
+        ({"kind": "arc", "angles": (50, 50), "box": (0, 0, 9, 9)}, "two angles that differ"),
         ({"kind": "letters", "text": "no!", "box": (0, 0, 9, 9)}, "'!'"),
         ({"kind": "outlined_letters", "text": "Ü", "box": (0, 0, 9, 9)}, "'Ü'"),
     ],
@@ -108,3 +110,40 @@ def test_in_holes_robots_keep_off_the_edge(work: Workspace) -> None:
         call(work, "sample_along_edges", target="t1", n=6, offset=30, holes=True)
     with pytest.raises(ToolError, match="n, offset and step alone"):
         call(work, "sample_along_edges", target="t1", n=6, holes=True, side="left")
+
+
+def beside_border(radius: float) -> Workspace:
+    outline = make_outline([(8, 150), (100, 150), (100, 300), (8, 300)])
+    picture = picture_from_array(np.full((480, 640, 3), 90, np.uint8))
+    target = Target("t1", "crate", outline.bounds, 1.0, outline, "outline")
+    return Workspace(
+        Scene(picture, targets=(target,)), settings=Settings(robots=None, robot_radius=radius)
+    )
+
+
+@pytest.mark.parametrize("rings", [1, 2, 3])
+@pytest.mark.parametrize("radius", [0.0, 6.0])
+def test_rings_that_the_border_cuts_keep_their_distance(rings: int, radius: float) -> None:
+    place = beside_border(radius)
+    points = sampled(
+        place, "sample_along_edges", target="t1", n=18, rings=rings, offset=15.0, step=20.0
+    )
+    off = shapely.distance(place.scene.target("t1").outline.filled, shapely.points(points))
+    assert off.min() >= 15 + radius - 0.05
+    assert len(points) == 18
+
+
+def test_a_line_keeps_robots_apart_and_in_the_picture() -> None:
+    place = beside_border(20.0)
+    with pytest.raises(ToolError, match=r"robots? fit"):
+        call(place, "sample_shape", kind="line", n=5, start=(0, 0), end=(40, 0))
+    points = sampled(place, "sample_shape", kind="line", n=5, start=(0, 30), end=(639, 30))
+    assert points[:, 0].min() >= 20
+    assert points[:, 0].max() <= 619
+    with pytest.raises(ToolError, match="takes no targets"):
+        call(place, "sample_shape", kind="line", n=2, start=(0, 9), end=(40, 9), targets=["t1"])
+
+
+def test_on_the_outline_itself_there_are_no_rings() -> None:
+    with pytest.raises(ToolError, match="offset of 0"):
+        call(beside_border(0.0), "sample_along_edges", target="t1", n=9, rings=2, offset=0)

@@ -20,10 +20,10 @@ from ..formation.contract import (
 from ..formation.lengths import in_pixels
 from ..formation.place import place, reference_curve
 from ..formation.site import Site
-from ..geometry.curves import Frame, segment
+from ..geometry.curves import Frame
 from ..geometry.outline import FloatArray
 from ..geometry.rings import equal_chords, hole_rings, nested_rings
-from ..geometry.sampling import along_curve, min_spacing
+from ..geometry.sampling import min_spacing
 from ..geometry.shapes import Kind
 from ..perception.prompts import Box, Point
 from ..tool import ToolResult, tool, violations
@@ -171,14 +171,10 @@ def _plain_shape(
         start, end = ends
         if start is None or end is None:
             raise ToolError("sample_shape: a line needs start and end.")
-        picture = workspace.scene.picture
-        curve = segment(np.asarray(start), np.asarray(end), Frame(picture.width, picture.height))
-        points = along_curve(curve, n)
-        if len(points) < n or curve.length < MIN_SPACING * (n - 1):
-            raise ToolError(
-                f"{n} positions do not fit on {curve.length:.0f} px inside the picture."
-            )
-        return _reply(workspace, points)
+        if targets:
+            raise ToolError("sample_shape: a line from start to end takes no targets.")
+        drawn = {"relation": "shape", "robots": n, "line": (*start, *end)}
+        return _sampled(workspace, "sample_shape", drawn)
     wanted = 2 if kind == "between" else 1
     if len(targets) != wanted:
         raise ToolError(f"sample_shape: {kind} takes {wanted} target(s), got {len(targets)}.")
@@ -199,6 +195,8 @@ def _rings(
     radius = workspace.settings.robot_radius or 0.0
     room = (float(picture.width), float(picture.height))
     away = radius + (default_clearance(outline, room, radius) if offset is None else offset)
+    if away <= 0:
+        raise ToolError("sample_along_edges: an offset of 0 px leaves robots on the outline.")
     if rings is None:
         placed = hole_rings(outline, n, away)
     else:

@@ -99,6 +99,8 @@ class ShapeSpec(Value):
                 yield str(error).rstrip(".")
         if self.kind == "polyline" and self.points is None:
             yield "a polyline takes points"
+        if self.angles is not None and self.angles[0] == self.angles[1]:
+            yield f"an arc takes two angles that differ, not {self.angles}"
         if self.points is not None and len(set(self.points)) < 2:
             yield "points must differ"
 

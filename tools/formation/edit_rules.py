@@ -17,15 +17,15 @@ from ..geometry.outline import FloatArray, distances
 from ..geometry.sampling import along_curve, corner_points, nearest
 from .assignment import EXACT, assign
 from .contract import OUTSIDE, Contract, Group, SideName
+from .edit_forms import DECIMALS, Affine, form_after
 from .edit_kinds import Add, Mirror, Offset, Rotate, Scale, Shift, SideOnly
+from .figure import figure_of
 from .place import Site, place, reference_curve
 from .slots import Track, moved_out, pushed, respaced, track, track_at
 
 IntArray = NDArray[np.intp]
 UNLIMITED = 100_000.0
 """A greatest clearance of this is none: "at least"."""
-DECIMALS = 6
-"""Lengths of a contract are rounded to this many places, px."""
 ON_CURVE = frozenset({"around", "cage", "along"})
 OPPOSITE: Mapping[str, Mapping[str, SideName]] = {
     "left-right": {"left": "right", "right": "left"},
@@ -48,11 +48,18 @@ class Part:
         return replace(self, points=points, group=self.group.model_copy(update=update))
 
     @property
+    def free(self) -> bool:
+        """Whether its places follow from nothing but what was given."""
+        group = self.group
+        return group.relation == "shape" and group.line is None and group.shape is None
+
+    @property
     def centre(self) -> FloatArray:
         """Of the target; of the robots where there is none, or more than one."""
         if len(self.group.targets) != 1:
             return self.points.mean(axis=0)
-        return np.asarray(self.site.outlines[self.group.targets[0]].centre)
+        outline = self.site.outlines[self.group.targets[0]]
+        return shapely.get_coordinates(outline.filled.centroid)[0]
 
     def track(self, count: int) -> Track:
         """The curve its robots stand on, and would if there were `count`."""
@@ -70,13 +77,18 @@ class Part:
 def skipped(part: Part, stay: FloatArray) -> Part:
     """Nobody moves; a ring of a cage stays even by definition, and its verdict says so."""
     spacing = "even" if part.group.relation == "cage" else "free"
+    if part.group.relation == "between":  # its line would be that of fewer robots
+        line = np.concatenate(part.track(len(part.points)).curve.lines)[[0, -1]].ravel()
+        ends = tuple(round(float(v), DECIMALS) for v in line)
+        return part.to(stay, spacing=spacing, relation="shape", line=ends, layout="line")
+    if part.group.shape is not None and part.group.shape.kind == "grid":
+        return part.to(stay, spacing=spacing, shape=None, clearance=None)
     return part.to(stay, spacing=spacing)
 
 
 def closed_up(part: Part, stay: FloatArray) -> Part:
     """Those who stay share the place evenly; at corners and where spacing is free nobody moves."""
-    free = part.group.relation == "shape" and part.group.line is None
-    if free or part.group.spacing == "free" or part.group.relation == "corners":
+    if part.free or part.group.spacing == "free" or part.group.relation == "corners":
         return part.to(stay)
     slots, takes = _slots(replace(part, points=stay), len(stay))
     return part.to(slots[takes])
@@ -84,7 +96,8 @@ def closed_up(part: Part, stay: FloatArray) -> Part:
 
 def _slots(part: Part, count: int) -> tuple[FloatArray, IntArray]:
     """Places for `count` robots, and which of them those that are there take."""
-    if part.group.relation not in ("corners", "inside", "centre"):
+    drawn = part.group.shape is not None
+    if not drawn and part.group.relation not in ("corners", "inside", "centre"):
         here = part.track(count)
         _check_room(part, here)
         return respaced(here, part.points, count)
@@ -118,7 +131,8 @@ def _offset(part: Part, edit: Offset) -> Part:
         raise ToolError(
             f"The {group.relation} group keeps no distance to move out or in by: scale it instead."
         )
-    outline, inward = part.site.outlines[group.targets[0]], group.relation == "inside"
+    outline = part.site.outlines[group.targets[0]]
+    inward = group.relation == "inside" or group.enters
     base = outline.polygon.boundary if inward else outline.filled
     here = track(group, part.points, part.site, part.radius) if group.relation in ON_CURVE else None
     nearest_px = here.offset if here else float(distances(base, part.points).min())
@@ -186,12 +200,13 @@ def _shifted(part: Part, edit: Shift) -> Part:
 def _scaled(part: Part, edit: Scale) -> Part:
     """Rigid but for size; clearances demanded grow as those that are kept do."""
     there = _rigid(part, np.eye(2) * edit.factor, part.centre, part.centre)
-    if part.group.clearance is None or not part.group.targets:
+    group = there.group
+    if group.clearance is None or not group.targets:
         return there
     old, new = (_edges_off(p) for p in (part, there))
     if min(old.min(), new.min()) <= 0:
         return there  # on the outline: the verdict says so
-    least, greatest = part.group.clearance
+    least, greatest = group.clearance
     least = round(least * float(new.min() / old.min()), DECIMALS)
     if greatest < UNLIMITED:
         greatest = round(greatest * float(new.max() / old.max()), DECIMALS)
@@ -207,16 +222,25 @@ def _edges_off(part: Part) -> FloatArray:
 
 
 def _rigid(part: Part, linear: FloatArray, origin: FloatArray, to: FloatArray) -> Part:
-    """Every place, and a line of the contract, by the same map; a row vector times `linear`."""
-    points = (part.points - origin) @ linear + to
+    """Every place, and a line or form of the contract, by the same map of row vectors."""
+    there = Affine(linear, origin, to)
+    points, shape = there(part.points), part.group.shape
+    if shape is not None:
+        figure = figure_of(part.group, shape, part.site, part.radius)
+        group, anew = form_after(part.group, figure, there)
+        moved = replace(part, group=group, points=points)
+        if anew:
+            slots = moved.placed(len(points))
+            moved = replace(moved, points=slots[_taken(points, slots)])
+        return moved
     if part.group.line is None:
         return part.to(points)
-    ends = (np.reshape(part.group.line, (2, 2)) - origin) @ linear + to
+    ends = there(np.reshape(part.group.line, (2, 2)))
     return part.to(points, line=tuple(round(float(v), DECIMALS) for v in ends.ravel()))
 
 
 def _added(part: Part, edit: Add) -> Part:
-    if part.group.relation == "shape" and part.group.line is None:
+    if part.free:
         raise ToolError("A free shape has no places of its own for more robots: give positions.")
     old = len(part.points)
     slots, takes = _slots(part, old + edit.n)
@@ -231,8 +255,8 @@ def _to_side(part: Part, edit: SideOnly) -> Part:
         raise ToolError(
             f"Only robots outside a target can keep to one side of it; these are {group.relation}."
         )
-    other = {"relation": "along", "side": edit.side, "edges": None, "max_gap": None}
-    along = group.model_copy(update={**other, "closure": None})
+    other = {"relation": "along", "side": edit.side, "edges": None, "facing": None}
+    along = group.model_copy(update={**other, "max_gap": None, "closure": None, "walls": None})
     outline = part.site.outlines[group.targets[0]]
     offset = float(distances(outline.filled, part.points).min())
     if offset <= 0:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import shapely
-from shapely.geometry import GeometryCollection, LineString, MultiPoint, Polygon
+from shapely.geometry import GeometryCollection, LineString, MultiPoint, Point, Polygon
 
 from ..errors import InputError, ToolError
 from ..geometry.curves import QUAD_SEGMENTS, ROUND_JOIN_DIP
@@ -36,6 +36,8 @@ ROOMY = 1.02
 """A shape too small for the spacing is enlarged by so much more than it takes."""
 SEARCH = 40
 """Halvings of the search for a size."""
+SHRINKS = 0.95 ** np.arange(90)
+"""Sizes tried within a target, as parts of the largest that could be: down to a hundredth."""
 
 
 def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sketch:
@@ -144,17 +146,19 @@ def _placed(sketch: Sketch, group: Group, shape: ShapeSpec, site: Site, radius: 
 
 
 def _within(sketch: Sketch, outline: Outline, margin: float) -> Sketch:
-    """As large as it lies in the outline about its centre, holes left out."""
+    """As large as it lies in the outline about one of its centres, holes left out."""
     room = outline.polygon.buffer(-margin * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
     x0, y0, x1, y1 = outline.bounds
     width, height = sketch.size
     most = math.hypot(x1 - x0, y1 - y0) / (max(width, height) or 1.0)
-    for _ in range(SEARCH):
-        placed = sketch.at(outline.centre, most)
-        lines = [LineString(line) for line in placed.lines]
-        if room.covers(GeometryCollection([*lines, MultiPoint(placed.points)])):
-            return placed
-        most *= 0.95
+    middle = outline.filled.centroid
+    centres = (outline.centre, (middle.x, middle.y), ((x0 + x1) / 2, (y0 + y1) / 2))
+    for scale in most * SHRINKS:
+        for centre in centres:
+            placed = sketch.at(centre, float(scale))
+            lines = [LineString(line) for line in placed.lines]
+            if room.covers(GeometryCollection([*lines, MultiPoint(placed.points)])):
+                return placed
     raise ToolError(f"It has no room inside the target, {margin:.1f} px from its edge.")
 
 
@@ -164,9 +168,10 @@ def _about(sketch: Sketch, outline: Outline, gap: float) -> Sketch:
     centre = (float(circle.centroid.x), float(circle.centroid.y))
 
     def holds(scale: float) -> bool:
-        line = LineString(sketch.at(centre, scale).lines[0])
-        around = Polygon(line).contains(outline.filled) or not line.is_closed
-        return around and line.distance(outline.filled) >= gap
+        placed = sketch.at(centre, scale)
+        line = LineString(placed.lines[0])
+        whole = Polygon(line) if line.is_closed else Point(centre).buffer(placed.size[0] / 2)
+        return whole.contains(outline.filled) and line.distance(outline.filled) >= gap
 
     low, high = 0.0, 1.0
     while not holds(high):

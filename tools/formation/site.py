@@ -67,6 +67,7 @@ class CapacityError(ToolError):
 
     def __init__(self, group: Group, fits: int, why: str) -> None:
         noun = "robot fits" if fits == 1 else "robots fit"
-        super().__init__(f"{group.robots} robots were asked for but only {fits} {noun}: {why}.")
+        asked = "1 robot was" if group.robots == 1 else f"{group.robots} robots were"
+        super().__init__(f"{asked} asked for but only {fits} {noun}: {why}.")
         self.fits = fits
         self.group = group

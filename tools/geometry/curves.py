@@ -119,7 +119,9 @@ def ring(
         return Curve((shapely.get_coordinates(whole),), True, float(whole.length))
     inside = _filled_parts(closed.intersection(frame.box)).boundary
     near = outline.filled.buffer(keep * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
-    lines = _lines(inside.difference(near))
+    border = frame.box.exterior  # the ring's own part is as far off as it is to be
+    run = inside.intersection(border).difference(near)
+    lines = _lines(shapely.union(inside.difference(border), run))
     is_loop = len(lines) == 1 and bool(np.allclose(lines[0][0], lines[0][-1]))
     return Curve(lines, is_loop, float(whole.length))
 

@@ -4,6 +4,8 @@ Pure functions from outlines to points, built on the offset curves of `curves`. 
 pixels, x right, y down.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
@@ -16,6 +18,11 @@ CHORD_STEPS = 200
 EQUAL = 0.999
 """Shortest by longest chord at which the relaxation has come far enough."""
 DAMPING = 0.5
+MOST_STEP = 1.5
+"""Longest arc between neighbours by the mean one: beyond it other starts are tried, as a chord may
+only look short, straight through what the curve goes around."""
+BARE = 2.1
+"""From here on more of the ring is bare than equal chords are worth: arcs keep to MOST_STEP."""
 
 
 def equal_chords(curve: Curve, n: int) -> FloatArray:
@@ -23,7 +30,9 @@ def equal_chords(curve: Curve, n: int) -> FloatArray:
 
     Equal arc lengths cut corners short; here each point moves along the curve until the chords to
     its two neighbours are as long. Points that are no neighbours may still come near each other
-    across a neck: see `min_spacing`. A curve in several pieces keeps equal arc lengths.
+    across a neck: see `min_spacing`. A curve in several pieces keeps equal arc lengths; where
+    equal chords would leave much of a ring bare, as about something thin, they are as equal as they
+    get without.
 
     Args:
         curve: closed or open; on an open one the end robots stay at its ends.
@@ -35,27 +44,58 @@ def equal_chords(curve: Curve, n: int) -> FloatArray:
     points = along_curve(curve, n)
     if len(curve.lines) != 1 or n < 3:
         return points
-    line = curve.lines[0]
     at = _arc_lengths(curve, points)
-    best, evenest = points, 0.0
+    found = _relaxed(curve, at)
+    phase = 1
+    while curve.closed and found.longest > MOST_STEP and phase < PHASES:
+        other = _relaxed(curve, at + phase / PHASES * curve.length / n)
+        found = min(found, other, key=lambda r: (r.even < EQUAL, r.longest))
+        phase += 1
+    if curve.closed and found.longest > BARE:
+        found = _relaxed(curve, at, MOST_STEP)
+    return found.points
+
+
+class _Relaxed(NamedTuple):
+    """Points, the shortest by the longest chord, and the longest by the mean arc."""
+
+    points: FloatArray
+    even: float
+    longest: float
+
+
+def _relaxed(curve: Curve, at: FloatArray, most: float = np.inf) -> _Relaxed:
+    """Points slid from given arc lengths until chords are equal, or as even as they got.
+
+    No arc gets longer than `most` times the mean one.
+    """
+    best = _Relaxed(np.empty((0, 2)), -1.0, np.inf)
     for _ in range(CHORD_STEPS):
         ends = np.append(at, at[0] + curve.length) if curve.closed else at
-        places = interpolate(line, ends % curve.length if curve.closed else ends)
+        places = interpolate(curve.lines[0], ends % curve.length if curve.closed else ends)
         chords = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        steps = np.diff(ends)
         even = float(chords.min() / max(chords.max(), 1e-12))
-        if even > evenest:
-            best, evenest = places[:n], even
+        longest = float(steps.max() / steps.mean())
+        if longest > most:
+            break
+        if even > best.even:
+            best = _Relaxed(places[: len(at)], even, longest)
         if even >= EQUAL:
             break
-        steps = np.diff(ends)
         ideal = steps * (chords.mean() / np.maximum(chords, 1e-9)) ** DAMPING
         ideal *= (ends[-1] - ends[0]) / ideal.sum()
-        at = at[0] + np.concatenate([[0.0], np.cumsum(ideal)])[:n]
+        at = at[0] + np.concatenate([[0.0], np.cumsum(ideal)])[: len(at)]
     return best
 
 
 def nested_rings(
-    outline: Outline, n: int, offset: float, step: float, count: int, frame: Frame | None = None
+    outline: Outline,
+    n: int,
+    offset: float,
+    step: float,
+    count: int,
+    frame: Frame | None = None,
 ) -> tuple[FloatArray, ...]:
     """N robots over several rings of an outline, shared by length, each ring further out.
 
@@ -67,12 +107,13 @@ def nested_rings(
         offset: distance of the first ring, px.
         step: from one ring to the next, px.
         count: how many rings.
-        frame: where robots may stand; None for the whole plane.
+        frame: where robots may stand, which may cut rings open; None for the whole plane.
 
     Returns:
         Per ring (k, 2), the innermost first; the k sum to n unless the picture leaves no room.
     """
-    curves = [ring(outline, offset + k * step, offset + k * step, frame) for k in range(count)]
+    offsets = [offset + k * step for k in range(count)]
+    curves = [ring(outline, away, away, frame, keep=away) for away in offsets]
     curves = [curve for curve in curves if curve.length > 0]
     if not curves:
         return ()

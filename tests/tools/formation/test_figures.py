@@ -8,11 +8,11 @@ import pytest
 import shapely
 from formup.tools.errors import ToolError
 from formup.tools.formation.check import certify
-from formup.tools.formation.contract import Contract, Group
+from formup.tools.formation.contract import Contract, Group, ShapeSpec
 from formup.tools.formation.figure import figure_of
 from formup.tools.formation.place import CapacityError, Site
 from formup.tools.formation.plan import Plan, make_plan
-from formup.tools.geometry.outline import FloatArray, make_outline
+from formup.tools.geometry.outline import FloatArray, Outline, make_outline
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -197,3 +197,49 @@ def test_contracts_that_use_neither_are_written_as_before() -> None:
     assert Group.model_validate(group.model_dump(mode="json")) == group
     form = drawn(8, {"kind": "circle", "box": BOX}).formation.contract.groups[0]
     assert Group.model_validate_json(form.model_dump_json()) == form
+
+
+THIN = make_outline([(310, 80), (330, 80), (330, 400), (310, 400)])
+RING = make_outline(
+    np.stack([np.cos(T), np.sin(T)], axis=1) * 100 + (320, 240),
+    (np.stack([np.cos(T), np.sin(T)], axis=1) * 60 + (320, 240),),
+)
+CUP = make_outline(
+    [(220, 140), (400, 140), (400, 180), (260, 180), (260, 290), (400, 290), (400, 330), (220, 330)]
+)
+
+
+@pytest.mark.parametrize("outline", [THIN, RING, CUP], ids=["thin", "ring", "cup"])
+@pytest.mark.parametrize("kind", ["star", "circle", "polygon", "grid", "line"])
+def test_a_form_finds_room_inside_what_is_thin_or_hollow(outline: Outline, kind: str) -> None:
+    shape = ShapeSpec.model_validate({"kind": kind, "where": "inside"})
+    group = Group(relation="shape", targets=("t1",), robots=5, shape=shape)
+    plan = make_plan(Contract(groups=(group,)), Site({"t1": outline}, WIDTH, HEIGHT), "s")
+    assert plan.verdict.findings == ()
+    assert shapely.intersects_xy(outline.polygon, plan.formation.points).all()
+    if (outline, kind) == (RING, "circle"):  # round the hole, not beside it
+        assert np.ptp(plan.formation.points, axis=0).min() > 120
+
+
+@pytest.mark.parametrize("angles", [(0, 180), (0, 270), (-60, 200)])
+def test_an_arc_goes_around_what_is_hollow(angles: tuple[float, float]) -> None:
+    shape = ShapeSpec(kind="arc", where="around", angles=angles)
+    group = Group(relation="shape", targets=("t1",), robots=9, shape=shape)
+    plan = make_plan(Contract(groups=(group,)), Site({"t1": CUP}, WIDTH, HEIGHT), "s")
+    assert plan.verdict.findings == ()
+    x, y = plan.formation.points.T
+    assert np.hypot(x - 310, y - 235).min() > 130
+
+
+@pytest.mark.parametrize("clearance", [(15, 15), (30, 30), (60, 60)])
+@pytest.mark.parametrize("radius", [0.0, 5.0])
+def test_an_exact_distance_holds_where_the_picture_cuts_the_ring(
+    clearance: tuple[float, float], radius: float
+) -> None:
+    edge = make_outline([(0, 150), (60, 150), (60, 300), (0, 300)])
+    group = Group(relation="around", targets=("t1",), robots=8, clearance=clearance)
+    contract = Contract(groups=(group,), robot_radius=radius)
+    plan = make_plan(contract, Site({"t1": edge}, WIDTH, HEIGHT), "s")
+    assert plan.verdict.certified
+    off = shapely.distance(edge.filled, shapely.points(plan.formation.points)) - radius
+    assert off == pytest.approx(clearance[0], abs=0.3)

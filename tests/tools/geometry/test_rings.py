@@ -39,6 +39,18 @@ def test_neighbours_are_at_equal_straight_distances(corners: FloatArray, n: int)
         assert apart.min() >= 0.99 * apart.max()
 
 
+@pytest.mark.parametrize("n", [3, 5, 8, 9, 12, 31])
+@pytest.mark.parametrize("height", [12.0, 20.0, 80.0])
+def test_equal_chords_leave_no_part_of_a_thin_thing_bare(n: int, height: float) -> None:
+    """Straight through it two robots at an end are as near as neighbours along it."""
+    thin = make_outline([(120, 230), (520, 230), (520, 230 + height), (120, 230 + height)])
+    curve = ring(thin, 12, 12)
+    points = equal_chords(curve, n)
+    at = np.sort(locate(curve.lines[0], points))
+    arcs = np.diff(np.append(at, at[0] + curve.length))
+    assert arcs.max() <= 2.1 * arcs.mean() + 1e-6
+
+
 def test_across_a_neck_robots_that_are_no_neighbours_may_be_nearer_and_that_is_measured() -> None:
     curve = ring(make_outline(DUMBBELL), 4, 4)
     points = equal_chords(curve, 6)
