@@ -124,6 +124,7 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
             "robots",
         )
     order = _order(part.points, curve) + part.first
+    mend = _enough(part, curve)
     for k in np.flatnonzero(opening > allowed + TOLERANCE):
         other = order[(k + 1) % len(order)] + 1
         cut = "" if curve.closed else " (the picture's border cuts the ring there)"
@@ -133,8 +134,20 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
             opening[k],
             allowed,
             f"and robot {other} leave an opening of {opening[k]:.1f} px; a closed ring "
-            f"allows {allowed:.1f} px{cut}",
+            f"allows {allowed:.1f} px{cut}{mend}",
         )
+
+
+def _enough(part: Part, curve: Curve) -> str:
+    """How many robots make openings as narrow as a contract names, where more are what it takes."""
+    widest = part.group.max_gap
+    if not widest or not curve.closed:
+        return ""
+    needed = math.ceil(curve.length / (widest + 2 * part.radius))  # chords are shorter than arcs
+    apart = curve.length / needed
+    if needed <= len(part.points) or apart < (part.group.min_spacing or 0.0):
+        return ""
+    return f"; {needed} robots evenly would do"
 
 
 def corner_matching(part: Part, audit: Audit) -> None:

@@ -129,6 +129,18 @@ def test_walls_never_take_more_robots(side: float, radius: float) -> None:
     assert plan.verdict.certified
 
 
+@pytest.mark.parametrize("radius", [0.0, 5.0])
+@pytest.mark.parametrize("thing", [SQUARE, ELL], ids=["square", "ell"])
+def test_too_few_for_the_openings_that_are_named_say_how_many_would_do(
+    thing: Outline, radius: float
+) -> None:
+    few = planned(thing, 7, radius, max_gap=20)
+    assert not few.verdict.certified
+    enough = int(few.verdict.findings[0].sentence.split(" robots evenly would do")[0].split()[-1])
+    assert planned(thing, enough, radius, max_gap=20).verdict.certified
+    assert not planned(thing, enough - 3, radius, max_gap=20).verdict.certified
+
+
 def test_robots_that_have_no_room_on_the_ring_are_counted() -> None:
     speck = make_outline([(300, 200), (303, 200), (303, 203), (300, 203)])
     with pytest.raises(CageError, match=r"no more than [3-9] have room there") as caught:
