@@ -42,14 +42,20 @@ class Offset(_GroupEdit):
 
 
 class Rotate(_GroupEdit):
-    """Turn clockwise as seen in the picture: robots on a ring along it, others rigidly."""
+    """Turn clockwise as seen in the picture: robots on a ring along it, others rigidly.
+
+    Letters and grids that are turned are free positions from then on.
+    """
 
     kind: Literal["rotate"] = "rotate"
     degrees: Finite
 
 
 class Mirror(_GroupEdit):
-    """Each robot to the mirror image of its place, left and right (or top and bottom) swapped."""
+    """Each robot to the mirror image of its place, left and right (or top and bottom) swapped.
+
+    Letters go to the mirrored place and can still be read.
+    """
 
     kind: Literal["mirror"] = "mirror"
     axis: Literal["left-right", "top-bottom"]
