@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import Point
+from shapely.geometry import LineString, Point
 
 from ..errors import ToolError
 from ..geometry.outline import FloatArray, distances
@@ -189,7 +189,18 @@ def _mirrored(part: Part, edit: Mirror) -> Part:
     flip = np.diag([-1.0, 1.0] if edit.axis == "left-right" else [1.0, -1.0])
     side = part.group.side
     there = _rigid(part, flip, part.centre, part.centre)
-    return there.to(there.points, side=side and OPPOSITE[edit.axis].get(side, side))
+    side = side and OPPOSITE[edit.axis].get(side, side)
+    edges = part.group.edges and _edges_after(part, Affine(flip, part.centre, part.centre))
+    return there.to(there.points, side=side, edges=edges)
+
+
+def _edges_after(part: Part, there: Affine) -> tuple[int, ...]:
+    """The edges of the target that lie where a map takes the middles of those chosen."""
+    vertices, pairs = part.site.outlines[part.group.targets[0]].graph()
+    ends = np.array([vertices[list(pair)] for pair in pairs])
+    middles = there(ends[list(part.group.edges or ())].mean(axis=1))
+    at = np.argmin(np.stack([distances(LineString(e), middles) for e in ends]), axis=0)
+    return tuple(sorted({int(k) for k in at}))
 
 
 def _shifted(part: Part, edit: Shift) -> Part:

@@ -23,6 +23,7 @@ from formup.tools.formation.edits import (
 from formup.tools.formation.place import Site
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import make_outline
+from pydantic import TypeAdapter
 
 SITE = Site(
     {
@@ -162,3 +163,13 @@ def test_a_thing_that_is_its_own_mirror_image_keeps_its_ring() -> None:
     plan = make_plan(Contract(groups=(group,)), site, "s")
     found = edited(plan, Mirror(axis="top-bottom"), site)
     assert found.plan.verdict.certified
+
+
+def test_edges_are_those_on_the_other_side_of_the_mirror() -> None:
+    group = Group(relation="along", targets=("t1",), robots=4, edges=(0,))
+    plan = make_plan(Contract(groups=(group,)), SITE, "s")
+    wide, high = np.ptp(plan.formation.points, axis=0)
+    axis = "top-bottom" if wide > high else "left-right"
+    found = edited(plan, TypeAdapter(Edit).validate_python({"kind": "mirror", "axis": axis}), SITE)
+    assert found.plan.formation.contract.groups[0].edges == (2,)
+    assert found.plan.verdict.findings == ()
