@@ -132,7 +132,7 @@ def _offset(part: Part, edit: Offset) -> Part:
             f"The {group.relation} group keeps no distance to move out or in by: scale it instead."
         )
     outline = part.site.outlines[group.targets[0]]
-    inward = group.relation == "inside" or group.enters
+    inward = group.enters
     base = outline.polygon.boundary if inward else outline.filled
     here = track(group, part.points, part.site, part.radius) if group.relation in ON_CURVE else None
     nearest_px = here.offset if here else float(distances(base, part.points).min())

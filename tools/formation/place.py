@@ -35,6 +35,8 @@ MOST_AVOIDED = 20
 REFLEX = 1.5
 """A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
 square root of 2 in a right-angled reflex one."""
+ROUNDING = 2e-6
+"""A place this much nearer than a clearance, px, is at it: corners are found to half of this."""
 DRAWN_BY_NUMBER = frozenset({"between", "centre"})
 """Where the places depend on how many there are, so that some of them are none for fewer."""
 DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
@@ -248,13 +250,9 @@ def _as_many_as_fit(group: Group, site: Site, radius: float) -> tuple[FloatArray
         outline = site.outlines[group.targets[0]]
         return caged_places(group, outline, radius, site.frame(radius), curve), ""
     spacing = group.min_spacing or 0.0
-    cut = (
-        ", cut open by the picture's border,"
-        if group.relation == "cage" and not curve.closed
-        else ""
-    )
-    left = f"the {curve.length:.0f} px that are left to stand on{cut}"
-    why = f"{left} allow no more at {spacing:g} px"
+    why = f"the {curve.length:.0f} px that are left to stand on allow no more at {spacing:g} px"
+    if group.relation == "cage" and not curve.closed:
+        why += ", and the picture's border cuts the ring open"
     return _fit(curve, group.robots, spacing), why
 
 
@@ -306,7 +304,8 @@ def _corners(group: Group, site: Site, radius: float, earlier: Sequence[Stand] =
     points = np.clip(points, (x0, y0), (x1, y1))
     corners = corner_points(outline, group.robots)
     near = np.linalg.norm(points - corners, axis=1) <= corner_reach(group, outline, radius)
-    free = points[near & (distances(outline.filled, points) >= group.clearance[0] + radius)]
+    least = group.clearance[0] + radius - ROUNDING
+    free = points[near & (distances(outline.filled, points) >= least)]
     free = free[clear(free, group, earlier)]
     if len(free) > group.robots:
         free = free[spread_subset(free, group.robots)]

@@ -244,3 +244,18 @@ def test_robots_too_big_for_the_picture_are_refused_in_words(radius: float) -> N
         contract = Contract(groups=(wanted,), robot_radius=radius)
         with pytest.raises(ToolError):
             make_plan(contract, BRICK, "s")
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.0, 2.2])
+@pytest.mark.parametrize("radius", [0.0, 4.0])
+def test_at_corners_an_exact_distance_takes_away_none(
+    block: str, turn: float, radius: float
+) -> None:
+    c, s = math.cos(turn), math.sin(turn)
+    corners = np.array(BLOCKS[block]) @ np.array([[c, s], [-s, c]]) * 90 + (320, 240)
+    site = Site({"t1": make_outline(corners)}, WIDTH, HEIGHT)
+    for n in range(1, len(corners) + 1):
+        group = Group(relation="corners", targets=("t1",), robots=n, clearance=(15, 15))
+        plan = make_plan(Contract(groups=(group,), robot_radius=radius), site, "s")
+        assert plan.verdict.findings == ()
