@@ -45,19 +45,19 @@ check: .venv/.ready-dev
 # The tools, placing and checking, who takes which place, cages: each beside the bare library calls.
 bench: .venv/.ready-dev
 	@for what in bench bench_sampling bench_assignment bench_cages; do \
-	  echo "== $$what"; $(BIN)/python -m formup.evals.$$what || exit 1; echo; \
+	  echo "== $$what"; $(BIN)/python -m formup.benchmarks.$$what || exit 1; echo; \
 	done
 
 # What the gate blocks and how often it errs; what the runner costs, beside Inspect's.
 bench-evals: .venv/.ready-dev .venv/bench/trials_inspect/.ready
-	$(BIN)/python -m formup.evals.false_blocks
-	$(BIN)/python -m formup.evals.bench_runner --inspect .venv/bench/trials_inspect/bin/python
+	$(BIN)/python -m formup.benchmarks.false_blocks
+	$(BIN)/python -m formup.benchmarks.bench_runner --inspect .venv/bench/trials_inspect/bin/python
 
 # Loops of other agent frameworks beside ours, each in an environment of its own.
 bench-loop: .venv/.ready-dev $(PEERS:%=.venv/bench/%/.ready)
-	$(BIN)/python evals/loop_bench/compare.py $(ROUNDS) .venv/bench
+	$(BIN)/python benchmarks/loop/run.py $(ROUNDS) .venv/bench
 
-.venv/bench/%/.ready: evals/loop_bench/peers/%.txt
+.venv/bench/%/.ready: benchmarks/loop/peers/%.txt
 	@$(call environment,$(@D),-r $<)
 	@touch $@
 

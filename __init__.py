@@ -7,12 +7,12 @@ if TYPE_CHECKING:
     from .agent.agent import Agent
     from .agent.limits import Limits
     from .agent.messages import Call, Reply, Result, User
-    from .agent.models.doubles import FunctionModel, ScriptedModel
     from .agent.outcomes import Answered, Cancelled, Paused, Stopped
     from .agent.policy import Policy
     from .agent.report import Report
-    from .agent.runs import Run, load_run
-    from .tools.doors import TOOLS
+    from .agent.session import Run, load_run
+    from .agent.wrappers.doubles import FunctionModel, ScriptedModel
+    from .tools.builtin import TOOLS
     from .tools.errors import (
         FleetError,
         FormupError,
@@ -22,27 +22,27 @@ if TYPE_CHECKING:
         ToolError,
     )
     from .tools.fleet.deploy import Arrival
-    from .tools.formation.check import certify
+    from .tools.formation.checking.check import certify
+    from .tools.formation.checking.verdict import Finding, Verdict
     from .tools.formation.contract import Contract, Group
     from .tools.formation.plan import Formation, Plan, make_plan
-    from .tools.formation.verdict import Finding, Verdict
     from .tools.geometry.outline import Outline, make_outline
     from .tools.perception.image import Picture, load_picture
-    from .tools.perception.prompts import TargetPrompt
+    from .tools.perception.target_prompt import TargetPrompt
     from .tools.scene import Scene, Target
     from .tools.tool import Tool, ToolResult, tool
-    from .tools.workspace import Settings, Workspace
+    from .tools.world import Settings, Workspace
 
 _HOMES = {
     "agent.agent": ("Agent",),
     "agent.limits": ("Limits",),
     "agent.messages": ("Call", "Reply", "Result", "User"),
-    "agent.models.doubles": ("FunctionModel", "ScriptedModel"),
+    "agent.wrappers.doubles": ("FunctionModel", "ScriptedModel"),
     "agent.outcomes": ("Answered", "Cancelled", "Paused", "Stopped"),
     "agent.policy": ("Policy",),
     "agent.report": ("Report",),
-    "agent.runs": ("Run", "load_run"),
-    "tools.doors": ("TOOLS",),
+    "agent.session": ("Run", "load_run"),
+    "tools.builtin": ("TOOLS",),
     "tools.errors": (
         "FleetError",
         "FormupError",
@@ -52,16 +52,16 @@ _HOMES = {
         "ToolError",
     ),
     "tools.fleet.deploy": ("Arrival",),
-    "tools.formation.check": ("certify",),
+    "tools.formation.checking.check": ("certify",),
     "tools.formation.contract": ("Contract", "Group"),
     "tools.formation.plan": ("Formation", "Plan", "make_plan"),
-    "tools.formation.verdict": ("Finding", "Verdict"),
+    "tools.formation.checking.verdict": ("Finding", "Verdict"),
     "tools.geometry.outline": ("Outline", "make_outline"),
     "tools.perception.image": ("Picture", "load_picture"),
-    "tools.perception.prompts": ("TargetPrompt",),
+    "tools.perception.target_prompt": ("TargetPrompt",),
     "tools.scene": ("Scene", "Target"),
     "tools.tool": ("Tool", "ToolResult", "tool"),
-    "tools.workspace": ("Settings", "Workspace"),
+    "tools.world": ("Settings", "Workspace"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

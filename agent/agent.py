@@ -9,27 +9,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..prompts import Prompt, PromptError, PromptLibrary
-from ..tools.doors import TOOLS
+from ..tools.builtin import TOOLS
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
 from ..tools.perception.image import Picture
-from ..tools.perception.prompts import TargetPrompt
+from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.scene import Scene, Target
 from ..tools.tool import Tool
-from ..tools.workspace import Settings, Workspace
+from ..tools.world import Settings, Workspace
+from .first_message import first_message
 from .limits import DEFAULT_LIMITS, Limits
 from .loop import ANYTHING, Show, run
 from .messages import Call, History, Reply, Result, User
 from .model import Model
-from .models import model_named
 from .outcomes import Outcome, Paused, Stopped
 from .policy import Policy
+from .providers.registry import model_named
 from .report import Report, make_report
-from .runs import Run, check_text, going_on
-from .stages import TwoStages, offered
-from .task import first_message
-from .telemetry import traced_model, traced_run, traced_tool
-from .trace import TraceWriter, settings_facts
+from .session import Run, check_text, going_on
+from .store.folder import TraceWriter, settings_facts
+from .wrappers.telemetry import traced_model, traced_run, traced_tool
+from .wrappers.two_stages import TwoStages, offered
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer

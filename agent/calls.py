@@ -9,7 +9,7 @@ import traceback
 
 from ..tools.errors import ArgumentsError, FleetError, FormupError, ToolError
 from ..tools.tool import Tool
-from ..tools.workspace import Workspace
+from ..tools.world import Workspace
 from .messages import Call, ErrorKind, Result
 
 

@@ -7,7 +7,7 @@ from functools import partial
 
 from ..tools.errors import ArgumentsError, FleetError, ModelError
 from ..tools.tool import Tool
-from ..tools.workspace import Workspace
+from ..tools.world import Workspace
 from .calls import BrokenToolError, answer, failed, refused, tool_named
 from .limits import DEFAULT_LIMITS, Limits, exhausted
 from .messages import (

@@ -9,7 +9,7 @@ from typing import Literal
 
 from ..tools.errors import InputError
 from ..tools.tool import Tool
-from ..tools.workspace import Workspace
+from ..tools.world import Workspace
 
 Decision = Literal["allow", "ask", "refuse"]
 DECISIONS: tuple[Decision, ...] = ("allow", "ask", "refuse")

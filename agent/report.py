@@ -6,14 +6,14 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict
 
 from ..tools.fleet.deploy import Arrival
+from ..tools.formation.checking.verdict import Verdict
 from ..tools.formation.contract import Contract
-from ..tools.formation.lengths import in_metres, with_metres
 from ..tools.formation.plan import Plan, Shortfall
-from ..tools.formation.verdict import Verdict
-from ..tools.perception.attributes import Candidate
+from ..tools.formation.units import in_metres, with_metres
+from ..tools.perception.referring.attributes import Candidate
 from ..tools.scene import Box, Scene, Target
 from ..tools.store import rings
-from ..tools.workspace import Workspace
+from ..tools.world import Workspace
 from .messages import History, Reply, Result
 from .outcomes import Cancelled, Outcome, Paused, Stopped
 

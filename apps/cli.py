@@ -12,17 +12,30 @@ from ..agent.agent import Agent
 from ..agent.limits import Limits
 from ..agent.outcomes import Paused
 from ..agent.policy import Policy
-from ..agent.runs import load_run
-from ..agent.telemetry import environment_tracer
-from ..agent.trace import prompt_name, read_trace
+from ..agent.session import load_run
+from ..agent.store.folder import prompt_name, read_trace
+from ..agent.wrappers.telemetry import environment_tracer
 from ..prompts import PromptLibrary
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
-from ..tools.workspace import Settings
-from . import eval_run, inputs, plans, prompts, tools, traces
+from ..tools.world import Settings
+from . import (
+    arguments as inputs,
+)
+from . import (
+    deploy as plans,
+)
+from . import (
+    eval_run,
+    prompts,
+    tools,
+)
 from . import options as o
-from .carry import Desk
-from .output import Folder
+from . import (
+    trace as traces,
+)
+from .run_files import Folder
+from .terminal_session import Desk
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer

@@ -14,27 +14,27 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from ..evals.cells import Cell, Chance, cells, chances
-from ..evals.check_tasks import check_task
-from ..evals.executors import executor
-from ..evals.journal import Arm, read_rows
-from ..evals.methods import Method, SuiteWork, arm_key, method, trials_of
-from ..evals.runner import Sweep
-from ..evals.suites.gallery import Hung, hang
-from ..evals.suites.kept import ATTEMPTS, PICTURES, keep_suite
-from ..evals.suites.ledger import NAME as LEDGER
-from ..evals.suites.ledger import look
-from ..evals.suites.load import described, load_suite, shipped, write_suite
-from ..evals.suites.tasks import Suite
-from ..evals.trials import Trial
+from ..evals.experiments.executors import executor
+from ..evals.experiments.journal import Arm, read_rows
+from ..evals.experiments.methods import Method, SuiteWork, arm_key, method, trials_of
+from ..evals.experiments.runner import Sweep
+from ..evals.experiments.trials import Trial
+from ..evals.grading.check_tasks import check_task
+from ..evals.statistics.cells import Cell, Chance, cells, chances
+from ..evals.tasks.heldout_ledger import NAME as LEDGER
+from ..evals.tasks.heldout_ledger import look
+from ..evals.tasks.load import described, load_suite, shipped, write_suite
+from ..evals.tasks.rendered_pictures import Hung, hang
+from ..evals.tasks.stored_suite import ATTEMPTS, PICTURES, keep_suite
+from ..evals.tasks.suite_task import Suite
 from ..prompts import PromptLibrary
 from ..tools.errors import InputError
 from ..tools.store import write_whole
+from . import arguments as inputs
 from . import eval_options as e
-from . import inputs
 from . import options as o
+from .eval_progress import sweep
 from .evaluate import app
-from .sweep import sweep
 
 RUNS = Path("formup-runs")
 SUMMARY = "summary.json"

@@ -13,14 +13,31 @@ from rich.progress import Progress, track
 from rich.table import Table
 
 from ..agent.agent import Agent
-from ..evals.descriptors import descriptor_costs
-from ..evals.pointed import JITTERED, Mode, Row, as_json, evaluate, mode_named, one_target, summary
+from ..evals.experiments.descriptor_cost import descriptor_costs
+from ..evals.experiments.pointed import (
+    JITTERED,
+    Mode,
+    Row,
+    as_json,
+    evaluate,
+    mode_named,
+    one_target,
+    summary,
+)
 from ..evals.scenes.build import write_scenes
-from ..evals.suite import Task, load_tasks
+from ..evals.tasks.photographs import Task, load_tasks
 from ..prompts import PromptLibrary
 from ..tools.errors import InputError
 from ..tools.store import write_whole
-from . import compare, inputs, report
+from . import (
+    arguments as inputs,
+)
+from . import (
+    eval_compare as compare,
+)
+from . import (
+    eval_report as report,
+)
 from . import options as o
 
 COLUMNS = {

@@ -49,7 +49,7 @@ def _run() -> int:
     from ..prompts import PromptError
     from ..tools.errors import FleetError, FormupError, ModelError
     from .cli import app
-    from .screen import say_failed
+    from .run_display import say_failed
 
     try:
         code = app(standalone_mode=False) or 0

@@ -12,15 +12,15 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from ..evals.leaks import leaks
-from ..evals.promotion import passed
-from ..evals.tool_versions import retooled, tool_hashes
+from ..evals.experiments.promotion import passed
+from ..evals.experiments.tool_versions import retooled, tool_hashes
+from ..evals.tasks.prompt_leaks import leaks
 from ..prompts import Prompt, PromptError, PromptLibrary
 from ..prompts.history import diff, lineage, log
 from ..prompts.lint import Finding, lint
 from ..prompts.release import new_draft, promote, release
 from ..tools.errors import InputError
-from . import inputs
+from . import arguments as inputs
 from . import options as o
 
 ADDED, REMOVED, PLACE = "green", "red", "cyan"

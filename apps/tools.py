@@ -7,15 +7,15 @@ from typing import Any, cast
 
 import typer
 
-from ..tools.doors import TOOLS
+from ..tools.builtin import TOOLS
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import Contract
 from ..tools.perception.image import load_picture
 from ..tools.scene import Scene
 from ..tools.schema import compact_schema
 from ..tools.store import read_stored, restore, store, write_whole
-from ..tools.workspace import Settings, Workspace
-from . import inputs
+from ..tools.world import Settings, Workspace
+from . import arguments as inputs
 from . import options as o
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)

@@ -15,10 +15,26 @@ from pathlib import Path
 from pydantic_core import to_json
 
 from .files import alone, read_text, write_new, write_whole
-from .library import CHANGELOG, CURRENT, PARTIALS, SHIPPED, PromptLibrary, names_in
+from .library import (
+    CHANGELOG,
+    CURRENT,
+    PARTIALS,
+    SHIPPED,
+    PromptLibrary,
+    names_in,
+)
 from .lock import NAME as LOCK
 from .lock import Locked, read_lock
-from .prompt import DRAFT, ID, Prompt, PromptError, hash_of, parse_prompt, split_file, tag
+from .prompt import (
+    DRAFT,
+    ID,
+    Prompt,
+    PromptError,
+    hash_of,
+    parse_prompt,
+    split_file,
+    tag,
+)
 
 MAX_VERSION = 999
 _TEMPLATE = """---

@@ -2,24 +2,27 @@
 
 import ast
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
-ROOMS = ("tools", "prompts", "agent", "evals", "apps")
+ROOMS = ("tools", "prompts", "agent", "evals", "apps", "benchmarks")
 MAY_IMPORT = {
     "tools": {"tools"},
     "prompts": {"prompts"},
     "agent": {"agent", "tools", "prompts"},
     "evals": {"evals", "agent", "tools", "prompts"},
     "apps": {"apps", "evals", "agent", "tools", "prompts"},
+    "benchmarks": {"benchmarks", "evals", "agent", "tools", "prompts"},
 }
 WITHIN_TOOLS = {
     "geometry": {"geometry", "errors"},
     "perception": {"perception", "geometry", "errors"},
     "formation": {"formation", "geometry", "errors"},
-    "fleet": {"fleet", "formation", "geometry", "errors"},
+    "motion": {"motion", "formation", "geometry", "errors"},
+    "fleet": {"fleet", "motion", "formation", "geometry", "errors"},
 }
 GEOMETRY_LIBRARIES = {"numpy", "scipy", "shapely"}
 HEAVY = {
@@ -83,9 +86,9 @@ def test_within_tools_data_goes_from_picture_to_fleet(path: Path) -> None:
 def test_libraries_stay_in_their_rooms(path: Path) -> None:
     place = path.relative_to(ROOT).as_posix()
     modules = {module.partition(".")[0] for level, module in imports(path) if not level}
-    if not place.startswith(("tools/perception/", "evals/bench")):
+    if not place.startswith(("tools/perception/", "benchmarks/")):
         assert "cv2" not in modules
-    if not place.startswith(("agent/models/", "evals/loop_bench/")):
+    if not place.startswith(("agent/providers/", "benchmarks/loop/")):
         assert not modules & {"httpx", "httpx2", "requests", "aiohttp"}
     if place.startswith("tools/geometry/"):
         outside = modules - GEOMETRY_LIBRARIES - set(__import__("sys").stdlib_module_names)
@@ -94,7 +97,7 @@ def test_libraries_stay_in_their_rooms(path: Path) -> None:
 
 @pytest.mark.parametrize("path", SOURCES, ids=names(SOURCES))
 def test_heavy_libraries_are_imported_where_they_are_used(path: Path) -> None:
-    if path.relative_to(ROOT).parts[0] == "evals":
+    if path.relative_to(ROOT).parts[0] in ("evals", "benchmarks"):
         return  # nothing a user waits for imports the graders
     modules = {m.partition(".")[0] for _, m in imports(path, top_level=True)}
     assert not modules & HEAVY
@@ -115,6 +118,26 @@ def test_files_and_functions_stay_small(path: Path) -> None:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             assert node.end_lineno is not None
             assert node.end_lineno - node.lineno < 50, f"{node.name} is too long"
+
+
+def modules_imported(path: Path, known: dict[tuple[str, ...], Path]) -> set[Path]:
+    """Files of this package that a file imports while it is itself imported."""
+    here = path.relative_to(ROOT).parts
+    found: set[Path] = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = (*here[: len(here) - node.level], *(node.module or "").split("."))
+            base = tuple(part for part in base if part)
+            inside = [known.get((*base, alias.name)) for alias in node.names]
+            found |= {file or known[base] for file in inside if file or base in known}
+    return found - {path}
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    known = {p.relative_to(ROOT).with_suffix("").parts: p for p in SOURCES}
+    known |= {parts[:-1]: p for parts, p in known.items() if parts[-1] == "__init__"}
+    graph = {path: modules_imported(path, known) for path in SOURCES}
+    assert list(TopologicalSorter(graph).static_order())  # raises CycleError, which names them
 
 
 def test_modules_say_why_they_exist_in_five_lines() -> None:

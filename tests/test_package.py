@@ -69,8 +69,7 @@ def test_wheel_holds_every_package_and_data_file_and_no_tests(tmp_path: Path) ->
     data = (".py", ".yaml", ".md", ".json", ".jpg", ".png", ".css", ".js", "CURRENT")
     wanted = [n for n in kept if n.endswith(data)]
     missing = [n for n in wanted if f"formup/{n}" not in inside and n.startswith(rooms)]
-    # Scripts that are run from a checkout, in environments of their own.
-    assert not [n for n in missing if not n.startswith("evals/loop_bench/")]
+    assert not missing
     assert {"formup/py.typed", "formup/__init__.py", "formup/__main__.py"} <= inside
     assert not [n for n in inside if "test" in n.split("/")[1]]
 

@@ -10,12 +10,12 @@ import shapely
 
 from .errors import ToolError
 from .formation.contract import Contract
-from .formation.lengths import also_metres, check_scale
-from .formation.place import Site
+from .formation.placement.place import Site
 from .formation.plan import scene_version
+from .formation.units import also_metres, check_scale
 from .geometry.outline import Outline
 from .perception.image import Picture
-from .perception.prompts import TargetPrompt
+from .perception.target_prompt import TargetPrompt
 
 Box = tuple[float, float, float, float]
 

@@ -18,10 +18,10 @@ from .formation.plan import Plan
 from .formation.value import Value
 from .geometry.outline import make_outline
 from .perception.image import Picture, load_picture
-from .perception.prompts import Box, Point, TargetPrompt
+from .perception.target_prompt import Box, Point, TargetPrompt
 from .scene import Scene, Target
 from .tool import violations
-from .workspace import Settings, Workspace
+from .world import Settings, Workspace
 
 FORMAT = "formup/1"
 MAX_BYTES = 64 << 20

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .errors import ArgumentsError
 from .schema import compact_schema, without_bounds
-from .workspace import Workspace
+from .world import Workspace
 
 Kind = Literal["read", "commit", "actuate", "ask", "end"]
 """read: changes nothing outside the workspace; commit: makes a plan; actuate: moves robots;

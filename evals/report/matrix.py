@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from statistics import median
 
 from ...tools.errors import InputError
-from ..cells import TOTAL, Cell, cells
-from ..compare import compare
-from ..comparison import Comparison, Difference
-from ..journal import USUAL, Arm
-from ..trials import TrialRow
+from ..experiments.compare import compare
+from ..experiments.comparison import Comparison, Difference
+from ..experiments.journal import USUAL, Arm
+from ..experiments.trials import TrialRow
+from ..statistics.cells import TOTAL, Cell, cells
 from .markup import Content, Html, joined, tag
 from .read import Side
 

@@ -9,13 +9,13 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..journal import read_manifest
+from ..experiments.journal import read_manifest
 from .markup import Html, joined, tag
 from .matrix import compared, counted, matrix, verdict
-from .overlay import robot
 from .pictures import pictures, sprite
 from .read import Side
-from .tasks import cards
+from .task_cards import cards
+from .trial_overlay import robot
 
 HERE = Path(__file__).parent
 

@@ -9,8 +9,8 @@ from PIL import Image
 
 from ...tools.errors import ImageError
 from ...tools.perception.image import load_picture
-from ..suites.gallery import hashed
-from ..suites.kept import KeptSuite, KeptTask
+from ..tasks.rendered_pictures import hashed
+from ..tasks.stored_suite import KeptSuite, KeptTask
 from .markup import Html, joined, tag
 
 LONG = 900

@@ -11,12 +11,12 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ...agent.trace import read_trace
+from ...agent.store.folder import read_trace
 from ...tools.errors import InputError
-from ..journal import Arm
-from ..methods import kept_as
-from ..suites.kept import ATTEMPTS, KeptSuite, Point, read_suite
-from ..trials import TrialRow
+from ..experiments.journal import Arm
+from ..experiments.methods import kept_as
+from ..experiments.trials import TrialRow
+from ..tasks.stored_suite import ATTEMPTS, KeptSuite, Point, read_suite
 
 LONGEST = 4_000
 """Characters shown of one text of a transcript."""

@@ -9,8 +9,8 @@ from numpy.random import Generator
 
 from . import ground as grounds
 from .choose import HIDDEN, goes_by
-from .colours import VISIBLE, difference, lit, shade
 from .layout import Point, Rows, rows, scatter
+from .palette import VISIBLE, difference, lit, shade
 from .things import Family, Ground, Look, Scene, Sort, Thing, make
 
 Choice = tuple[Sort, str]

@@ -8,7 +8,7 @@ from shapely import affinity
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from .colours import RGB, lit
+from .palette import RGB, lit
 from .things import Part
 
 Draw = Callable[[Generator, RGB], list[Part]]

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from numpy.random import Generator
 from shapely.geometry import Polygon
 
-from . import ground, indoors, outdoors, shapes
+from . import ground, indoors, outdoors
+from . import polygons as shapes
 from .drawing import plain
 from .things import Family, Sort
 

@@ -7,7 +7,7 @@ from numpy.random import Generator
 from shapely import affinity
 from shapely.geometry import Polygon
 
-from .colours import RGB, lit
+from .palette import RGB, lit
 from .things import Ground, Part
 
 Size = tuple[int, int]

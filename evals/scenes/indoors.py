@@ -9,9 +9,9 @@ from numpy.random import Generator
 from shapely import affinity
 from shapely.geometry import Polygon
 
-from . import shapes
-from .colours import RGB, lit
+from . import polygons as shapes
 from .drawing import edged, shrunk
+from .palette import RGB, lit
 from .things import Part
 
 

@@ -8,9 +8,9 @@ from numpy.random import Generator
 from shapely import affinity
 from shapely.geometry import Polygon
 
-from . import shapes
-from .colours import RGB, lit
+from . import polygons as shapes
 from .drawing import GLASS, edged, shrunk
+from .palette import RGB, lit
 from .things import Part
 
 WOOD: RGB = (150, 104, 62)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter
 from shapely.geometry import Polygon
 
-from .colours import RGB
+from .palette import RGB
 from .things import Look, Part, Scene
 
 FINE = 3

@@ -12,7 +12,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ...tools.geometry.outline import Outline, outline_of, rectangle_of
-from .colours import RGB, shade
+from .palette import RGB, shade
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.messages import Call, Reply, User
-from formup.agent.models.doubles import ScriptedModel
-from formup.agent.runs import Run
+from formup.agent.session import Run
+from formup.agent.wrappers.doubles import ScriptedModel
 from formup.tools.perception.image import load_picture
-from formup.tools.workspace import Settings
+from formup.tools.world import Settings
 
 FOLDER = Path(__file__).parent.parent / "recordings" / "injected"
 RED = {"exit": (180, 220, 320, 330), "label": (120, 200, 300, 330)}

@@ -12,14 +12,14 @@ from formup.agent.limits import Limits
 from formup.agent.loop import run
 from formup.agent.messages import Call, History, Reply, Result, Usage, User
 from formup.agent.model import Request
-from formup.agent.models.doubles import FunctionModel, ScriptedModel
 from formup.agent.outcomes import Answered, Cancelled, Outcome, Stopped
-from formup.tools.doors import TOOLS
+from formup.agent.wrappers.doubles import FunctionModel, ScriptedModel
+from formup.tools.builtin import TOOLS
 from formup.tools.errors import FleetError, InputError, ToolError
 from formup.tools.perception.image import picture_from_array
 from formup.tools.scene import Scene
 from formup.tools.tool import Tool, ToolResult, tool
-from formup.tools.workspace import Workspace
+from formup.tools.world import Workspace
 
 START: History = (User(text="go"),)
 PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))

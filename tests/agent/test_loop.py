@@ -11,14 +11,14 @@ from formup.agent.limits import Limits
 from formup.agent.loop import run
 from formup.agent.messages import HISTORY, Call, History, Reply, Result, User, unanswered
 from formup.agent.model import Request
-from formup.agent.models.doubles import FunctionModel, ScriptedModel
 from formup.agent.outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from formup.agent.policy import Policy
-from formup.tools.doors import TOOLS
+from formup.agent.wrappers.doubles import FunctionModel, ScriptedModel
+from formup.tools.builtin import TOOLS
 from formup.tools.errors import InputError, ModelError
 from formup.tools.perception.image import picture_from_array
 from formup.tools.scene import Scene
-from formup.tools.workspace import Settings, Workspace
+from formup.tools.world import Settings, Workspace
 
 START: History = (User(text="go"),)
 ALONG: dict[str, Any] = {

@@ -9,15 +9,15 @@ import pytest
 from formup.agent.agent import Agent
 from formup.agent.loop import run
 from formup.agent.messages import Call, History, Reply, Result, User
-from formup.agent.models.doubles import ScriptedModel
 from formup.agent.outcomes import Answered, Outcome, Paused
 from formup.agent.policy import Policy
-from formup.tools.doors import TOOLS
+from formup.agent.wrappers.doubles import ScriptedModel
+from formup.tools.builtin import TOOLS
 from formup.tools.errors import InputError
 from formup.tools.perception.image import picture_from_array
 from formup.tools.scene import Scene
 from formup.tools.tool import ToolResult, tool
-from formup.tools.workspace import Settings, Workspace
+from formup.tools.world import Settings, Workspace
 
 START: History = (User(text="go"),)
 PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-PHOTOS = Path(__file__).parent.parent.parent / "evals/photos/images"
+PHOTOS = Path(__file__).parents[2] / "evals/photos/images"
 CAR_BOX = ("--box", "322,118,478,405")
 KEYS = [
     "status",

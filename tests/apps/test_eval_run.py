@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 from formup.apps.cli import app
-from formup.evals.false_blocks import PLANTED, REGRESSION, planted
-from formup.evals.journal import read_rows
-from formup.evals.obedient import DUTIES
+from formup.benchmarks.false_blocks import PLANTED, REGRESSION, planted
+from formup.evals.experiments.journal import read_rows
+from formup.evals.experiments.simulated_model import DUTIES
 from formup.prompts import PromptLibrary, load_prompt
-from formup.tools import workspace
+from formup.tools import world as workspace
 from formup.tools.errors import InputError
-from formup.tools.perception.attributes import Candidate
+from formup.tools.perception.referring.attributes import Candidate
 from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "evals"))

@@ -13,7 +13,7 @@ import pytest
 from formup.agent.agent import Agent
 from formup.agent.messages import Reply
 from formup.agent.model import Request
-from formup.agent.models.remote import RemoteModel
+from formup.agent.providers.remote import RemoteModel
 from formup.apps.main import main
 from formup.prompts import PromptLibrary, load_prompt
 from formup.prompts.release import new_draft

@@ -11,16 +11,16 @@ from typing import Any
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.messages import Call, Reply, Result, User
-from formup.agent.models.doubles import ScriptedModel
-from formup.apps.inputs import pointed
-from formup.apps.output import Folder, write_files
+from formup.agent.wrappers.doubles import ScriptedModel
+from formup.apps.arguments import pointed
+from formup.apps.run_files import Folder, write_files
 from formup.tools.draw import draw_look
 from formup.tools.errors import InputError
 from formup.tools.perception.image import load_picture
 from formup.tools.scene import Scene
 from PIL import Image, ImageChops
 
-SMARTIES = Path(__file__).parent.parent.parent / "evals/photos/images/smarties.png"
+SMARTIES = Path(__file__).parents[2] / "evals/photos/images/smarties.png"
 BLUE = (SMARTIES, "Ring the blue ball", "-n", "4")
 PROMPT = "your answer"
 person = pytest.mark.skipif(sys.platform == "win32", reason="POSIX terminals")

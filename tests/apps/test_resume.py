@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from formup.agent.trace import read_trace
+from formup.agent.store.folder import read_trace
 
-COINS = Path(__file__).parent.parent.parent / "evals/photos/images/us_coins.jpg"
+COINS = Path(__file__).parents[2] / "evals/photos/images/us_coins.jpg"
 CAGE = ("run", COINS, "Cage the largest coin", "-n", 6, "--out", "out")
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formup.agent.telemetry import environment_tracer
+from formup.agent.wrappers.telemetry import environment_tracer
 from formup.tools.errors import InputError
 from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
 from PIL import Image

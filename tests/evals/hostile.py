@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from formup.agent.agent import Agent
 from formup.agent.messages import Call, Reply
-from formup.agent.models.doubles import ScriptedModel
-from formup.evals.journal import Manifest
-from formup.evals.methods import kept_as
-from formup.evals.suites.gallery import hashed
-from formup.evals.suites.kept import KeptGoal, KeptSuite, KeptTask, KeptThing
-from formup.evals.trials import Status, Trial, TrialRow
+from formup.agent.wrappers.doubles import ScriptedModel
+from formup.evals.experiments.journal import Manifest
+from formup.evals.experiments.methods import kept_as
+from formup.evals.experiments.trials import Status, Trial, TrialRow
+from formup.evals.tasks.rendered_pictures import hashed
+from formup.evals.tasks.stored_suite import KeptGoal, KeptSuite, KeptTask, KeptThing
 from formup.tools.perception.image import load_picture
 from PIL import Image
 

@@ -4,9 +4,9 @@ import json
 from typing import Any
 
 import pytest
-from formup.evals.compare import compare
-from formup.evals.comparison import Comparison
-from formup.evals.trials import Status, TrialRow
+from formup.evals.experiments.compare import compare
+from formup.evals.experiments.comparison import Comparison
+from formup.evals.experiments.trials import Status, TrialRow
 from formup.tools.errors import InputError
 
 SUITE = "5" * 64

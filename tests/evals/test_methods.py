@@ -12,16 +12,16 @@ import pytest
 from formup.agent import agent as agent_module
 from formup.agent.messages import Call, Reply
 from formup.agent.model import Model
-from formup.agent.models.doubles import FunctionModel
-from formup.evals.executors import attempt, executor
-from formup.evals.journal import Arm, read_rows
-from formup.evals.methods import Method, SuiteWork, arm_key, method, trials_of
-from formup.evals.obedient import DUTIES, lapses_of
-from formup.evals.reference import reference
-from formup.evals.runner import run_trials
-from formup.evals.suites.gallery import hang
-from formup.evals.suites.load import load_suite, write_suite
-from formup.evals.trials import Trial, TrialRow
+from formup.agent.wrappers.doubles import FunctionModel
+from formup.evals.experiments.executors import attempt, executor
+from formup.evals.experiments.journal import Arm, read_rows
+from formup.evals.experiments.methods import Method, SuiteWork, arm_key, method, trials_of
+from formup.evals.experiments.runner import run_trials
+from formup.evals.experiments.simulated_model import DUTIES, lapses_of
+from formup.evals.experiments.trials import Trial, TrialRow
+from formup.evals.grading.reference import reference
+from formup.evals.tasks.load import load_suite, write_suite
+from formup.evals.tasks.rendered_pictures import hang
 from formup.prompts import load_prompt
 from formup.tools.errors import InputError, ModelError
 
@@ -131,7 +131,7 @@ def test_requests_to_a_model_keep_its_pace(folder: Path, monkeypatch: pytest.Mon
     async def sleep(seconds: float) -> None:
         slept.append(seconds)
 
-    monkeypatch.setattr("formup.evals.pace.asyncio.sleep", sleep)
+    monkeypatch.setattr("formup.evals.experiments.rate_limiter.asyncio.sleep", sleep)
     arm = Method("agent", "obedient", "former@v003", rate=0.01)
     work, trials = work_of(folder, arm)
     assert [work(trial).status for trial in trials[:2]] == ["pass", "pass"]

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 from formup.agent.agent import Agent
-from formup.agent.trace import read_trace
-from formup.evals.pointed import Row, evaluate
-from formup.evals.suite import load_tasks, photos_folder
+from formup.agent.store.folder import read_trace
+from formup.evals.experiments.pointed import Row, evaluate
+from formup.evals.tasks.photographs import load_tasks, photos_folder
 
 RECORDED = Path(__file__).parent.parent / "recordings"
 TASKS = {t.id: t for t in (*load_tasks(), *load_tasks(photos_folder() / "many.json"))}

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from formup.evals.executors import Executor, Pool, Ray, Serial, executor
-from formup.evals.journal import MANIFEST, ROWS, equal_lines, held, merge, read_rows
-from formup.evals.runner import Progress, Queue, balanced, part, run_trials
-from formup.evals.trials import Trial, TrialRow
+from formup.evals.experiments.executors import Executor, Pool, Ray, Serial, executor
+from formup.evals.experiments.journal import MANIFEST, ROWS, equal_lines, held, merge, read_rows
+from formup.evals.experiments.runner import Progress, Queue, balanced, part, run_trials
+from formup.evals.experiments.trials import Trial, TrialRow
 from formup.tools.errors import InputError, ModelError
 from pydantic import ValidationError
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formup.evals.grade import grade
-from formup.evals.pointed import evaluate, mode_named, one_target, summary
-from formup.evals.suite import Task, load_tasks, photos_folder
+from formup.evals.experiments.pointed import evaluate, mode_named, one_target, summary
+from formup.evals.grading.photo_rules import grade
+from formup.evals.tasks.photographs import Task, load_tasks, photos_folder
 from formup.tools.errors import InputError
 from formup.tools.geometry.outline import FloatArray
 from formup.tools.perception.image import load_picture

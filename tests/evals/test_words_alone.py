@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from formup.evals.suite import load_tasks
+from formup.evals.tasks.photographs import load_tasks
 
 
 def test_words_alone_take_the_right_thing_or_ask(tmp_path: Path) -> None:

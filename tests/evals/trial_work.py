@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from formup.evals.executors import Ray
-from formup.evals.runner import run_trials
-from formup.evals.trials import Trial, TrialRow
+from formup.evals.experiments.executors import Ray
+from formup.evals.experiments.runner import run_trials
+from formup.evals.experiments.trials import Trial, TrialRow
 from formup.tools.errors import ModelError
 
 SUITE = "a" * 64

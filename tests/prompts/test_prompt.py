@@ -145,7 +145,7 @@ def test_a_file_must_be_what_its_place_says() -> None:
 
 
 def test_the_example_of_the_docs_is_a_prompt() -> None:
-    page = (Path(__file__).parent.parent.parent / "docs/prompts.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs/prompts.md").read_text("utf-8")
     source = page.split("```\n")[1]
     prompt = parse_prompt("rough@v002", source, lambda ref: "Pixels, y down.")
     assert prompt.render() == "Draw an outline of 8 vertices. Pixels, y down.\n"

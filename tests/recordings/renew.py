@@ -14,12 +14,12 @@ from tempfile import TemporaryDirectory
 from formup.agent.agent import Agent
 from formup.agent.messages import Reply
 from formup.agent.model import Request
-from formup.agent.models.replay import ReplayModel
-from formup.agent.trace import Trace, read_trace
-from formup.evals.suite import load_tasks, photos_folder
+from formup.agent.store.folder import Trace, read_trace
+from formup.agent.wrappers.replay import ReplayModel
+from formup.evals.tasks.photographs import load_tasks, photos_folder
 from formup.tools.errors import ModelError
 from formup.tools.perception.image import load_picture
-from formup.tools.workspace import Settings
+from formup.tools.world import Settings
 
 DRAWN = Path(__file__).parent / "injected" / "images"
 TASKS = {t.id: t for t in (*load_tasks(), *load_tasks(photos_folder() / "many.json"))}

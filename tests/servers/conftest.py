@@ -20,9 +20,9 @@ import httpx
 import pytest
 from formup.agent.messages import Reply
 from formup.agent.model import Request
-from formup.agent.models.remote import RemoteModel, remote_model
+from formup.agent.providers.remote import RemoteModel, remote_model
 from formup.prompts import load_prompt
-from formup.tools.doors import TOOLS
+from formup.tools.builtin import TOOLS
 
 HERE = Path(__file__).parent
 READY_S = 300.0

@@ -5,12 +5,12 @@ from typing import Any
 import pytest
 from formup.agent.messages import User
 from formup.agent.model import Request
-from formup.agent.models.endpoint import endpoint
-from formup.agent.models.openai_chat import OpenAIChat
-from formup.agent.models.prices import UNKNOWN
-from formup.agent.models.remote import RemoteModel
-from formup.agent.models.transport import Transport
-from formup.tools.doors import TOOLS
+from formup.agent.providers.endpoint import endpoint
+from formup.agent.providers.openai_chat import OpenAIChat
+from formup.agent.providers.prices import UNKNOWN
+from formup.agent.providers.remote import RemoteModel
+from formup.agent.providers.transport import Transport
+from formup.tools.builtin import TOOLS
 from formup.tools.errors import ModelError
 
 ASKED = Request("You place robots.", (User(text="Surround the red thing"),), TOOLS)

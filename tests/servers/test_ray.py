@@ -8,9 +8,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from formup.evals.journal import equal_lines, read_rows
-from formup.evals.runner import run_trials
-from formup.evals.trials import Trial, TrialRow
+from formup.evals.experiments.journal import equal_lines, read_rows
+from formup.evals.experiments.runner import run_trials
+from formup.evals.experiments.trials import Trial, TrialRow
 
 EVALS = Path(__file__).parents[1] / "evals"
 sys.path.insert(0, str(EVALS))

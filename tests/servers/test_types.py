@@ -12,11 +12,11 @@ import httpx
 import pytest
 from formup.agent.messages import Call, Reply, Result, User
 from formup.agent.model import Request
-from formup.agent.models.anthropic import Anthropic
-from formup.agent.models.openai_chat import OpenAIChat
-from formup.agent.models.openai_responses import OpenAIResponses
-from formup.agent.models.prices import UNKNOWN
-from formup.tools.doors import TOOLS
+from formup.agent.providers.anthropic import Anthropic
+from formup.agent.providers.openai_chat import OpenAIChat
+from formup.agent.providers.openai_responses import OpenAIResponses
+from formup.agent.providers.prices import UNKNOWN
+from formup.tools.builtin import TOOLS
 from pydantic import TypeAdapter
 
 WHY = "the provider's package of types is not installed: pip install 'formup[dev]'"

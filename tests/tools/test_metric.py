@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 from formup.agent.agent import Agent
-from formup.agent.runs import load_run
-from formup.agent.task import read_task, task_text
-from formup.tools.doors import TOOLS
+from formup.agent.first_message import read_task, task_text
+from formup.agent.session import load_run
+from formup.tools.builtin import TOOLS
 from formup.tools.draw import draw_plan
 from formup.tools.draw.scale_bar import length_words, round_metres
 from formup.tools.errors import InputError, ToolError
-from formup.tools.formation.lengths import in_metres
+from formup.tools.formation.units import in_metres
 from formup.tools.perception.image import load_picture, picture_from_array
 from formup.tools.scene import Scene
 from formup.tools.store import read_stored, restore, store
-from formup.tools.workspace import Settings, Workspace
+from formup.tools.world import Settings, Workspace
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image

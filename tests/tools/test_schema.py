@@ -5,7 +5,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from formup.tools.doors import TOOLS
+from formup.tools.builtin import TOOLS
 from formup.tools.errors import ArgumentsError
 from formup.tools.tool import Tool
 

@@ -6,17 +6,17 @@ import os
 from pathlib import Path
 
 import pytest
-from formup.evals.suite import load_tasks
-from formup.tools.doors import TOOLS
+from formup.evals.tasks.photographs import load_tasks
+from formup.tools.builtin import TOOLS
 from formup.tools.errors import InputError
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import make_plan
 from formup.tools.perception.image import load_picture
 from formup.tools.scene import Scene, Target
 from formup.tools.store import read_stored, restore, store, write_whole
-from formup.tools.workspace import Settings, Workspace
+from formup.tools.world import Settings, Workspace
 
-PHOTO = Path(__file__).parent.parent.parent / "evals/photos/images/scissors_blue.jpg"
+PHOTO = Path(__file__).parents[2] / "evals/photos/images/scissors_blue.jpg"
 
 
 @pytest.fixture(scope="module")

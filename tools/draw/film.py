@@ -28,8 +28,7 @@ from .canvas import (
     Canvas,
     Colour,
 )
-from .marks import draw_outline, draw_robots, robot_size
-from .page import (
+from .captions import (
     FOOTER,
     FOOTER_HEIGHT,
     LINE,
@@ -41,6 +40,7 @@ from .page import (
     left_text,
     make_page,
 )
+from .marks import draw_outline, draw_robots, robot_size
 
 SIDE = 640
 """Greatest side of a frame, page px."""

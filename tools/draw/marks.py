@@ -12,10 +12,10 @@ from shapely.geometry import LineString, MultiLineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import ToolError
+from ..formation.checking.verdict import Part, parts_of
 from ..formation.contract import CENTRE_SHARE, OUTSIDE, Contract
-from ..formation.lengths import also_metres
-from ..formation.place import Site, reference_curve
-from ..formation.verdict import Part, parts_of
+from ..formation.placement.place import Site, reference_curve
+from ..formation.units import also_metres
 from ..geometry.curves import Curve
 from ..geometry.outline import FloatArray, Outline, distances
 from ..geometry.sampling import corner_points, nearest

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..geometry.outline import FloatArray, Outline, largest_part
 from ..geometry.sampling import nearest
-from ..perception.attributes import Candidate
+from ..perception.referring.attributes import Candidate
 from .canvas import INK, MARKS, Canvas, Colour, Labels
 from .marks import OUTLINE_DETAIL, rings
 

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ..formation.place import Site
+from ..formation.placement.place import Site
 from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
-from ..perception.attributes import Candidate
 from ..perception.image import Picture
+from ..perception.referring.attributes import Candidate
 from ..scene import Box, Scene
 from .canvas import CERTIFIED, FINDING, INK, PARTIAL, Canvas, Colour, Labels
-from .escape import draw_escape
+from .captions import draw_bars, draw_footer, make_page
+from .escape_path import draw_escape
 from .marks import (
     directions,
     draw_areas,
@@ -30,7 +31,6 @@ from .marks import (
     target_room,
 )
 from .numbered import colours_of, draw_numbered
-from .page import draw_bars, draw_footer, make_page
 from .rulers import RULER, draw_rulers
 from .scale_bar import draw_scale_bar
 from .text import drawable

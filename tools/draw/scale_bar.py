@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from .canvas import PAPER, Canvas
-from .page import FOOTER, PAD, footer_middle
+from .captions import FOOTER, PAD, footer_middle
 
 LONGEST = 0.18
 """Of the photograph's width, at most."""

@@ -12,9 +12,9 @@ from io import BytesIO
 import numpy as np
 
 from ..formation.plan import Plan
-from ..perception.attributes import Candidate
 from ..perception.image import Picture
-from ..perception.prompts import Point
+from ..perception.referring.attributes import Candidate
+from ..perception.target_prompt import Point
 from ..scene import Box, Scene
 from .canvas import WHITE, Canvas, Labels
 from .overlay import draw_scene

@@ -6,13 +6,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from ..errors import FleetError, ToolError
-from ..formation.assignment import assign
-from ..formation.check import certify
+from ..formation.checking.check import certify
 from ..formation.contract import with_defaults
-from ..formation.motion import obstacles, routes
-from ..formation.place import Site
+from ..formation.placement.place import Site
 from ..formation.plan import Plan, Point
+from ..geometry.assignment import assign
 from ..geometry.outline import FloatArray, distances
+from ..motion.motion import obstacles, routes
 
 CORRECTIONS = 5
 ARRIVED_SHARE, ARRIVED_PX = 0.001, 0.5

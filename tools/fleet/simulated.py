@@ -8,12 +8,12 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import InputError
 from ..formation.contract import MIN_SPACING
-from ..formation.motion import along
-from ..formation.place import Site
+from ..formation.placement.place import Site
 from ..geometry.curves import Curve, Frame
 from ..geometry.interior import inside
 from ..geometry.outline import FloatArray, distances, largest_part, outline_of
 from ..geometry.sampling import along_curve
+from ..motion.motion import along
 
 MAX_ROBOTS = 1_000
 """Above this, motion and its animation are not simulated yet."""

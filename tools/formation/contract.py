@@ -17,10 +17,10 @@ from pydantic import (
 )
 
 from ..errors import InputError
-from ..geometry.letters import letter_strokes
+from ..geometry.figures.letters import letter_strokes
+from ..geometry.figures.shapes import Kind
+from ..geometry.figures.typeface import letter_outlines
 from ..geometry.outline import Outline
-from ..geometry.shapes import Kind
-from ..geometry.typeface import letter_outlines
 from .value import Value
 
 MAX_ROBOTS = 10_000

@@ -15,11 +15,11 @@ from pydantic import BaseModel, ConfigDict
 
 from ..errors import ToolError
 from ..geometry.outline import FloatArray
-from .check import certify
+from .checking.check import certify
+from .checking.verdict import Verdict
 from .contract import Contract, Group, with_defaults
-from .place import Site, place
+from .placement.place import Site, place
 from .value import Value
-from .verdict import Verdict
 
 DECIMALS = 3
 """Positions are rounded to this many places of a pixel before they are certified."""

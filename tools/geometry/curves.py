@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiLineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from .outline import WALKED, FloatArray, Outline, distances, largest_part, nearest_segments
+from .outline import (
+    WALKED,
+    FloatArray,
+    Outline,
+    distances,
+    largest_part,
+    nearest_segments,
+)
 
 
 def round_join_dip(quad_segments: int) -> float:

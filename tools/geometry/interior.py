@@ -13,7 +13,14 @@ from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 from .curves import interpolate, round_join_dip
-from .lattice import ALL_PHASES, Lattice, ideal_pitch, lattice_points, most, widest
+from .lattice import (
+    ALL_PHASES,
+    Lattice,
+    ideal_pitch,
+    lattice_points,
+    most,
+    widest,
+)
 from .lloyd import MAX_CELLS, cells_of, grid, relax
 from .outline import FloatArray, Outline, largest_part, rectangle_of
 from .sampling import min_spacing, nearest, open_points, spread_subset

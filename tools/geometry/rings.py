@@ -10,7 +10,14 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 
-from .curves import QUAD_SEGMENTS, ROUND_JOIN_DIP, Curve, Frame, interpolate, ring
+from .curves import (
+    QUAD_SEGMENTS,
+    ROUND_JOIN_DIP,
+    Curve,
+    Frame,
+    interpolate,
+    ring,
+)
 from .outline import FloatArray, Outline
 from .sampling import PHASES, along_curve, nearest, split
 

@@ -9,11 +9,11 @@ from formup.tools.errors import FleetError, InputError, ToolError
 from formup.tools.fleet.deploy import Arrival, deploy
 from formup.tools.fleet.simulated import SimulatedFleet, checked_starts, spread_starts
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.motion import obstacles
-from formup.tools.formation.place import Site
+from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import FloatArray, make_outline
 from formup.tools.geometry.sampling import min_spacing
+from formup.tools.motion.motion import obstacles
 
 CUP = [(200, 150), (240, 150), (240, 270), (380, 270), (380, 150), (420, 150), (420, 330),
        (200, 330)]  # fmt: skip
@@ -80,7 +80,7 @@ def test_an_assignment_says_what_it_may_have_left_to_save_only_if_it_is_approxim
 ) -> None:
     arrival, _ = driven(planned(GROUPS[0]))
     assert arrival.assignment_gap is None
-    monkeypatch.setattr("formup.tools.formation.assignment.EXACT", 5)
+    monkeypatch.setattr("formup.tools.geometry.assignment.EXACT", 5)
     again, _ = driven(planned(GROUPS[0]))
     assert again.assignment_gap == pytest.approx(0, abs=1e-9)  # found the optimum all the same
     assert again.robots == arrival.robots

@@ -8,9 +8,9 @@ import pytest
 import shapely
 from formup.tools.errors import InputError, ToolError
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.place import Site
+from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import Plan, make_plan
-from formup.tools.geometry.cages import cage
+from formup.tools.geometry.cages.cages import cage
 from formup.tools.geometry.outline import FloatArray, Outline, make_outline
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -6,9 +6,9 @@ import sys
 import numpy as np
 import pytest
 from formup.tools.errors import FormupError
-from formup.tools.formation.check import certify
+from formup.tools.formation.checking.check import certify
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.place import Site
+from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import DECIMALS, Formation, Plan, make_plan, scene_version
 from formup.tools.geometry.outline import make_outline
 from hypothesis import given, settings
@@ -18,7 +18,7 @@ SITE = Site({"t1": make_outline([(100, 100), (223, 110), (210, 220), (95, 190)])
 AROUND = Contract(groups=(Group(relation="around", targets=("t1",), robots=7),), robot_radius=2)
 BUILD = """
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.place import Site
+from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import make_plan
 from formup.tools.geometry.outline import make_outline
 site = Site({"t1": make_outline([(100, 100), (223, 110), (210, 220), (95, 190)])}, 400, 300)

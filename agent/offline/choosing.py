@@ -1,0 +1,233 @@
+"""From the words for a thing to one candidate: what to ask the tools, and when to ask the person.
+
+A thing is taken only where measures single it out; else the person chooses among numbered
+candidates. What was asked and answered is read from the history, so nothing is kept here.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ...tools.perception.referring.query import SINGLE
+from ..messages import Call, History, Reply, Result, User
+from .descriptions import Reference
+from .phrases import table
+
+CROWDED, FAINT = 20, 0.6
+"""More things than this, or fainter ones, are rather patches than what people speak of."""
+MOST_ASKED = 24
+"""Candidates that one question offers: more cannot be told apart on a picture."""
+MOST_QUOTED = 40
+"""Characters of an answer that a question repeats."""
+POINT = "point at it with --point X,Y, --box X0,Y0,X1,Y1 or --outline X1,Y1,X2,Y2,..."
+
+
+@dataclass(frozen=True)
+class Found:
+    """The candidate that is meant, the words for it and the numbers that say so."""
+
+    candidate: str
+    said: str
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Step:
+    """The call that has to come first."""
+
+    name: str
+    arguments: dict[str, Any]
+
+
+def find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
+    """The candidates meant, as many as are needed, or what to do to learn them.
+
+    A question that is asked again says that the answer chose nothing.
+    """
+    found = _find(things, needed, history)
+    asked = [c for c in _calls(history) if c.name == "ask_user" and c.arguments.get("candidates")]
+    if isinstance(found, list) or found.name != "ask_user" or not asked:
+        return found
+    answer = next((m.text for m in history if _answers(m, asked[-1])), "")
+    question = f'"{answer[:MOST_QUOTED]}" chooses none of them. {found.arguments["question"]}'
+    return Step(found.name, found.arguments | {"question": question})
+
+
+def _find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
+    chosen = [Found(name, "the chosen thing", ()) for name in chosen_candidates(history, needed)]
+    if len(chosen) >= needed:
+        return chosen[:needed]
+    if needed == 2 and len(things) == 1 and things[0].plural and not chosen:
+        return _pair(things[0], history)
+    if len(things) > needed:
+        named = " or ".join(f'"{t.said}"' for t in things)
+        return _ask_all(f"Which thing is the arrangement about: {named}?", history)
+    found: list[Found] = []
+    for thing in things[: needed - len(chosen)] if not chosen else ():
+        one = _one(thing, history)
+        if isinstance(one, Step):
+            return one
+        found.append(one)
+    if len(found) == needed:
+        return found
+    which = "Which thing is meant?" if needed == 1 else "Which two things are meant?"
+    return _ask_all(f"{which} The words name none that can be found by its look.", history)
+
+
+def chosen_candidates(history: History, needed: int) -> list[str]:
+    """Candidates that the person chose among those offered, in order.
+
+    An answer that names more than are needed, or says which it is not, chooses nothing.
+    """
+    chosen: list[str] = []
+    for call in _calls(history):
+        if call.name == "ask_user" and call.arguments.get("candidates"):
+            answer = next((m.text for m in history if _answers(m, call)), "").lower()
+            numbers = re.findall(r"(?<![-.\w])c?([0-9]{1,4})(?!\.?[0-9])\b", answer)
+            offered = [f"c{n}" for n in numbers if f"c{n}" in call.arguments["candidates"]]
+            named = list(dict.fromkeys([*chosen, *offered]))
+            if len(named) <= needed and not _excludes(answer):
+                chosen = named
+    return chosen
+
+
+def _excludes(answer: str) -> bool:
+    words = set(re.findall(r"[a-z']+", answer))
+    return bool(words & {*table()["blockers"], *table()["differences"]["negation"]})
+
+
+def _answers(message: User | Reply | Result, call: Call) -> bool:
+    return isinstance(message, Result) and message.call_id == call.id
+
+
+def _one(thing: Reference, history: History) -> Found | Step:
+    """The one candidate a description means, or what to do to learn it."""
+    trouble = _trouble(thing)
+    if trouble:
+        return _ask_all(trouble, history)
+    query = thing.whole_query
+    reply = _located(query, history)
+    if reply is None:
+        return Step("locate_object", {"query": query})
+    matches = reply["candidates"]
+    alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and _is_told(thing))
+    if reply["settled"] and (alone or not _says_little(thing, _is_clear(reply))):
+        return Found(matches[0]["id"], thing.said, tuple(matches[0].get("reasons", ())))
+    if matches:
+        why = reply["doubt"] or f"{_listed(matches)} may be meant"
+        return _ask(f'Which one is "{thing.said}"? {_sentence(why)}', matches)
+    if reply["absent"] and query == thing.query and not thing.unknown:
+        reason = f'"{thing.said}" is not in the picture: {reply["lacking"]}.'
+        return Step("report_impossible", {"reason": reason})
+    why = reply["lacking"] or reply["doubt"]
+    return _ask_all(f'Which one is "{thing.said}"? {_sentence(why)}', history)
+
+
+def _pair(thing: Reference, history: History) -> list[Found] | Step:
+    """The two things that a plural means."""
+    query = {"count": 2} | thing.whole_query
+    reply = _located(query, history)
+    if reply is None:
+        return Step("locate_object", {"query": query})
+    matches = reply["candidates"]
+    if len(matches) == 2 and thing.noun and not thing.refused:
+        return [Found(m["id"], thing.said, tuple(m.get("reasons", ()))) for m in matches]
+    return _ask_all(f'Which two are "{thing.said}"?', history)
+
+
+def _trouble(thing: Reference) -> str:
+    """Why a description cannot be decided on measures at all, as a question."""
+    if thing.plural:
+        return f'Which one of "{thing.said}"? Robots are placed about one thing at a time.'
+    if thing.refused or (not thing.noun and not thing.query):
+        words = thing.refused or thing.said
+        return (
+            f'Which one is "{thing.said}"? The offline rules know things by colour, shape, size '
+            f'and place only, and do not know "{words}".'
+        )
+    return ""
+
+
+def _is_told(thing: Reference) -> bool:
+    """Whether the words fit what stands out most for what it is, not for its place among others.
+
+    Who adds words nobody understands sees several; of a kind that nothing measures, what is the
+    second from the left or the largest may be of another kind.
+    """
+    if not thing.query:
+        return not thing.unknown and bool(thing.whole_query)
+    ranks_alone = set(thing.query) == {"picks"} and _ranked(thing)
+    return not (ranks_alone and thing.weak and thing.whole_query == thing.query)
+
+
+def _ranked(thing: Reference) -> bool:
+    return any(p["by"] not in SINGLE for p in thing.query.get("picks", ()))
+
+
+def _is_clear(reply: dict[str, Any]) -> bool:
+    """Whether the match stands out in a picture that is not full of patches."""
+    return reply["things"] <= CROWDED and reply["candidates"][0]["salience"] >= FAINT
+
+
+def _says_little(thing: Reference, clear: bool) -> bool:
+    """Whether a noun that measures cannot tell would decide it, alone or by a rank among its kind.
+
+    A rank among mugs is none among all things, and a full picture of patches settles no rank.
+    Such a thing must be the only one, or fit the noun as the one that stands out most.
+    """
+    if thing.unknown and not thing.query:
+        return True
+    ranked = _ranked(thing)
+    if thing.noun in ("any", ""):
+        return not thing.query or (ranked and not clear)
+    nouns = {name for name in thing.whole_query if name not in thing.query}
+    unmeasured = thing.noun != "shape" and nouns <= {"colours", "shade"}  # not all blue is pond
+    loose = unmeasured or not clear
+    return (thing.weak and not thing.query) or (loose and ranked)
+
+
+def _ask(question: str, matches: Sequence[dict[str, Any]]) -> Step:
+    ids = [m["id"] for m in matches[:MOST_ASKED]]
+    hint = f"Answer with its number, or --target {ids[0]}" if ids else POINT.capitalize()
+    return Step("ask_user", {"question": f"{question} {hint}.", "candidates": ids})
+
+
+def _ask_all(question: str, history: History) -> Step:
+    """The question with all that stands out in the picture."""
+    reply = _located(None, history)
+    if reply is None:
+        return Step("locate_object", {})
+    return _ask(question, reply["candidates"])
+
+
+def _located(query: dict[str, Any] | None, history: History) -> dict[str, Any] | None:
+    """What locate_object answered to a query, if it was asked."""
+    for call in _calls(history):
+        if call.name == "locate_object" and call.arguments.get("query") == query:
+            result = next(m for m in history if isinstance(m, Result) and m.call_id == call.id)
+            return json.loads(result.text)
+    return None
+
+
+def located_reasons(history: History) -> dict[str, list[str]]:
+    """Why each candidate matched what was asked for, by id."""
+    found: dict[str, list[str]] = {}
+    for message in history:
+        if isinstance(message, Result) and message.name == "locate_object" and not message.error:
+            for candidate in json.loads(message.text).get("candidates", ()):
+                found[candidate["id"]] = candidate.get("reasons", [])
+    return found
+
+
+def _calls(history: History) -> list[Call]:
+    return [call for m in history if isinstance(m, Reply) for call in m.calls]
+
+
+def _listed(matches: Sequence[dict[str, Any]]) -> str:
+    return ", ".join(m["id"] for m in matches[:5])
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:].rstrip(".") + "." if text else ""

@@ -1,0 +1,1 @@
+"""Language models by name: OpenAI, Anthropic, Gemini, Ollama, and servers that speak their APIs."""

@@ -1,0 +1,239 @@
+"""Anthropic Messages, with its marks for prompt caching."""
+
+import io
+from functools import lru_cache
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from ...tools.tool import Tool
+from ..messages import Reply, Result, Usage, User
+from ..model import Request
+from .failures import cut_off, empty, foreign, refused
+from .prices import Price
+from .wire import (
+    Once,
+    Wire,
+    base64_text,
+    count,
+    dumped,
+    make_calls,
+    media_type,
+    safe_name,
+)
+
+VERSION = "2023-06-01"
+MAX_TOKENS = 8_192
+"""Of one reply; the interface wants a bound, and this is the least of the current models'."""
+CACHED_TURNS = 2
+"""The last turn's mark writes the cache for the next request, the one before reads it."""
+_MARK = b',"cache_control":{"type":"ephemeral"}}'
+
+
+class _Block(BaseModel):
+    type: str
+    text: str | None = None
+    id: str | None = None
+    name: str | None = None
+    input: Any = None
+
+
+class _Message(BaseModel):
+    content: list[_Block]
+    stop_reason: str | None = None
+    usage: Any = None
+
+
+class Anthropic(Wire):
+    """Speaks Messages.
+
+    Args:
+        model: as the server calls it.
+        price: of its tokens.
+    """
+
+    def __init__(self, model: str, price: Price) -> None:
+        self._model, self.price = dumped(model), price
+        self._blocks = Once(_blocks)
+
+    def path(self, *, stream: bool) -> str:
+        """What follows the base URL."""
+        return "/v1/messages"
+
+    def headers(self, key: str | None) -> dict[str, str]:
+        """The version of the interface, and the key where there is one."""
+        return {"anthropic-version": VERSION} | ({"x-api-key": key} if key else {})
+
+    def body(self, request: Request, *, stream: bool) -> bytes:
+        """A request as JSON."""
+        parts = [b'{"model":', self._model, b',"max_tokens":%d' % MAX_TOKENS]
+        if request.system:
+            parts += [b',"system":[', _marked(_text(request.system)), b"]"]
+        if request.tools:
+            # Tools come before the system prompt in the cache, so that its mark covers both.
+            parts += [b',"tools":[', _tools(request.tools, not request.system), b"]"]
+        parts += [b',"messages":[', self._turns(request), b"]"]
+        if stream:
+            parts.append(b',"stream":true')
+        return b"".join([*parts, b"}"])
+
+    def reading(self, request: Request) -> "_Reading":
+        """How the answer to a request is read."""
+        return _Reading(request, self.price)
+
+    def _turns(self, request: Request) -> bytes:
+        """Messages by turns: results and what a person says belong to the same one."""
+        turns: list[tuple[bytes, list[bytes]]] = []
+        for message in request.messages:
+            role, blocks = self._blocks(message)
+            if not blocks:
+                continue
+            if turns and turns[-1][0] == role:
+                turns[-1][1].append(blocks)
+            else:
+                turns.append((role, [blocks]))
+        for _, blocks in [turn for turn in turns if turn[0] == b"user"][-CACHED_TURNS:]:
+            blocks[-1] = _marked(blocks[-1])
+        return b",".join(
+            [b'{"role":"%b","content":[%b]}' % (role, b",".join(blocks)) for role, blocks in turns]
+        )
+
+
+class _Reading:
+    def __init__(self, request: Request, price: Price) -> None:
+        self._request, self._price = request, price
+
+    def assembly(self) -> "_Assembly":
+        return _Assembly()
+
+    def reply(self, data: Any) -> Reply:
+        try:
+            message = _Message.model_validate(data)
+        except ValidationError:
+            raise foreign("something that is no message") from None
+        text = "".join(b.text or "" for b in message.content if b.type == "text").strip()
+        if message.stop_reason == "refusal":
+            raise refused(text)
+        if message.stop_reason == "max_tokens":
+            raise cut_off(MAX_TOKENS)
+        if message.stop_reason == "model_context_window_exceeded":
+            raise cut_off()
+        written = [(b.id, b.name or "", b.input) for b in message.content if b.type == "tool_use"]
+        if not text and not written:
+            raise empty()
+        calls = make_calls(written, self._request.messages)
+        return Reply(text=text, calls=calls, usage=_usage(message.usage, self._price))
+
+
+class _Assembly:
+    def __init__(self) -> None:
+        self.done = False
+        self._blocks: dict[int, _Block] = {}
+        self._texts: dict[int, io.StringIO] = {}
+        self._inputs: dict[int, io.StringIO] = {}
+        self._stop: str | None = None
+        self._usage: dict[str, Any] = {}
+
+    def add(self, event: Any) -> str:
+        # Read by hand: there are hundreds of these a reply. What they make up is validated whole.
+        try:
+            return self._take(event)
+        except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
+            raise foreign("a stream of something else than messages") from None
+
+    def whole(self) -> Any:
+        content: list[dict[str, Any]] = []
+        for index, block in sorted(self._blocks.items()):
+            streamed, given = self._texts.get(index), self._inputs.get(index)
+            text = (block.text or "") + (streamed.getvalue() if streamed else "")
+            # What was streamed as text stays text: only a complete reply is read.
+            written = block.input if given is None else given.getvalue()
+            content.append(block.model_dump() | {"text": text, "input": written})
+        return {"content": content, "stop_reason": self._stop, "usage": self._usage}
+
+    def _take(self, event: dict[str, Any]) -> str:
+        kind, index = event["type"], int(event.get("index") or 0)
+        if not isinstance(kind, str):
+            raise TypeError
+        delta: dict[str, Any] = event.get("delta") or {}
+        if kind == "content_block_delta":
+            text, written = delta.get("text") or "", delta.get("partial_json") or ""
+            self._texts.setdefault(index, io.StringIO()).write(text)
+            if written:
+                self._inputs.setdefault(index, io.StringIO()).write(written)
+            return text
+        if kind == "content_block_start":
+            self._blocks[index] = _Block.model_validate(event["content_block"])
+        message: dict[str, Any] = event.get("message") or {}
+        for owner in (message, event):
+            usage: dict[str, Any] = owner.get("usage") or {}
+            self._usage |= {k: v for k, v in usage.items() if v is not None}
+        self._stop = delta.get("stop_reason") or self._stop
+        self.done = self.done or self._stop is not None or kind == "message_stop"
+        return ""
+
+
+def _usage(usage: Any, price: Price) -> Usage:
+    fresh, output = count(usage, "input_tokens"), count(usage, "output_tokens")
+    cached = count(usage, "cache_read_input_tokens")
+    written = count(usage, "cache_creation_input_tokens")
+    cost = price.cost(fresh=fresh, cached=cached, written=written, output=output)
+    return Usage(
+        input_tokens=fresh + cached + written,
+        cached_tokens=cached,
+        output_tokens=output,
+        cost_usd=cost,
+    )
+
+
+def _blocks(message: User | Reply | Result) -> tuple[bytes, bytes]:
+    """Role and blocks of a message; none where it says nothing, for empty ones are refused."""
+    if isinstance(message, Reply):
+        uses = [
+            dumped(
+                {
+                    "type": "tool_use",
+                    "id": safe_name(call.id),
+                    "name": safe_name(call.name),
+                    "input": call.arguments,
+                }
+            )
+            for call in message.calls
+        ]
+        said = [_text(message.text)] if message.text.strip() else []
+        return b"assistant", b",".join([*said, *uses])
+    said = [_text(message.text)] if message.text.strip() else []
+    shown = [_image(image) for image in message.images]
+    if isinstance(message, User):
+        return b"user", b",".join([*shown, *said])
+    return b"user", _result(message, b",".join([*said, *shown]))
+
+
+def _result(result: Result, content: bytes) -> bytes:
+    head = {"type": "tool_result", "tool_use_id": safe_name(result.call_id)}
+    if result.error:
+        head |= {"is_error": True}
+    return dumped(head)[:-1] + b',"content":[' + content + b"]}"
+
+
+def _text(text: str) -> bytes:
+    return dumped({"type": "text", "text": text})
+
+
+def _image(image: bytes) -> bytes:
+    source = {"type": "base64", "media_type": media_type(image), "data": base64_text(image)}
+    return dumped({"type": "image", "source": source})
+
+
+def _marked(blocks: bytes) -> bytes:
+    """Blocks with a cache mark in the last of them."""
+    return blocks[:-1] + _MARK
+
+
+@lru_cache(maxsize=16)
+def _tools(tools: tuple[Tool, ...], marked: bool) -> bytes:
+    listed = [
+        {"name": t.name, "description": t.description, "input_schema": t.offered} for t in tools
+    ]
+    written = b",".join(dumped(tool) for tool in listed)
+    return _marked(written) if marked else written

@@ -1,0 +1,309 @@
+"""Google Gemini's generateContent, with the thought signatures it wants back.
+
+A signature belongs to the part it came with, and a signed part must not be joined to another: so a
+reply that holds one is kept, and sent back, part by part.
+"""
+
+import re
+from functools import lru_cache
+from typing import Any
+from urllib.parse import quote
+
+from pydantic import BaseModel, ValidationError
+
+from ...tools.tool import Tool
+from ..messages import Call, Opaque, Reply, Result, Usage, User
+from ..model import Request
+from .failures import AskError, cut_off, empty, foreign, refused
+from .prices import Price
+from .wire import (
+    Once,
+    Wire,
+    base64_text,
+    count,
+    dumped,
+    make_calls,
+    media_type,
+)
+
+UNSIGNED = "skip_thought_signature_validator"
+"""What Google documents as the signature of calls that the model did not make itself."""
+_WANTS_SIGNATURES = re.compile(r"(models/)?gemini-(?![12]\b)")
+"""Since Gemini 3 the first call of a reply must be signed."""
+_CUT_OFF = {"MAX_TOKENS", "CONTINUATION"}
+_REFUSED = {
+    "BLOCKLIST",
+    "ESCALATION",
+    "IMAGE_PROHIBITED_CONTENT",
+    "IMAGE_RECITATION",
+    "IMAGE_SAFETY",
+    "LANGUAGE",
+    "MODEL_ARMOR",
+    "PROHIBITED_CONTENT",
+    "PUP_LIMITED_DISABLED",
+    "RECITATION",
+    "SAFETY",
+    "SPII",
+}
+_KEYS = {"candidates", "promptFeedback", "usageMetadata"}
+
+
+class _Function(BaseModel):
+    id: str | None = None
+    name: str | None = None
+    args: Any = None
+
+
+class _Part(BaseModel):
+    text: str | None = None
+    thought: bool | None = None
+    thoughtSignature: str | None = None  # noqa: N815
+    functionCall: _Function | None = None  # noqa: N815
+
+
+class _Content(BaseModel):
+    parts: list[_Part] | None = None
+
+
+class _Candidate(BaseModel):
+    content: _Content | None = None
+    finishReason: str | None = None  # noqa: N815
+    finishMessage: str | None = None  # noqa: N815
+
+
+class _Feedback(BaseModel):
+    blockReason: str | None = None  # noqa: N815
+    blockReasonMessage: str | None = None  # noqa: N815
+
+
+class _Response(BaseModel):
+    candidates: list[_Candidate] | None = None
+    promptFeedback: _Feedback | None = None  # noqa: N815
+    usageMetadata: Any = None  # noqa: N815
+
+
+class Gemini(Wire):
+    """Speaks generateContent.
+
+    Args:
+        model: as the server calls it.
+        price: of its tokens.
+    """
+
+    def __init__(self, model: str, price: Price) -> None:
+        self._name, self.price = f"gemini:{model}", price
+        self._resource = quote(model if "/" in model else f"models/{model}")
+        self._signs = _WANTS_SIGNATURES.match(model) is not None
+        self._turns = Once(self._turn)
+
+    def path(self, *, stream: bool) -> str:
+        """What follows the base URL."""
+        method = "streamGenerateContent?alt=sse" if stream else "generateContent"
+        return f"/v1beta/{self._resource}:{method}"
+
+    def headers(self, key: str | None) -> dict[str, str]:
+        """The key, where there is one; not in the URL, for URLs are logged."""
+        return {"x-goog-api-key": key} if key else {}
+
+    def body(self, request: Request, *, stream: bool) -> bytes:
+        """A request as JSON."""
+        parts = [b"{"]
+        if request.system:
+            parts += [b'"systemInstruction":{"parts":[', dumped({"text": request.system}), b"]},"]
+        if request.tools:
+            parts += [b'"tools":', _tools(request.tools), b","]
+        return b"".join([*parts, b'"contents":[', self._contents(request), b"]}"])
+
+    def reading(self, request: Request) -> "_Reading":
+        """How the answer to a request is read."""
+        return _Reading(request, self._name, self.price)
+
+    def _contents(self, request: Request) -> bytes:
+        """Messages by turns: all results of one reply belong to the same."""
+        turns: list[tuple[bytes, list[bytes]]] = []
+        before: User | Reply | Result | None = None
+        for message in request.messages:
+            role, parts = self._turns(message)
+            if not parts:
+                continue
+            if isinstance(message, Result) and isinstance(before, Result):
+                turns[-1][1].append(parts)
+            else:
+                turns.append((role, [parts]))
+            before = message
+        return b",".join(
+            b'{"role":"%b","parts":[%b]}' % (role, b",".join(parts)) for role, parts in turns
+        )
+
+    def _turn(self, message: User | Reply | Result) -> tuple[bytes, bytes]:
+        """Role and parts of a message; none where it says nothing, for empty ones are refused."""
+        if isinstance(message, Reply):
+            return b"model", b",".join(map(dumped, self._model_parts(message)))
+        shown = [_image(image) for image in message.images]
+        if isinstance(message, User):
+            said = [{"text": message.text}] if message.text.strip() else []
+            return b"user", b",".join(map(dumped, [*shown, *said]))
+        answer = {
+            "id": message.call_id,
+            "name": _function_name(message.name),
+            "response": {"error" if message.error else "output": message.text},
+        }
+        # Within a functionResponse only some models take images; beside it, all that see.
+        return b"user", b",".join(map(dumped, [{"functionResponse": answer}, *shown]))
+
+    def _model_parts(self, reply: Reply) -> list[dict[str, Any]]:
+        if reply.opaque and reply.opaque.model == self._name:
+            return list(reply.opaque.items)
+        said = [{"text": reply.text}] if reply.text.strip() else []
+        calls: list[dict[str, Any]] = [
+            {
+                "functionCall": {
+                    "id": call.id,
+                    "name": _function_name(call.name),
+                    "args": call.arguments,
+                }
+            }
+            for call in reply.calls
+        ]
+        if calls and self._signs:
+            calls[0]["thoughtSignature"] = UNSIGNED
+        return [*said, *calls]
+
+
+class _Reading:
+    def __init__(self, request: Request, name: str, price: Price) -> None:
+        self._request, self._name, self._price = request, name, price
+
+    def assembly(self) -> "_Assembly":
+        return _Assembly()
+
+    def reply(self, data: Any) -> Reply:
+        try:
+            response = _Response.model_validate(data)
+        except ValidationError:
+            raise foreign("something that is no content of Gemini's") from None
+        if not response.candidates:
+            raise _nothing(data, response.promptFeedback)
+        candidate = response.candidates[0]
+        _check_end(candidate)
+        parts = candidate.content.parts or [] if candidate.content else []
+        text = "".join(part.text or "" for part in parts if not part.thought).strip()
+        made = [part.functionCall for part in parts if part.functionCall is not None]
+        if not text and not made:
+            raise empty()
+        calls = make_calls([(f.id, f.name or "", f.args) for f in made], self._request.messages)
+        opaque = None
+        if any(part.thoughtSignature for part in parts):
+            written = data["candidates"][0]["content"]["parts"]
+            opaque = Opaque(model=self._name, items=_with_ids(written, calls))
+        usage = _usage(response.usageMetadata, self._price)
+        return Reply(text=text, calls=calls, usage=usage, opaque=opaque)
+
+
+class _Assembly:
+    def __init__(self) -> None:
+        self.done = False
+        self._parts: list[dict[str, Any]] = []
+        self._text: list[str] = []
+        self._whole: dict[str, Any] = {}
+        self._end: dict[str, Any] | None = None
+
+    def add(self, event: Any) -> str:
+        try:
+            return self._add(event)
+        except (TypeError, AttributeError, LookupError):
+            raise foreign("a stream of something else than Gemini's contents") from None
+
+    def whole(self) -> Any:
+        self._close_text()
+        if self._end is None:
+            return self._whole
+        return self._whole | {"candidates": [self._end | {"content": {"parts": self._parts}}]}
+
+    def _add(self, event: dict[str, Any]) -> str:
+        known = {key: event[key] for key in event.keys() & _KEYS if event[key] is not None}
+        if not known:
+            raise KeyError
+        candidates = known.pop("candidates", None)
+        self._whole |= known
+        self.done = self.done or bool(known.get("promptFeedback", {}).get("blockReason"))
+        if not candidates:
+            return ""
+        first: dict[str, Any] = candidates[0]
+        end = {key: first.get(key) for key in ("finishReason", "finishMessage")}
+        self._end = (self._end or {}) | {key: value for key, value in end.items() if value}
+        self.done = self.done or bool(self._end.get("finishReason"))
+        content: dict[str, Any] = first.get("content") or {}
+        return "".join([self._take(part) for part in content.get("parts") or ()])
+
+    def _take(self, part: dict[str, Any]) -> str:
+        if part.keys() == {"text"}:
+            self._text.append(part["text"])
+        else:
+            self._close_text()
+            self._parts.append(part)
+        return "" if part.get("thought") else part.get("text") or ""
+
+    def _close_text(self) -> None:
+        if self._text:
+            self._parts.append({"text": "".join(self._text)})
+            self._text = []
+
+
+def _nothing(data: Any, feedback: _Feedback | None) -> AskError:
+    """What a body without candidates means."""
+    if feedback and feedback.blockReason:
+        return refused(feedback.blockReasonMessage or feedback.blockReason)
+    if any(data.get(key) is not None for key in _KEYS):
+        return empty()
+    return foreign("something that is no content of Gemini's")
+
+
+def _check_end(candidate: _Candidate) -> None:
+    reason = candidate.finishReason or "STOP"
+    if reason in _CUT_OFF:
+        raise cut_off()
+    if reason in _REFUSED:
+        raise refused(candidate.finishMessage or reason)
+    if reason not in ("STOP", "FINISH_REASON_UNSPECIFIED"):
+        # MALFORMED_FUNCTION_CALL above all: the model wrote a call that is none.
+        what = f"broke its reply off ({reason})"
+        raise AskError(what, "try again, or use another model", "unless-same")
+
+
+def _with_ids(parts: list[dict[str, Any]], calls: tuple[Call, ...]) -> tuple[dict[str, Any], ...]:
+    """Parts whose calls have the ids that their results will name: some models give none."""
+    ids = iter(calls)
+    return tuple(
+        part | {"functionCall": part["functionCall"] | {"id": next(ids).id}}
+        if part.get("functionCall") is not None
+        else part
+        for part in parts
+    )
+
+
+def _usage(usage: Any, price: Price) -> Usage:
+    given = count(usage, "promptTokenCount")
+    cached = min(given, count(usage, "cachedContentTokenCount"))
+    # Thoughts are billed as output and not among the candidates' tokens.
+    written = count(usage, "candidatesTokenCount") + count(usage, "thoughtsTokenCount")
+    cost = price.cost(fresh=given - cached, cached=cached, output=written)
+    return Usage(input_tokens=given, cached_tokens=cached, output_tokens=written, cost_usd=cost)
+
+
+def _function_name(name: str) -> str:
+    """A name that Gemini takes; what it takes stays, for results must name calls to the letter."""
+    return re.sub(r"[^a-zA-Z0-9_.:-]", "_", name)[:64] or "unnamed"
+
+
+def _image(image: bytes) -> dict[str, Any]:
+    return {"inlineData": {"mimeType": media_type(image), "data": base64_text(image)}}
+
+
+@lru_cache(maxsize=16)
+def _tools(tools: tuple[Tool, ...]) -> bytes:
+    declared = [
+        {"name": t.name, "description": t.description, "parametersJsonSchema": t.offered}
+        for t in tools
+    ]
+    return dumped([{"functionDeclarations": declared}])

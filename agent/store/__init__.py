@@ -1,0 +1,1 @@
+"""Where conversations are stored: append-only logs of numbered events, and files by hash."""

@@ -1,0 +1,108 @@
+"""Two models as one: the first sees and says what is meant, the second plans without a picture.
+
+That is the paper's way: a vision model gives the object of interest O and the pattern instruction
+PI, another model makes the formation of the edges and PI. Which of them is asked next follows from
+the history alone, so that a run can be resumed and replayed like any other.
+"""
+
+import json
+
+from ...prompts import Prompt
+from ...tools.builtin import TOOLS
+from ...tools.tool import Tool
+from ..messages import History, Reply, Result, User
+from ..model import Model, Request
+
+STANDARD = frozenset(tool.name for tool in TOOLS)
+
+
+def offered(tools: tuple[Tool, ...], prompt: Prompt | None) -> tuple[Tool, ...]:
+    """The tools a prompt wants its model to be told of; those it does not know are kept."""
+    if prompt is None or not prompt.tools:
+        return tools
+    return tuple(t for t in tools if t.name in prompt.tools or t.name not in STANDARD)
+
+
+class TwoStages:
+    """A model that looks, and one that plans once everything meant is measured.
+
+    Args:
+        looker: is given the picture.
+        planner: is given what the person said, the pattern, and what was measured; no pictures.
+        look: the looker's prompt.
+        plan: the planner's prompt.
+        repair: the planner's prompt where what it proposed last is not certified.
+    """
+
+    sees = True
+
+    def __init__(
+        self, looker: Model, planner: Model, *, look: Prompt, plan: Prompt, repair: Prompt
+    ) -> None:
+        self.names = (looker.name, planner.name)
+        self.name = "+".join(self.names)
+        self._looker, self._planner = looker, planner
+        self._look, self._plan, self._repair = look, plan, repair
+
+    async def reply(self, request: Request) -> Reply:
+        """The reply of whose turn it is.
+
+        Raises:
+            ModelError: it cannot.
+        """
+        messages, tools = request.messages, request.tools
+        found = measuring(messages)
+        if found is None:
+            seen = Request(self._look.render(), messages, offered(tools, self._look))
+            return await self._looker.reply(seen)
+        prompt = self._repair if _uncertified(messages) else self._plan
+        told = Request(prompt.render(), _handed_over(messages, found), offered(tools, prompt))
+        return await self._planner.reply(told)
+
+    async def aclose(self) -> None:
+        """Close what either keeps open."""
+        for model in (self._looker, self._planner):
+            close = getattr(model, "aclose", None)
+            if close is not None:
+                await close()
+
+
+def measuring(messages: History) -> int | None:
+    """The place of the first reply all of whose things came out as segmented, if there is one."""
+    failed: dict[str, bool] = {}
+    for message in messages:
+        if isinstance(message, Result) and message.name == "segment":
+            failed[message.call_id] = message.error is not None
+    for place, message in enumerate(messages):
+        if isinstance(message, Reply):
+            asked = [c.id for c in message.calls if c.name == "segment"]
+            if asked and not any(failed.get(id, True) for id in asked):
+                return place
+    return None
+
+
+def _uncertified(messages: History) -> bool:
+    proposals = [m for m in messages if isinstance(m, Result) and m.name == "propose_formation"]
+    return bool(proposals) and '"certified":true' not in proposals[-1].text
+
+
+def _handed_over(messages: History, found: int) -> History:
+    """In place of what the looker said and did, what came of it, as one message of the person's.
+
+    A planner that read the pattern as its own words might go on as if it had seen the picture.
+    """
+    looked = messages[found]
+    assert isinstance(looked, Reply)
+    calls = {call.id for call in looked.calls}
+    answers = [m for m in messages[found:] if isinstance(m, Result) and m.call_id in calls]
+    facts = ", ".join(m.text for m in answers if m.name == "segment")
+    said = [m.text for m in messages[:found] if isinstance(m, User)]
+    pattern = json.dumps(looked.text, ensure_ascii=False)
+    first = User(text="\n".join([*said, f"Pattern: {pattern}", f"Measured: [{facts}]"]))
+    rest = messages[found + 1 + len(answers) :]
+    return (first, *(_without_pictures(m) for m in rest))
+
+
+def _without_pictures(message: User | Reply | Result) -> User | Reply | Result:
+    shown = not isinstance(message, Reply) and message.images
+    return message.model_copy(update={"images": ()}) if shown else message

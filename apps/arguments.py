@@ -1,0 +1,393 @@
+"""Command-line words to values; each mistake is one sentence with the value and what is allowed."""
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from ..agent.limits import Limits
+from ..agent.policy import Policy
+from ..evals.tasks.photographs import Task
+from ..prompts.inputs import Input
+from ..tools.errors import InputError
+from ..tools.formation.contract import MAX_LENGTH, MAX_ROBOTS
+from ..tools.formation.named_lengths import named_lengths
+from ..tools.formation.units import COARSEST, FINEST, check_scale
+from ..tools.geometry.outline import FARTHEST, FloatArray
+from ..tools.perception.target_prompt import TargetPrompt
+from ..tools.store import read_text
+from ..tools.tool import violations
+from ..tools.world import Descriptor
+
+MAX_SPAN = 10_000
+"""Seeds in one run."""
+
+
+def robots(text: str | None) -> int | None:
+    """A number of robots.
+
+    Raises:
+        InputError: not a whole number from 1 to 10,000.
+    """
+    if text is None:
+        return None
+    return whole("--robots", text, least=1, most=MAX_ROBOTS)
+
+
+def whole(name: str, text: str, *, least: int, most: int = 1_000_000) -> int:
+    """A whole number in a range.
+
+    Raises:
+        InputError: not such a number.
+    """
+    plain = re.fullmatch(r"[0-9]{1,9}|[0-9]{1,3}(,[0-9]{3})+", text.strip())
+    value = int(plain[0].replace(",", "")) if plain else least - 1
+    if not least <= value <= most:
+        raise InputError(
+            f"{name} {text!r} cannot be used; give a whole number from {least} to {most:,}."
+        )
+    return value
+
+
+def span(name: str, text: str) -> tuple[int, int]:
+    """First and last of a range of whole numbers, A-B or A alone.
+
+    Raises:
+        InputError: no such range, or one of more than 10,000.
+    """
+    first, dash, last = text.strip().partition("-")
+    if not dash:
+        last = first
+    numbers = [
+        int(n) if n.isascii() and n.isdecimal() and len(n) < 10 else -1 for n in (first, last)
+    ]
+    if not 0 <= numbers[0] <= numbers[1] < numbers[0] + MAX_SPAN:
+        raise InputError(
+            f"{name} {text!r} cannot be used; give first and last seed, 0 or more, such as 0-199 "
+            f"({MAX_SPAN:,} at most)."
+        )
+    return numbers[0], numbers[1]
+
+
+def tasks(names: list[str] | None, there: list[Task]) -> list[Task]:
+    """The tasks named, or all.
+
+    Raises:
+        InputError: there is none of a name; the text lists those there are.
+    """
+    known = {task.id: task for task in there}
+    for name in names or ():
+        if name not in known:
+            raise InputError(f"Unknown task {name!r}. There are: {', '.join(known)}.")
+    return [known[name] for name in names] if names else there
+
+
+def scale(text: str | None) -> float | None:
+    """Metres per pixel.
+
+    Raises:
+        InputError: not a number, or no scale that a picture has.
+    """
+    if text is None:
+        return None
+    value = _number(text)
+    try:
+        if value is not None:
+            check_scale(value)
+            return value
+    except InputError:
+        pass
+    raise InputError(
+        f"--metres-per-pixel {text!r} cannot be used; give a number from {FINEST:f} to "
+        f"{COARSEST:g}, such as 0.05."
+    )
+
+
+def lengths(scale_text: str | None, radius: str | None, clearance: str | None) -> dict[str, Any]:
+    """The scale, the robots' radius and the clearance, as fields of Settings.
+
+    Raises:
+        InputError: as `scale` and `length` do.
+    """
+    metres_per_pixel = scale(scale_text)
+    return {
+        "metres_per_pixel": metres_per_pixel,
+        "robot_radius": length("--robot-radius", radius, metres_per_pixel),
+        "clearance": length("--clearance", clearance, metres_per_pixel),
+    }
+
+
+def length(name: str, text: str | None, metres_per_pixel: float | None) -> float | None:
+    """A length in pixels, 0 or more, from pixels or, with a unit behind them, m, cm or mm.
+
+    Raises:
+        InputError: not such a number, or a metric one in a picture without a scale.
+    """
+    if text is None:
+        return None
+    value = _number(text)
+    if value is None:
+        value = _metric(name, text, metres_per_pixel)
+    if value is None or not 0 <= value <= MAX_LENGTH:
+        raise InputError(
+            f"{name} {text!r} is no length; give pixels from 0 to 100000, such as 12, or a metric "
+            "length such as 1.5m or 40cm together with --metres-per-pixel."
+        )
+    return value
+
+
+def _metric(name: str, text: str, metres_per_pixel: float | None) -> float | None:
+    """A length with its unit, px; None where it is none."""
+    found = named_lengths(text.strip().lower())
+    if len(found) != 1 or found[0].said != text.strip().lower():
+        return None
+    if found[0].unit == "m" and metres_per_pixel is None:
+        raise InputError(
+            f"{name} {text!r} is metric, and the picture has no scale; give --metres-per-pixel "
+            "too, or pixels."
+        )
+    return found[0].px(metres_per_pixel)
+
+
+def share(name: str, text: str | None) -> float | None:
+    """A number from 0 to 1.
+
+    Raises:
+        InputError: not such a number.
+    """
+    if text is None:
+        return None
+    value = _number(text)
+    if value is None or not 0 <= value <= 1:
+        raise InputError(f"{name} {text!r} cannot be used; give a number from 0 to 1.")
+    return value
+
+
+def rates(name: str, texts: list[str] | None, models: Sequence[str]) -> dict[str, float]:
+    """Numbers above 0 by model, from MODEL=N.
+
+    Args:
+        models: those there are.
+
+    Raises:
+        InputError: not of that form, or of another model.
+    """
+    found: dict[str, float] = {}
+    for text in texts or []:
+        model, _, number = text.rpartition("=")
+        value = _number(number)
+        if model not in models or value is None or not value > 0:
+            known = ", ".join(models) or "none"
+            raise InputError(
+                f"{name} {text!r} cannot be used; give MODEL=N, N above 0, such as "
+                f"openai:NAME=60. Models of this run: {known}."
+            )
+        found[model] = value
+    return found
+
+
+def dollars(name: str, text: str | None) -> float | None:
+    """An amount of money in US dollars.
+
+    Raises:
+        InputError: not a number above 0.
+    """
+    if text is None:
+        return None
+    value = _number(text)
+    if value is None or not 0 < value <= 1_000_000:
+        raise InputError(f"{name} {text!r} cannot be used; give US dollars above 0, such as 2.50.")
+    return value
+
+
+def descriptor(text: str) -> Descriptor:
+    """How shapes are put into text.
+
+    Raises:
+        InputError: not one of the three.
+    """
+    for known in get_args(Descriptor):
+        if text == known:
+            return known
+    raise InputError(f"Unknown descriptor {text!r}. There are: {', '.join(get_args(Descriptor))}.")
+
+
+def pointed(
+    points: list[str], boxes: list[str], outlines: list[str], candidates: list[str]
+) -> tuple[TargetPrompt, ...]:
+    """What was pointed at, as t1, t2, ...: points, then boxes, then outlines, then candidates.
+
+    Raises:
+        InputError: not numbers, not as many as are needed, or no id of a candidate.
+    """
+    found: list[dict[str, object]] = []
+    for text in points:
+        values = _numbers(text, "--point", "X,Y")
+        if len(values) % 2:
+            raise InputError(_wrong("--point", text, "X,Y, or X1,Y1,X2,Y2,... for one thing,"))
+        found.append({"points": tuple(zip(values[::2], values[1::2], strict=True))})
+    for text in boxes:
+        values = _numbers(text, "--box", "X0,Y0,X1,Y1")
+        if len(values) != 4:
+            raise InputError(_wrong("--box", text, "X0,Y0,X1,Y1"))
+        found.append({"box": tuple(values)})
+    for text in outlines:
+        values = _numbers(text, "--outline", "X1,Y1,X2,Y2,...")
+        if len(values) % 2 or not 6 <= len(values) <= 60:
+            raise InputError(
+                f"--outline {text!r} has {len(values)} numbers; give 3 to 30 vertices as "
+                "X1,Y1,X2,Y2,..."
+            )
+        found.append({"outline": tuple(zip(values[::2], values[1::2], strict=True))})
+    for text in candidates:
+        found.append({"candidate": _candidate(text)})
+    try:
+        return tuple(
+            TargetPrompt.model_validate({"id": f"t{i}", **prompt})
+            for i, prompt in enumerate(found, start=1)
+        )
+    except ValidationError as error:
+        raise InputError(violations(error)) from None
+
+
+def starts(path: Path | None) -> FloatArray | None:
+    """Starting positions from a JSON file [[x, y], ...] or lines of x,y; (n, 2), px.
+
+    Raises:
+        InputError: it cannot be read, or holds anything but finite pairs.
+    """
+    if path is None:
+        return None
+    text = read_text(path)
+    try:
+        rows = (
+            json.loads(text)
+            if text.lstrip().startswith("[")
+            else [[float(v) for v in line.split(",")] for line in text.splitlines() if line.strip()]
+        )
+        values = np.asarray(rows, dtype=float)
+    except (ValueError, TypeError, OverflowError, RecursionError):
+        values = np.empty(0)
+    pairs = values.ndim == 2 and values.shape[1:] == (2,)
+    if not pairs or not (np.abs(values) <= FARTHEST).all():
+        raise InputError(
+            f"--starts {path} must hold one x,y a line, or JSON [[x, y], ...], in pixels."
+        )
+    return values
+
+
+def limits(given: list[str] | None, before: Mapping[str, Any] | None = None) -> Limits:
+    """Limits from NAME=VALUE, over those there were before.
+
+    Raises:
+        InputError: no such limit, or no number above 0.
+    """
+    names = [field.name for field in fields(Limits)]
+    found: dict[str, Any] = dict(before or {})
+    for text in given or []:
+        name, _, written = text.partition("=")
+        value = _number(written)
+        whole = name in ("requests", "tool_calls", "tokens")
+        lifted = written == "none"
+        if name not in names or not (lifted or (value and (not whole or value == int(value)))):
+            raise InputError(
+                f"--limit {text!r} cannot be used; give NAME=NUMBER, or NAME=none for no limit, "
+                f"with one of {', '.join(names)}."
+            )
+        found[name] = None if lifted or value is None else int(value) if whole else value
+    return Limits(**found)
+
+
+def policy(given: list[str] | None, before: Sequence[Sequence[str]] = ()) -> Policy:
+    """A policy from GLOB=DECISION, these rules before those there were.
+
+    Raises:
+        InputError: no such rule.
+    """
+    for text in given or []:
+        if not re.fullmatch("[^=]+=(allow|ask|refuse)", text):
+            raise InputError(
+                f"--policy {text!r} cannot be used; give GLOB=allow, GLOB=ask or GLOB=refuse, such "
+                "as deploy=ask."
+            )
+    rules: list[Any] = [*(text.rpartition("=")[::2] for text in given or []), *before]
+    return Policy(tuple((glob, decision) for glob, decision in rules))
+
+
+def variables(given: list[str] | None, declared: Mapping[str, Input]) -> dict[str, object]:
+    """Values for the inputs of a prompt from NAME=VALUE; whether they will do is for it to say.
+
+    Raises:
+        InputError: no NAME=VALUE, or a name given twice.
+    """
+    found: dict[str, object] = {}
+    for text in given or []:
+        name, equals, written = text.partition("=")
+        if not equals or name in found:
+            why = "is given twice" if equals else "has no ="
+            raise InputError(f"--var {text!r} {why}; give NAME=VALUE, each name once.")
+        found[name] = declared[name].read(written) if name in declared else written
+    return found
+
+
+def scores(path: Path | None) -> dict[str, dict[str, float]]:
+    """Scores of prompts by suite, from JSON; none without a file.
+
+    Raises:
+        InputError: it cannot be read, or is something else.
+    """
+    if path is None:
+        return {}
+    try:
+        return TypeAdapter(dict[str, dict[str, float]]).validate_json(read_text(path))
+    except ValidationError as error:
+        form = '{"ID@VERSION": {"SUITE": NUMBER}}'
+        raise InputError(f"--baselines {path} must hold {form}: {violations(error)}") from None
+
+
+def recording(path: Path | None) -> Path | None:
+    """Where a recording goes; that it can is found out before the run.
+
+    Raises:
+        InputError: there is no such folder, or a folder lies there.
+    """
+    if path is not None and (path.is_dir() or not path.parent.is_dir()):
+        raise InputError(
+            f"--record {path} cannot be written; name a file in a folder that is there."
+        )
+    return path
+
+
+def _candidate(text: str) -> str:
+    known = re.fullmatch(r"[cC]?([1-9][0-9]{0,3})", text.strip(), re.ASCII)
+    if known is None:
+        raise InputError(
+            f"--target {text!r} cannot be read; give a candidate's id such as c3, or its number."
+        )
+    return f"c{known[1]}"
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _numbers(text: str, option: str, form: str) -> list[float]:
+    values = [_number(part) for part in text.split(",")]
+    known = [v for v in values if v is not None]
+    if len(known) < len(values):
+        raise InputError(_wrong(option, text, form))
+    return known
+
+
+def _wrong(option: str, text: str, form: str) -> str:
+    return f"{option} {text!r} cannot be read; give {form} in pixels, numbers with commas between."

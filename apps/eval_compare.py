@@ -1,0 +1,211 @@
+"""`formup eval compare`, `gate` and `merge`: two versions side by side, over folders of trials."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..evals.experiments.compare import compare as compared
+from ..evals.experiments.comparison import Bounded, Comparison, Difference, Metric, Range, Settled
+from ..evals.experiments.gate import MARGIN
+from ..evals.experiments.journal import Arm, merge, read_rows
+from ..evals.experiments.trials import TrialRow
+from ..evals.tasks.stored_suite import join_kept
+from ..tools.errors import InputError
+from ..tools.store import write_whole
+from . import arguments as inputs
+from . import options as o
+
+EXIT = {"pass": 0, "block": 1, "inconclusive": 3}
+STYLE = {
+    "pass": "bold green",
+    "better": "bold green",
+    "block": "bold red",
+    "worse": "bold red",
+    "inconclusive": "bold yellow",
+}
+
+
+def _command(concluded: Callable[[Console, Comparison], int]) -> Callable[..., None]:
+    """The command that compares two runs and ends as `concluded` says, with its exit code."""
+
+    def command(
+        a: o.OldRun,
+        b: o.NewRun,
+        arm_a: o.OldArm = None,
+        arm_b: o.NewArm = None,
+        metric: o.MetricName = "sr",
+        margin: o.Margin = f"{MARGIN:g}",
+        as_json: o.Json = False,
+        out: o.ReportFile = None,
+    ) -> None:
+        made = _made((a, arm_a), (b, arm_b), metric, margin, out)
+        console = Console(highlight=False, soft_wrap=True, quiet=as_json)
+        if as_json:
+            print(made.model_dump_json(indent=2))  # noqa: T201
+        _show(console, made)
+        raise typer.Exit(concluded(console, made))
+
+    command.__doc__ = concluded.__doc__
+    return command
+
+
+@_command
+def compare(console: Console, made: Comparison) -> int:
+    """Whether B is better or worse than A, or how many trials would settle it."""
+    _conclude(console, made.outcome, (), made.overall.settled_by, made.overall)
+    return 0
+
+
+@_command
+def gate(console: Console, made: Comparison) -> int:
+    """Whether B may replace A: exit code 0 pass, 1 block, 3 inconclusive."""
+    _conclude(console, made.verdict, made.reasons, made.settled_by, made.overall)
+    return EXIT[made.verdict]
+
+
+def merge_shards(shards: o.Shards, out: o.MergedFolder) -> None:
+    """Put the trials of shards together in a new folder."""
+    count = merge(shards, out)
+    join_kept(shards, out)
+    print(f"{count:,} trials in {out}")  # noqa: T201
+
+
+def _made(
+    old: tuple[Path, str | None],
+    new: tuple[Path, str | None],
+    metric: str,
+    margin: str,
+    out: Path | None,
+) -> Comparison:
+    measured, tolerated = _metric(metric), inputs.share("--margin", margin)
+    if not tolerated:
+        raise InputError("--margin 0 can never be passed; give a share above 0, such as 0.05.")
+    made = compared(arm_rows(*old, "--arm-a"), arm_rows(*new, "--arm-b"), measured, tolerated)
+    if out is not None:
+        write_whole(out, f"{made.model_dump_json(indent=1)}\n".encode())
+    return made
+
+
+def _metric(text: str) -> Metric:
+    for known in ("sr", "strict", "gcr"):
+        if text == known:
+            return known
+    raise InputError(f"Unknown metric {text!r}. There are: sr, strict, gcr.")
+
+
+def arm_rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
+    """The rows of one arm of a folder: the only one, or the one of which all the words are said."""
+    rows = read_rows(folder)
+    words = named.split() if named else []
+    arms = {arm.name: arm for arm in map(Arm.of, rows)}
+    chosen = {name for name, arm in arms.items() if all(_says(name, arm, word) for word in words)}
+    if rows and len(chosen) != 1:
+        what = f"{option} {named!r} fits {len(chosen)} of these" if named else f"Give {option}"
+        raise InputError(
+            f"{folder} holds {len(arms)} arms. {what}, words of one: {'; '.join(sorted(arms))}."
+        )
+    return [row for row in rows if Arm.of(row).name in chosen]
+
+
+def _says(name: str, arm: Arm, word: str) -> bool:
+    return word in (*name.split(), arm.prompt) or (
+        arm.prompt is not None and "#" in word and f"{arm.prompt}#{arm.sha256}".startswith(word)
+    )
+
+
+def _show(console: Console, made: Comparison) -> None:
+    for name, arm in (("A", made.a), ("B", made.b)):
+        console.print(Text.assemble((f"{name} ", "cyan"), arm.name))
+    console.print()
+    console.print(_scores(made))
+    console.print()
+    console.print(_differences(made))
+    tokens = "" if made.tokens is None else f"; tokens {100 * made.tokens:+.1f} %"
+    console.print(
+        f"one-sided bounds: {_bounds(made.success)} points, of invalid output "
+        f"{_bounds(made.invalid)} points{tokens}"
+    )
+    if any(made.unpaired):
+        a, b = made.unpaired
+        console.print(f"left out for want of a pair: {a} trials of A, {b} of B")
+
+
+def _scores(made: Comparison) -> Table:
+    """How each does; intervals at 95 %."""
+    table = _table(made.metric, "", "new tasks", "these tasks")
+    for k in made.overall.a.pass_k:
+        table.add_column(f"pass^{k}", justify="right", no_wrap=True)
+    for name, score in (("A", made.overall.a), ("B", made.overall.b)):
+        counted = "" if score.successes is None else f"{score.successes}/{score.trials}"
+        again = [f"{value:.2f}" for value in score.pass_k.values()]
+        intervals = [_shares(score.new_tasks), _shares(score.fixed_tasks)]
+        table.add_row(f"{name}  {score.mean:.3f}", counted, *intervals, *again)
+    return table
+
+
+def _differences(made: Comparison) -> Table:
+    """B minus A over all tasks and by slice, in points; intervals at 95 %."""
+    table = _table("B - A", "tasks", "points", "new tasks", "p", "these tasks", "p", "")
+    slices = ((n, d) for values in made.slices.values() for n, d in values.items())
+    for name, found in (("all", made.overall), *slices):
+        table.add_row(
+            Text(name),
+            str(found.tasks),
+            _points(found.estimate),
+            _bounds(found.interval),
+            _p(found.p_holm),
+            "-" if found.fixed_tasks is None else _bounds(found.fixed_tasks),
+            _p(found.fixed_p),
+            Text(found.outcome, style=STYLE[found.outcome]),
+        )
+    if made.slices:
+        table.caption, table.caption_justify = "p of slices on new tasks: Holm's", "left"
+    return table
+
+
+def _table(first: str, *titles: str) -> Table:
+    table = Table(box=None, header_style="cyan", pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column(first, no_wrap=True)
+    for title in titles:
+        table.add_column(title, justify="right" if title else "left", no_wrap=True)
+    return table
+
+
+def _conclude(
+    console: Console,
+    word: str,
+    reasons: tuple[str, ...],
+    settled: Settled | None,
+    overall: Difference,
+) -> None:
+    console.print(Text.assemble((word, STYLE[word]), f": {'; '.join(reasons)}" if reasons else ""))
+    if settled is not None:
+        each = round(overall.pairs / overall.tasks)
+        ways = [
+            f"{settled.trials:,} trials of each of these {overall.tasks} tasks"
+            if settled.trials
+            else "",
+            f"{settled.tasks:,} tasks with {each} trials of each" if settled.tasks else "",
+        ]
+        told = " or ".join(filter(None, ways)) or "more tasks and trials than can be run"
+        console.print(f"to tell {100 * settled.difference:.1f} points (power .8): {told}")
+
+
+def _shares(found: Range | None) -> str:
+    return "-" if found is None else f"{found.low:.3f} to {found.high:.3f}"
+
+
+def _bounds(found: Range | Bounded) -> str:
+    return f"{_points(found.low)} to {_points(found.high)}"
+
+
+def _points(share: float) -> str:
+    return f"{round(100 * share, 1) + 0.0:+.1f}"
+
+
+def _p(value: float) -> str:
+    return f"{value:.3f}" if value >= 0.001 else "<.001"

@@ -1,0 +1,192 @@
+"""A run on the terminal: what was found, the contract, its certificate, the arrival table."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..agent.report import Report
+from ..tools.formation.checking.verdict import Measure
+from ..tools.formation.contract import Group
+from ..tools.formation.units import also_metres
+
+LONGEST = 600
+"""Characters of an error message; a value given may be vast."""
+MAX_ROWS = 16
+"""Robots shown in the arrival table; the rest are summed up."""
+PLACES = {
+    "around": "around",
+    "cage": "caging",
+    "corners": "at the corners of",
+    "along": "along",
+    "inside": "inside",
+    "between": "between",
+    "centre": "at the centre of",
+    "shape": "in a form by",
+}
+GOING_ON = {
+    "question": " --answer TEXT",
+    "needs_approval": " --approve, or --refuse",
+    "stopped": "",
+    "failed": "",
+}
+STATUS_STYLE = {
+    "deployed": "bold green",
+    "planned": "bold green",
+    "question": "bold yellow",
+    "needs_approval": "bold yellow",
+    "impossible": "bold red",
+    "stopped": "bold red",
+    "failed": "bold red",
+}
+
+
+def show_report(console: Console, report: Report, folder: str) -> None:
+    """Print a report for a person."""
+    console.print(Text(report.instruction, style="bold"))
+    for target in report.targets:
+        parts = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in target["parts"].items())
+        box = ", ".join(f"{v:g}" for v in target["box"])
+        _line(
+            console,
+            "found",
+            f"{target['id']}: {target['label']}, box ({box}), "
+            f"confidence {target['confidence']:.2f} ({parts})",
+        )
+    if report.contract is not None:
+        for group in report.contract.groups:
+            _line(console, "contract", _told(_group(group), report))
+    if report.verdict is not None:
+        _certificate(console, report)
+    if report.arrival is not None:
+        _arrival(console, report)
+    console.print(
+        Text.assemble((f"{report.status}: ", STATUS_STYLE[report.status]), report.message)
+    )
+    if report.candidates:
+        _choices(console, report.candidates)
+    written = [name for name in (report.files or {}).values() if name]
+    if written:
+        _line(console, "files", f"{folder}/ {', '.join(written)}")
+    if written and report.status in GOING_ON:
+        _line(console, "go on", f"formup resume {folder}{GOING_ON[report.status]}")
+
+
+def at_terminal() -> bool:
+    """Whether a person reads and can answer."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def ask(what: str) -> str:
+    """The person's answer to the question just shown; empty to leave it open."""
+    print(f"{what} (Enter leaves it open): ", end="", flush=True)  # noqa: T201
+    line = sys.stdin.buffer.readline()  # not input(): it chokes on bytes that are no text
+    if not line.endswith(b"\n"):
+        print()  # noqa: T201
+    return line.decode(errors="replace").strip()
+
+
+def say_failed(message: str) -> None:
+    """Say on stderr what was wrong; with --json, also as the one object on stdout."""
+    message = " ".join(message.split())  # a path may hold a line break
+    if len(message) > LONGEST:
+        message = f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
+    print(f"formup: {message}", file=sys.stderr)  # noqa: T201
+    if "--json" in sys.argv and sys.argv[1] in ("run", "resume", "deploy"):
+        report = Report(status="failed", message=message, instruction="", model="offline")
+        print(report.model_dump_json(indent=2))  # noqa: T201
+
+
+def _line(console: Console, name: str, text: str) -> None:
+    console.print(Text.assemble((f"{name:>12}  ", "cyan"), text))
+
+
+def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
+    """What a question offers; candidates by the number they bear in the picture."""
+    table = Table(box=None, padding=(0, 2), pad_edge=False, header_style="cyan")
+    for title in ("number", "looks like", "box"):
+        table.add_column(title, justify="right" if title == "number" else "left")
+    for choice in candidates:
+        box = ", ".join(f"{v:.0f}" for v in choice["box"])
+        table.add_row(choice["id"].removeprefix("c"), Text(choice["label"]), box)
+    console.print(table)
+
+
+def _group(group: Group) -> str:
+    noun = "robot" if group.robots == 1 else "robots"
+    words = [f"{group.robots} {noun} {PLACES[group.relation]}", " and ".join(group.targets)]
+    if group.side:
+        words.append(f"({group.side} side)")
+    if group.clearance is not None and group.relation == "inside":
+        words.append(f"at least {group.clearance[0]:.1f} px from its edge")
+    elif group.clearance is not None and group.relation != "corners":
+        words.append(f"{group.clearance[0]:.1f} to {group.clearance[1]:.1f} px away")
+    escape_proof = group.closure == "escape-proof"
+    if group.spacing == "even" and group.relation not in ("corners", "centre") and not escape_proof:
+        words.append("evenly spaced")
+    if group.closure:
+        words.append("escape-proof" if escape_proof else f"in a closed {group.closure}")
+    return " ".join(word for word in words if word)
+
+
+def _told(text: str, report: Report) -> str:
+    """With lengths in metres too, where the picture's scale is known."""
+    return also_metres(text, report.metric["metres_per_pixel"] if report.metric else None)
+
+
+def _measures(measures: dict[str, Measure]) -> str:
+    """Measures as words, those in pixels with their unit behind the number."""
+    return ", ".join(
+        f"{name.removesuffix('_px').replace('_', ' ')} "
+        + (value if isinstance(value, str) else f"{value:g}")
+        + (" px" if name.endswith("_px") else "")
+        for name, value in measures.items()
+    )
+
+
+def _certificate(console: Console, report: Report) -> None:
+    verdict = report.verdict
+    assert verdict is not None
+    measures = _told(_measures(verdict.measures), report)
+    if report.partial is not None:
+        _line(console, "partial", report.partial.sentence)
+    if verdict.certified:
+        _line(console, "certified", f"plan {report.plan_id}: {measures}")
+    else:
+        _line(console, "NOT CERTIFIED", f"plan {report.plan_id}: {measures}")
+    for finding in verdict.findings[:MAX_ROWS]:
+        _line(console, "finding", finding.sentence)
+    if len(verdict.findings) > MAX_ROWS:
+        _line(console, "", f"and {len(verdict.findings) - MAX_ROWS} more findings")
+    for note in verdict.notes:
+        _line(console, "note", note)
+
+
+def _arrival(console: Console, report: Report) -> None:
+    arrival, positions = report.arrival, report.positions
+    assert arrival is not None and positions is not None
+    table = Table(box=None, padding=(0, 2), pad_edge=False, header_style="cyan")
+    for title in ("place", "robot", "requested", "observed", "off by"):
+        table.add_column(title, justify="right")
+    rows = zip(arrival.robots, positions, arrival.observed, arrival.residual_px, strict=True)
+    for place, (robot, wanted, seen, off) in enumerate(rows, start=1):
+        if place > MAX_ROWS:
+            break
+        table.add_row(
+            str(place),
+            str(robot),
+            f"{wanted[0]:.1f}, {wanted[1]:.1f}",
+            f"{seen[0]:.1f}, {seen[1]:.1f}",
+            f"{off:.2f} px",
+        )
+    console.print(table)
+    if len(positions) > MAX_ROWS:
+        _line(
+            console,
+            "",
+            f"and {len(positions) - MAX_ROWS} more robots, the furthest "
+            f"{max(arrival.residual_px):.2f} px off",
+        )

@@ -1,0 +1,70 @@
+"""What happens with a run at the command line: told, its files written, questions answered."""
+
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from ..agent.agent import Agent
+from ..agent.outcomes import Cancelled
+from ..agent.report import Report
+from ..agent.session import Run
+from ..tools.store import write_whole
+from .main import INTERRUPTED
+from .run_display import ask, at_terminal, show_report
+from .run_files import Folder, write_files
+
+MOST_ANSWERS = 5
+"""Questions answered in one run at a terminal."""
+
+
+class Desk:
+    """Where a person meets a run.
+
+    Args:
+        agent: goes on with it.
+        folder: for its files.
+        as_json: whether a program reads, which is not asked anything.
+        record: a file for a copy of the trace, if wanted.
+    """
+
+    def __init__(
+        self, agent: Agent, folder: Folder, as_json: bool, record: Path | None = None
+    ) -> None:
+        self._agent, self._folder, self._as_json, self._record = agent, folder, as_json, record
+
+    @property
+    def can_ask(self) -> bool:
+        """Whether somebody is there to answer."""
+        return not self._as_json and at_terminal()
+
+    def serve(self, run: Run) -> int:
+        """Tell what came of a run, and go on as long as a person answers.
+
+        Returns:
+            What to exit with.
+        """
+        report = self._told(run)
+        for _ in range(MOST_ANSWERS if self.can_ask else 0):
+            if report.status not in ("question", "needs_approval"):
+                break
+            asked = report.status == "question"
+            text = ask("your answer" if asked else "yes, or no and why")
+            if not text:
+                break
+            approve = None if asked else text.lower() in ("y", "yes")
+            run = self._agent.resume(run, answer=text, approve=approve)
+            report = self._told(run)
+        return INTERRUPTED if isinstance(run.outcome, Cancelled) else report.exit_code
+
+    def _told(self, run: Run) -> Report:
+        files = write_files(self._folder, run)
+        report = run.report.model_copy(update={"files": files})
+        if self._as_json:
+            print(report.model_dump_json(indent=2))  # noqa: T201
+            print(f"formup: files in {self._folder.path}", file=sys.stderr)  # noqa: T201
+        else:
+            show_report(Console(highlight=False), report, str(self._folder.path))
+        if self._record is not None and run.trace:
+            write_whole(self._record, run.trace.read_bytes())
+        return report

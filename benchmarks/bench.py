@@ -1,0 +1,293 @@
+"""`make bench`: CPU time of each tool on a 2-megapixel photograph beside the bare library calls.
+
+The bare call is the part no implementation of the tool could do without, made directly with
+OpenCV, shapely, scipy or Pillow on the same data; the ratio is what formup adds around it.
+"""
+
+import asyncio
+import io
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from ..evals.tasks.photographs import load_tasks
+from ..tools.builtin import TOOLS
+from ..tools.geometry.outline import FloatArray, distances, outline_of
+from ..tools.perception.contours import mask_of_outline
+from ..tools.perception.image import load_picture, picture_from_array
+from ..tools.perception.target_prompt import TargetPrompt
+from ..tools.scene import Scene
+from ..tools.world import Workspace
+from .growth import Work, best, growth
+
+SIZE = (1920, 1080)
+REPEATS = 5
+ROBOTS, PROBES = 24, 1000
+SIDES = (0.25, 0.5, 1, 2)
+"""Sides of the pictures for the growth, by those of SIZE."""
+TEAMS = (6, 24, 96)
+PLACING = ("sample_along_edges", "sample_inside", "sample_shape", "propose_formation", "deploy")
+Case = tuple[str, dict[str, Any], tuple[str, Work]]
+"""What is called, its arguments, and the bare calls in words and as a function."""
+
+
+def main() -> None:
+    """Print the table and how the times grow."""
+    workspace = _workspace(SIZE)
+    print(f"{SIZE[0]} x {SIZE[1]} px, CPU milliseconds, best of {REPEATS}")  # noqa: T201
+    print(f"{'tool':20} {'formup':>9} {'bare':>9} {'ratio':>7}  bare calls")  # noqa: T201
+    for case in _cases(workspace):
+        name, _, (words, bare) = case
+        ours, theirs = _timed(workspace, case), best(bare, REPEATS)
+        print(f"{name:20} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.1f}  {words}")  # noqa: T201
+    print(f"\n{'growth':28} fitted")  # noqa: T201
+    for line in _growths(workspace):
+        print(line, flush=True)  # noqa: T201
+
+
+def _growths(workspace: Workspace) -> Iterator[str]:
+    """Every tool against the picture's pixels; those that place robots against their number."""
+    sizes = [(round(SIZE[0] * share), round(SIZE[1] * share)) for share in SIDES]
+    pixels = [width * height for width, height in sizes]
+    spaces = [_workspace(size) for size in sizes]
+    for cases in zip(*map(_cases, spaces), strict=True):
+        found = [_timed(w, case) for w, case in zip(spaces, cases, strict=True)]
+        yield growth(cases[0][0], "pixels", pixels, found)
+    for cases in zip(*(_cases(workspace, n) for n in TEAMS), strict=True):
+        if cases[0][0] in PLACING:
+            found = [_timed(workspace, case) for case in cases]
+            yield growth(cases[0][0], "robots", TEAMS, found)
+
+
+def _timed(workspace: Workspace, case: Case) -> float:
+    name, arguments, _ = case
+    tool = next(t for t in TOOLS if t.name == name.partition(" ")[0])
+    return best(lambda: asyncio.run(tool.call(_anew(workspace), arguments)), REPEATS)
+
+
+def _anew(workspace: Workspace) -> Workspace:
+    """The workspace with outlines that have nothing computed and kept from an earlier call."""
+    targets = (replace(t, outline=outline_of(t.outline.polygon)) for t in workspace.scene.targets)
+    scene = replace(workspace.scene, targets=tuple(targets))
+    return replace(workspace, scene=scene, found=None)
+
+
+def _workspace(size: tuple[int, int]) -> Workspace:
+    """The two cars at a width and height, px, the red one segmented as t1, the other as t2."""
+    task = next(t for t in load_tasks() if t.image.stem == "cars_two" and t.other)
+    photo = load_picture(task.image)
+    scale = np.array(size) / (photo.width, photo.height)
+    workspace = Workspace(
+        Scene(picture_from_array(np.asarray(cv2.resize(photo.pixels, size), dtype=np.uint8)))
+    )
+    segment = next(t for t in TOOLS if t.name == "segment")
+    assert task.other is not None
+    for name, thing in (("t1", task.target), ("t2", task.other)):
+        box = np.asarray(thing.outline.bounds) * np.tile(scale, 2)
+        asyncio.run(segment.call(workspace, {"id": name, "box": box.tolist()}))
+    box = workspace.scene.target("t1").box
+    return replace(workspace, pointed=(TargetPrompt(id="t3", box=box),))  # for locate_object
+
+
+def _cases(workspace: Workspace, robots: int = ROBOTS) -> list[Case]:
+    size = workspace.scene.picture.width, workspace.scene.picture.height
+    box = [round(v) for v in workspace.scene.target("t1").box]
+    group = {"relation": "around", "targets": ["t1"], "robots": robots}
+    probes = np.random.default_rng(0).uniform((0, 0), size, (PROBES, 2))
+    propose = next(t for t in TOOLS if t.name == "propose_formation")
+    plan = asyncio.run(propose.call(workspace, {"contract": {"groups": [group]}})).data["plan_id"]
+    points = workspace.plans[plan].formation.points
+    return [
+        *_seeing_cases(workspace, box),
+        (
+            "describe_shape",
+            {"target": "t1"},
+            ("findContours, approxPolyDP, minAreaRect", _bare_describe(workspace)),
+        ),
+        (
+            "check_point",
+            {"target": "t1", "points": probes.tolist()},
+            ("shapely contains, distance", _bare_check(workspace, probes)),
+        ),
+        (
+            "sample_along_edges",
+            {"target": "t1", "n": robots},
+            ("shapely buffer, interpolate", _bare_ring(workspace)),
+        ),
+        (
+            "sample_inside",
+            {"target": "t1", "n": robots},
+            ("4 x 40 cKDTree queries of 6000 cells", _bare_inside(workspace)),
+        ),
+        (
+            "sample_shape",
+            {"kind": "between", "n": robots // 3, "targets": ["t1", "t2"]},
+            ("shapely difference, interpolate", _bare_between(workspace)),
+        ),
+        ("measure", {"a": "t1", "b": "t2"}, ("shapely distance", _bare_measure(workspace))),
+        (
+            "propose_formation",
+            {"contract": {"groups": [group]}},
+            ("shapely buffer, distance; cKDTree", _bare_propose(workspace)),
+        ),
+        (
+            "deploy",
+            {"plan_id": plan},
+            ("scipy assignment, shapely intersects", _bare_deploy(workspace, points)),
+        ),
+    ]
+
+
+def _seeing_cases(workspace: Workspace, box: list[int]) -> list[Case]:
+    cut = ("bilateral, 5 x GrabCut at 160 px", lambda: _bare_segment(workspace, box))
+    return [
+        ("look", {}, ("Pillow resize, PNG", lambda: _bare_look(workspace))),
+        ("locate_object", {}, cut),
+        (
+            "locate_object query",
+            {"query": {"colours": ["red"], "picks": [{"by": "largest"}]}},
+            ("k-means, 150 thresholds at 384 px, contours", lambda: _bare_candidates(workspace)),
+        ),
+        ("segment", {"id": "t1", "box": box}, cut),
+    ]
+
+
+def _bare_look(workspace: Workspace) -> bytes:
+    buffer = io.BytesIO()
+    image = Image.fromarray(workspace.scene.picture.pixels)
+    image.resize((1500, 844)).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def _bare_segment(workspace: Workspace, box: list[int]) -> object:
+    x0, y0, x1, y1 = box
+    reach_x, reach_y = (x1 - x0) // 4, (y1 - y0) // 4
+    crop = workspace.scene.picture.pixels[
+        max(y0 - reach_y, 0) : y1 + reach_y, max(x0 - reach_x, 0) : x1 + reach_x
+    ]
+    scale = 160 / max(crop.shape[:2])
+    small = cv2.resize(crop, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    smooth = np.asarray(cv2.bilateralFilter(small, 7, 40, 5), dtype=np.uint8)
+    labels = np.empty(0)
+    for _ in range(5):
+        labels = np.full(smooth.shape[:2], cv2.GC_PR_BGD, np.uint8)
+        labels[:3], labels[-3:], labels[:, :3], labels[:, -3:] = 0, 0, 0, 0
+        labels[20:-20, 15:-15] = cv2.GC_PR_FGD
+        model = np.zeros((1, 65)), np.zeros((1, 65))
+        cv2.grabCut(smooth, labels, (0, 0, 1, 1), *model, 4, cv2.GC_INIT_WITH_MASK)
+    return labels
+
+
+def _bare_candidates(workspace: Workspace) -> int:
+    """The regions of every threshold of three channels and of the distances to nine colours."""
+    small = cv2.resize(workspace.scene.picture.pixels[::2, ::2], (384, 216))
+    smooth = np.asarray(cv2.bilateralFilter(small, 7, 40, 5), dtype=np.float32)
+    lab = np.asarray(cv2.cvtColor(smooth / 255, cv2.COLOR_RGB2LAB), dtype=np.float32)
+    cues: list[NDArray[np.float32]] = [lab[..., k] for k in range(3)]
+    for count in (3, 6):
+        stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 12, 1.0)
+        sample, none = lab.reshape(-1, 3)[::16], np.empty(0, np.int32)
+        _, _, centres = cv2.kmeans(sample, count, none, stop, 1, cv2.KMEANS_PP_CENTERS)
+        away = (np.linalg.norm(lab - c, axis=2) for c in np.asarray(centres, np.float32))
+        cues += [np.asarray(d, dtype=np.float32) for d in away]
+    found = 0
+    for cue in cues:
+        for level in np.quantile(cue, np.linspace(0.02, 0.98, 12)):
+            above = np.asarray(cue > level, dtype=np.uint8)
+            cv2.connectedComponentsWithStats(above, connectivity=4)
+            contours, _ = cv2.findContours(above, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+            found += len(contours)
+    return found
+
+
+def _bare_describe(workspace: Workspace) -> Work:
+    picture = workspace.scene.picture
+    mask = mask_of_outline(workspace.scene.target("t1").outline, picture.width, picture.height)
+    raster = mask.astype(np.uint8)
+
+    def work() -> object:
+        contours, _ = cv2.findContours(raster, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+        return [(cv2.approxPolyDP(c, 4, True), cv2.minAreaRect(c)) for c in contours]
+
+    return work
+
+
+def _bare_check(workspace: Workspace, probes: FloatArray) -> Work:
+    polygon = workspace.scene.target("t1").outline.polygon
+    edge = polygon.boundary
+    return lambda: (shapely.contains_xy(polygon, probes), distances(edge, probes))
+
+
+def _bare_ring(workspace: Workspace) -> Callable[[], FloatArray]:
+    filled = workspace.scene.target("t1").outline.filled
+
+    def work() -> FloatArray:
+        loop = shapely.LineString(shapely.get_coordinates(filled.buffer(80)))
+        steps = np.arange(ROBOTS, dtype=float) * loop.length / ROBOTS
+        return shapely.get_coordinates(shapely.line_interpolate_point(loop, steps))
+
+    return work
+
+
+def _bare_inside(workspace: Workspace) -> Work:
+    x0, y0, x1, y1 = workspace.scene.target("t1").outline.bounds
+    random = np.random.default_rng(0)
+    cells = random.uniform((x0, y0), (x1, y1), (6000, 2))
+    robots = random.uniform((x0, y0), (x1, y1), (ROBOTS, 2))
+
+    def work() -> object:
+        return [cKDTree(robots).query(cells) for _ in range(4 * 40)]
+
+    return work
+
+
+def _bare_between(workspace: Workspace) -> Work:
+    a, b = (workspace.scene.target(t).outline.filled for t in ("t1", "t2"))
+
+    def work() -> object:
+        line = shapely.LineString([a.centroid, b.centroid]).difference(shapely.union(a, b))
+        shares = np.arange(ROBOTS // 3) / 7
+        return [line.interpolate(float(share), normalized=True) for share in shares]
+
+    return work
+
+
+def _bare_measure(workspace: Workspace) -> Work:
+    a, b = (workspace.scene.target(t).outline.polygon for t in ("t1", "t2"))
+    return lambda: shapely.distance(a, b)
+
+
+def _bare_propose(workspace: Workspace) -> Work:
+    filled = workspace.scene.target("t1").outline.filled
+    ring = _bare_ring(workspace)
+
+    def work() -> object:
+        points = ring()
+        return distances(filled, points), cKDTree(points).query(points, k=2)
+
+    return work
+
+
+def _bare_deploy(workspace: Workspace, goals: FloatArray) -> Work:
+    filled = workspace.scene.target("t1").outline.filled
+    starts = np.random.default_rng(0).uniform((0, 0), SIZE, goals.shape)
+
+    def work() -> object:
+        pairs = linear_sum_assignment(cdist(starts, goals, "sqeuclidean"))
+        lines = shapely.linestrings(np.stack([starts[pairs[0]], goals[pairs[1]]], axis=1))
+        return shapely.intersects(lines, filled.buffer(20))
+
+    return work
+
+
+if __name__ == "__main__":
+    main()

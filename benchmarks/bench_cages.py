@@ -1,0 +1,150 @@
+"""`python -m formup.benchmarks.bench_cages`: CPU time of the tests that prove a cage.
+
+Beside each stand the bare library calls it could not do without: of the disc test the inscribed
+disc, a triangulation and distances; of the flood one look-up of every robot in every cell of its
+first grid halved once, and one labelling of what is free.
+"""
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from scipy.ndimage import label
+from shapely.affinity import translate
+from shapely.geometry import Polygon
+
+from ..tools.geometry.cages.cages import QUICK, THOROUGH, cage
+from ..tools.geometry.cages.configuration import flood
+from ..tools.geometry.cages.configuration_grid import first_grid
+from ..tools.geometry.cages.rigid import Obstacles, body_of
+from ..tools.geometry.curves import ring
+from ..tools.geometry.outline import FloatArray, make_outline
+from ..tools.geometry.sampling import along_curve
+from .growth import Work, best, growth, peak, times
+
+REPEATS = 5
+SIZE = 100.0
+COUNTS = (10, 30, 100, 300, 1000)
+FLOODED = (5, 6, 8, 12)
+CROWDS = (30, 60, 120, 240)
+VERTICES = (60, 300, 1500, 4500)
+ELL = ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3))
+TABLE = 192
+COPIES = 40
+"""As many bodies, each a little aside, so that nothing is kept from the call before."""
+
+
+def main() -> None:
+    """Print the tables."""
+    region = make_outline(np.asarray(ELL) * SIZE + 300).filled
+    print(f"CPU milliseconds, best of {REPEATS}; disc: 60 corners; flood: an L of 6 corners")  # noqa: T201
+    print(f"{'test':32} {'formup':>9} {'bare':>9} {'ratio':>7}  state")  # noqa: T201
+    discs = [_disc(_coin(60), n) for n in COUNTS]
+    for n in FLOODED:
+        for levels in (QUICK, THOROUGH):
+            _flood(region, n, levels)
+    print(f"\n{'growth':28} fitted")  # noqa: T201
+    print(growth("disc", "robots", COUNTS, discs))  # noqa: T201
+    for line in _growths(region):
+        print(line, flush=True)  # noqa: T201
+
+
+def _growths(region: Polygon) -> Iterator[str]:
+    """One level of the flood, the disc test of ten robots."""
+
+    def crowd(n: int) -> Work:
+        return _level(region, _around(region, n))
+
+    def disc(vertices: int) -> Work:
+        coin = _coin(vertices)
+        robots = _around(coin, 10)
+        asides = itertools.cycle(np.arange(COPIES) / 8)
+
+        def work() -> object:
+            aside = next(asides)
+            return cage(translate(coin, aside), robots + np.array([aside, 0.0]), levels=0)
+
+        return work
+
+    def cornered(vertices: int) -> Work:
+        return _level(_coin(vertices), _around(_coin(vertices), 10))
+
+    yield growth("flood, a level", "robots", CROWDS, times(crowd, CROWDS, REPEATS))
+    yield growth("disc, 10 robots", "vertices", VERTICES, times(disc, VERTICES, REPEATS))
+    found = times(cornered, VERTICES, REPEATS)
+    yield growth("flood, a level, 10 robots", "vertices", VERTICES, found)
+    memory = [peak(crowd(n)) for n in CROWDS]
+    yield growth("flood, memory", "robots", CROWDS, memory, "MiB")
+
+
+def _coin(vertices: int) -> Polygon:
+    turns = np.arange(vertices) / vertices * 2 * np.pi
+    return make_outline(np.stack([np.cos(turns), np.sin(turns)], axis=1) * SIZE + 300).filled
+
+
+def _level(region: Polygon, robots: FloatArray) -> Work:
+    body, obstacles = body_of(region), Obstacles(robots, 0.0)
+    return lambda: flood(body, obstacles, 1, escapes=False)
+
+
+def _disc(region: Polygon, n: int) -> float:
+    robots = _around(region, n)
+    moved = [(translate(region, x), robots + np.array([x, 0.0])) for x in np.arange(COPIES) / 8]
+    turn, again = itertools.cycle(moved), itertools.cycle(moved)
+    inner = max(1000 // n, 1)
+
+    def bare(body: Polygon, points: FloatArray) -> object:
+        places = shapely.multipoints(points)
+        disc = shapely.maximum_inscribed_circle(body)
+        return disc, shapely.delaunay_triangles(places, only_edges=True), body.distance(places)
+
+    ours = best(lambda: [cage(*next(turn), levels=0) for _ in range(inner)], REPEATS) / inner
+    theirs = best(lambda: [bare(*next(again)) for _ in range(inner)], REPEATS) / inner
+    _row(f"disc, {n} robots", ours, theirs, cage(region, robots, levels=0).state)
+    return ours
+
+
+def _flood(region: Polygon, n: int, levels: int) -> None:
+    robots = _around(region, n)
+    found = cage(region, robots, levels=levels)
+    how = f"{found.state}, by the {found.test}" if found.test else found.state
+    ours = best(lambda: cage(region, robots, levels=levels), REPEATS)
+    bare = best(_bare_flood(region, robots), REPEATS)
+    _row(f"flood, {n} robots, {levels} levels", ours, bare, how)
+
+
+def _around(region: Polygon, n: int) -> FloatArray:
+    return along_curve(ring(make_outline(shapely.get_coordinates(region)), 8.0, 16.0), n)
+
+
+def _bare_flood(region: Polygon, robots: FloatArray) -> Work:
+    body = body_of(region)
+    grid = first_grid(body, Obstacles(robots, 0.0))
+    turns, rows, columns = 2 * grid.turns, *(2 * side for side in grid.domain.shape)
+    ticks = np.linspace(-body.reach, body.reach, TABLE)
+    table = shapely.contains_xy(body.polygon, *np.meshgrid(ticks, ticks))
+    y, x = np.mgrid[:rows, :columns] * (grid.side / 2) + grid.origin[::-1, None, None]
+    scale = (TABLE - 1) / (2 * body.reach)
+
+    def work() -> object:
+        free = np.ones((turns, rows, columns), dtype=bool)
+        for turned, angle in zip(free, np.arange(turns) * 2 * np.pi / turns, strict=True):
+            c, s = np.cos(angle), np.sin(angle)
+            for px, py in robots:
+                across, down = px - x, py - y
+                column = ((c * across + s * down + body.reach) * scale).astype(np.intp)
+                row = ((c * down - s * across + body.reach) * scale).astype(np.intp)
+                near = (column >= 0) & (column < TABLE) & (row >= 0) & (row < TABLE)
+                turned[near] &= ~table[row[near], column[near]]
+        return label(free)
+
+    return work
+
+
+def _row(name: str, ours: float, theirs: float, state: str) -> None:
+    print(f"{name:32} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.1f}  {state}", flush=True)  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,195 @@
+"""`python -m formup.benchmarks.bench_sampling`: CPU time of placing and checking many robots.
+
+Beside each time stand the bare library calls that nothing could do without, on the same data, and
+how fast the time grows with the number of robots and of vertices.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from ..tools.formation.checking.check import certify
+from ..tools.formation.contract import Contract, Group, with_defaults
+from ..tools.formation.placement.place import Site, place
+from ..tools.geometry.curves import Curve, ring
+from ..tools.geometry.interior import BRISK_STEPS, FEW, LLOYD_STEPS, inside
+from ..tools.geometry.lloyd import cells_of, grid
+from ..tools.geometry.outline import FloatArray, Outline, make_outline, nearest_segments
+from ..tools.geometry.rings import equal_chords
+from ..tools.geometry.sampling import along_curve, nearest
+from .growth import Work, best, growth, peak, times
+
+REPEATS = 3
+SIZE = 12_000.0
+MANY, VERTICES = 10_000, 1000
+FINE = 1_000_000
+"""Cells that the energy is summed over."""
+HEXAGON = 5 / (18 * 3**0.5)
+"""Energy of a hexagonal lattice, by area squared over the number of robots (Fejes Toth)."""
+
+
+def main() -> None:
+    """Print the tables."""
+    outline = bumpy(VERTICES)
+    print(f"CPU milliseconds, best of {REPEATS}; an outline of {VERTICES} vertices")  # noqa: T201
+    _placing(outline)
+    _checking(outline)
+    print(f"\n{'growth':28} fitted")  # noqa: T201
+    for line in _growth():
+        print(line, flush=True)  # noqa: T201
+
+
+def bumpy(vertices: int) -> Outline:
+    """A smooth closed outline with bays."""
+    t = np.arange(vertices) / vertices * 2 * np.pi
+    radius = SIZE / 3 * (1 + 0.25 * np.sin(3 * t) + 0.1 * np.sin(7 * t + 1))
+    return make_outline(np.stack([np.cos(t), np.sin(t)], axis=1) * radius[:, None] + SIZE / 2)
+
+
+def energy_ratio(outline: Outline, points: FloatArray) -> float:
+    """Energy of the Voronoi cells of robots in a region, by that of a hexagonal lattice."""
+    cells = grid(outline.polygon, float(np.sqrt(outline.area / FINE)))
+    mean = float((nearest(points, cells, 1)[0] ** 2).mean())
+    return mean * outline.area / (HEXAGON * outline.area**2 / len(points))
+
+
+def _placing(outline: Outline) -> None:
+    plain = make_outline(shapely.get_coordinates(outline.filled.simplify(SIZE / 200)))
+    loop = ring(outline, 100, 200)
+    few = len(plain.polygon.exterior.coords) - 1
+    rows: list[tuple[str, Work, Work]] = [
+        (
+            f"around, 8, {few} vertices",
+            _eight(plain),
+            _bare_ring(plain, 8),
+        ),
+        ("around, 8", _eight(outline), _bare_ring(outline, 8)),
+        ("8 on the ring alone", lambda: along_curve(loop, 8), _bare_places(loop, 8)),
+        (f"{MANY} on the ring alone", lambda: along_curve(loop, MANY), _bare_places(loop, MANY)),
+        ("100 at equal chords", lambda: equal_chords(loop, 100), _bare_places(loop, 100)),
+    ]
+    print(f"{'placing':28} {'formup':>10} {'bare':>10}")  # noqa: T201
+    for name, work, bare in rows:
+        print(f"{name:28} {best(work, REPEATS):10.2f} {best(bare, REPEATS):10.2f}")  # noqa: T201
+    for n in (6, 50, 100, 1000, MANY):
+        ratio = energy_ratio(outline, inside(outline, n, 10, SIZE, 0.0))
+        ours = best(_inside(outline, n), REPEATS)
+        theirs = best(_bare_lloyd(outline, n), REPEATS)
+        print(f"{f'inside, {n}':28} {ours:10.2f} {theirs:10.2f}   energy {ratio:.3f}")  # noqa: T201
+
+
+def _bare_ring(outline: Outline, n: int) -> Work:
+    """The region grown, and places on its edge, without a bay bridged or a phase chosen."""
+
+    def work() -> object:
+        line = outline.filled.buffer(100).exterior
+        return shapely.line_interpolate_point(line, np.arange(n) * line.length / n)
+
+    return work
+
+
+def _bare_places(loop: Curve, n: int) -> Work:
+    line = shapely.LineString(loop.lines[0])
+    return lambda: shapely.line_interpolate_point(line, np.arange(n) * line.length / n)
+
+
+def _bare_lloyd(outline: Outline, n: int) -> Work:
+    """As many plain steps of Lloyd's iteration as one start gets, from random places."""
+    cells = cells_of(outline.polygon, n)
+    first = np.random.default_rng(0).choice(cells, n, replace=False)
+
+    def work() -> object:
+        points = first
+        for _ in range(LLOYD_STEPS if n <= FEW else BRISK_STEPS):
+            index = cKDTree(points).query(cells)[1]
+            size = np.maximum(np.bincount(index, minlength=n), 1)
+            sums = [np.bincount(index, weights=x, minlength=n) for x in cells.T]
+            points = np.stack(sums, axis=1) / size[:, None]
+        return points
+
+    return work
+
+
+def _eight(outline: Outline) -> Work:
+    return lambda: along_curve(ring(outline, 100, 200), 8)
+
+
+def _inside(outline: Outline, n: int) -> Work:
+    """Places robots inside; each time a little deeper, so that nothing is kept from the last."""
+    margins = itertools.count(10, 1e-6)
+    return lambda: inside(outline, n, next(margins), SIZE, 0.0)
+
+
+def _checking(outline: Outline) -> None:
+    print(f"\ncheck of {MANY:18} {'formup':>10} {'bare':>10} {'ratio':>7}")  # noqa: T201
+    for relation in ("around", "inside"):
+        work, points = _checked(relation, outline, MANY)
+        bare = _bare_around(outline, points) if relation == "around" else _bare_in(outline, points)
+        ours, theirs = best(work, REPEATS), best(bare, REPEATS)
+        print(f"{relation:28} {ours:10.1f} {theirs:10.1f} {ours / theirs:7.1f}")  # noqa: T201
+
+
+def _checked(relation: str, outline: Outline, n: int) -> tuple[Work, FloatArray]:
+    """The check of places that hold, and these."""
+    site = Site({"t1": outline}, SIZE, SIZE)
+    group = Group.model_validate({"relation": relation, "targets": ["t1"], "robots": n})
+    contract = with_defaults(Contract(groups=(group,)), site.outlines, site.room)
+    points = place(contract, site)
+    assert certify(points, contract, site).certified
+    return lambda: certify(points, contract, site), points
+
+
+def _bare_around(outline: Outline, points: FloatArray) -> Work:
+    """Distances to the outline and to the ring, and to the nearest other robot."""
+    loop = shapely.LineString(ring(outline, 100, 200).lines[0])
+
+    def work() -> object:
+        places = np.asarray(shapely.points(points), dtype=object)
+        near = [nearest_segments(line, places) for line in (outline.filled, loop)]
+        return near, cKDTree(points).query(points, k=2)
+
+    return work
+
+
+def _bare_in(outline: Outline, points: FloatArray) -> Work:
+    """Distances to the outline and to the nearest other robot, and how far all ground is."""
+
+    def work() -> object:
+        places = np.asarray(shapely.points(points), dtype=object)
+        near = nearest_segments(outline.polygon, places)
+        cells = cells_of(outline.polygon, len(points))
+        return near, cKDTree(points).query(points, k=2), cKDTree(points).query(cells)
+
+    return work
+
+
+def _growth() -> Iterator[str]:
+    """Time and memory against the number of robots and of vertices."""
+    outline, counts, corners = bumpy(VERTICES), (300, 1000, 3000, MANY), (300, 1000, 3000)
+    loop = ring(outline, 100, 200)
+    by_robots: dict[str, Callable[[int], Work]] = {
+        "along": lambda n: lambda: along_curve(loop, n),
+        "inside": lambda n: _inside(outline, n),
+        "check of around": lambda n: _checked("around", outline, n)[0],
+        "check of inside": lambda n: _checked("inside", outline, n)[0],
+    }
+    by_vertices: dict[str, Callable[[int], Work]] = {
+        "around 8": lambda v: _eight(bumpy(v)),
+        "inside 100": lambda v: _inside(bumpy(v), 100),
+        "check of 1000 around": lambda v: _checked("around", bumpy(v), 1000)[0],
+        "check of 1000 inside": lambda v: _checked("inside", bumpy(v), 1000)[0],
+    }
+    for name, work in by_robots.items():
+        yield growth(name, "robots", counts, times(work, counts, REPEATS))
+    for name, work in by_vertices.items():
+        yield growth(name, "vertices", corners, times(work, corners, REPEATS))
+    for name, work in by_robots.items():
+        found = [peak(work(n)) for n in counts]
+        yield growth(f"{name}, memory", "robots", counts, found, "MiB")
+
+
+if __name__ == "__main__":
+    main()

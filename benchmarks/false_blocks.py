@@ -1,0 +1,149 @@
+"""`python -m formup.benchmarks.false_blocks`: how often the gate blocks, no worse and worse.
+
+Seeded comparisons of simulated versions go through the gate itself. Rates of tasks come from a beta
+distribution with ICC .3; tasks whose rate is .99 or more are the ones that must pass. Of the
+output .02 is invalid.
+"""
+
+import sys
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..evals.experiments.gate import Paired, gate
+from ..evals.statistics.intervals import Interval, wilson
+from ..evals.statistics.power import TASK_SD, rates
+
+COMPARISONS = 2000
+SIZES = ((15, 2), (15, 10), (30, 10), (60, 10), (150, 10))
+"""Tasks and trials of each."""
+INVALID = 0.02
+TOKENS, TOKENS_SD = 3000.0, 0.1
+"""Mean tokens of a trial, and the relative spread of a task's mean."""
+ALWAYS = 0.99
+REGRESSION = 0.10
+PLANTED = ((12, 10), (12, 20), (12, 30), (30, 10), (60, 10))
+"""Tasks and trials of each at which a lapse planted on purpose is looked for."""
+
+
+@dataclass(frozen=True)
+class Blocked:
+    """How often comparisons ended in each verdict."""
+
+    tasks: int
+    trials: int
+    regression: float
+    blocked: int
+    passed: int
+    comparisons: int
+
+    @property
+    def interval(self) -> Interval:
+        """Of the rate of blocks, at 95 %."""
+        return wilson(self.blocked, self.comparisons)
+
+
+def simulate(
+    tasks: int,
+    trials: int,
+    regression: float = 0.0,
+    *,
+    task_sd: float = 0.0,
+    comparisons: int = COMPARISONS,
+    seed: int = 0,
+) -> Blocked:
+    """Put simulated comparisons through the gate.
+
+    Args:
+        regression: what the new version loses on every task, as far as its rate goes.
+        task_sd: spread of the effect it has on each task but those that must pass.
+    """
+    random = np.random.default_rng([seed, tasks, trials, round(1000 * regression)])
+    blocked = passed = 0
+    for _ in range(comparisons):
+        verdict = gate(_versions(random, tasks, trials, regression, task_sd)).verdict
+        blocked += verdict == "block"
+        passed += verdict == "pass"
+    return Blocked(tasks, trials, regression, blocked, passed, comparisons)
+
+
+def _versions(
+    random: np.random.Generator, tasks: int, trials: int, regression: float, task_sd: float
+) -> Paired:
+    """Two versions as they turn out."""
+    before = rates(random, (tasks,))
+    always = before >= ALWAYS
+    effect = np.where(always, 0.0, random.normal(0, 1, tasks) * task_sd)
+    after = np.clip(before + effect - regression, 0, 1)
+    both = np.stack([before, after])
+    tokens = TOKENS * (1 + TOKENS_SD * random.normal(size=both.shape) / np.sqrt(trials))
+    return Paired(
+        tasks=tuple(map(str, range(tasks))),
+        pairs=np.full(tasks, float(trials)),
+        score=random.binomial(trials, both) / trials,
+        invalid=random.binomial(trials, INVALID, both.shape) / trials,
+        tokens=tokens,
+        must_pass=always,
+    )
+
+
+def planted(
+    tasks: int, trials: int, share: float, *, comparisons: int = COMPARISONS, seed: int = 0
+) -> Blocked:
+    """Put a version through the gate that fails in a share of trials which the old one all passes.
+
+    The lapse befalls any trial alike, as do those of evals/experiments/simulated_model.py.
+
+    Args:
+        share: of trials that lapse.
+    """
+    random = np.random.default_rng([seed, tasks, trials, round(1000 * share)])
+    none, all_right = np.zeros((2, tasks)), np.ones(tasks)
+    verdicts = list[str]()
+    for _ in range(comparisons):
+        kept = 1 - random.binomial(trials, share, tasks) / trials
+        paired = Paired(
+            tasks=tuple(map(str, range(tasks))),
+            pairs=np.full(tasks, float(trials)),
+            score=np.stack([all_right, kept]),
+            invalid=none,
+            tokens=none + TOKENS,
+            must_pass=np.zeros(tasks, dtype=bool),
+        )
+        verdicts.append(gate(paired).verdict)
+    blocked, passed = verdicts.count("block"), verdicts.count("pass")
+    return Blocked(tasks, trials, share, blocked, passed, comparisons)
+
+
+def main() -> None:
+    """Print the rates; exit code 1 if false blocks are not compatible with 5 % or less."""
+    began = time.perf_counter()
+    rows = [simulate(tasks, trials) for tasks, trials in SIZES]
+    uneven = [simulate(*SIZES[-1], task_sd=TASK_SD), simulate(15, 10, task_sd=TASK_SD)]
+    print(f"{COMPARISONS:,} comparisons each; blocks with Wilson's interval at 95 %\n")  # noqa: T201
+    _print("equal on every task", rows)
+    _print(f"equal on average, tasks differ by {TASK_SD:g}", uneven)
+    lost = [simulate(tasks, trials, REGRESSION) for tasks, trials in SIZES]
+    _print(f"{100 * REGRESSION:.0f} points worse on every task", lost)
+    worse = [planted(tasks, trials, REGRESSION) for tasks, trials in PLANTED]
+    _print(
+        f"a lapse in {REGRESSION:.0%} of the trials of a version that else always succeeds", worse
+    )
+    print(f"{time.perf_counter() - began:.1f} s")  # noqa: T201
+    sys.exit(int(any(row.interval.low > 0.05 for row in [*rows, *uneven])))
+
+
+def _print(title: str, rows: list[Blocked]) -> None:
+    print(title)  # noqa: T201
+    for row in rows:
+        low, high = row.interval
+        share, passed = row.blocked / row.comparisons, row.passed / row.comparisons
+        print(  # noqa: T201
+            f"  {row.tasks:4d} tasks x {row.trials:2d}: blocked {share:.4f} ({low:.4f} to "
+            f"{high:.4f}), passed {passed:.3f}"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The agent loop's overhead beside bare HTTP and other agent frameworks."""

@@ -1,0 +1,66 @@
+"""formup's own loop, model client and tool."""
+
+import numpy as np
+from formup.agent.limits import Limits
+from formup.agent.loop import run as converse
+from formup.agent.messages import User
+from formup.agent.model import Model
+from formup.agent.outcomes import Answered
+from formup.agent.providers.registry import model_named
+from formup.tools.perception.image import picture_from_array
+from formup.tools.scene import Scene
+from formup.tools.tool import ToolResult, tool
+from formup.tools.world import Workspace
+from pydantic import BaseModel
+from task import SYSTEM, USER, compute
+
+UNLIMITED = Limits(requests=None, tool_calls=None)
+WORKSPACE = Workspace(Scene(picture_from_array(np.full((20, 20, 3), 60, np.uint8))))
+_models: dict[tuple[str, bool], Model] = {}
+
+
+class Point(BaseModel):
+    """One of them."""
+
+    label: str
+    x: float
+    y: float
+
+
+@tool("read")
+async def check_points(workspace: Workspace, points: list[Point]) -> ToolResult:
+    """Count the points that lie inside the unit circle.
+
+    Args:
+        points: the points to check
+    """
+    return ToolResult({"result": compute((p.x, p.y) for p in points)})
+
+
+def _nowhere(text: str | None) -> None:
+    """Streamed text is asked for, and not looked at."""
+
+
+def _model(base_url: str, streams: bool) -> Model:
+    if (base_url, streams) not in _models:
+        show = _nowhere if streams else None
+        _models[base_url, streams] = model_named("openai:bench-model", base_url, show=show)
+    return _models[base_url, streams]
+
+
+async def _run(model: Model) -> str:
+    first = (User(text=USER),)
+    tools = (check_points,)
+    outcome = await converse(model, tools, WORKSPACE, first, system=SYSTEM, limits=UNLIMITED)
+    assert isinstance(outcome, Answered), outcome
+    return outcome.text
+
+
+async def run(base_url: str) -> str:
+    """A conversation."""
+    return await _run(_model(base_url, False))
+
+
+async def run_stream(base_url: str) -> str:
+    """A conversation, streamed."""
+    return await _run(_model(base_url, True))

@@ -1,0 +1,1 @@
+"""Trials of methods over suites: running, storing, comparing, gating and promoting."""

@@ -1,0 +1,119 @@
+"""What a comparison consists of: printed by `--json`, written by `--out`, read by promotion."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, PlainSerializer
+
+from ..statistics.intervals import Interval
+from .gate import Verdict
+from .journal import Arm
+
+Metric = Literal["sr", "strict", "gcr"]
+Outcome = Literal["better", "worse", "inconclusive"]
+
+Rounded = Annotated[float, PlainSerializer(lambda value: round(value, 6), return_type=float)]
+
+
+class _Value(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Range(_Value):
+    """An interval at 95 %, or one-sided bounds at 95 %."""
+
+    low: Rounded
+    high: Rounded
+
+    @classmethod
+    def of(cls, interval: Interval) -> "Range":
+        """As a value; at most from -1 to 1."""
+        return cls(low=max(-1.0, interval.low), high=min(1.0, interval.high))
+
+
+class Score(_Value):
+    """How one version does.
+
+    Attributes:
+        new_tasks: interval on tasks like these.
+        fixed_tasks: on these tasks; None for scores that are no shares of trials.
+        pass_k: the chance that k trials of a task all succeed, by k, as far as there are trials.
+    """
+
+    mean: Rounded
+    new_tasks: Range
+    successes: int | None
+    trials: int
+    fixed_tasks: Range | None
+    pass_k: dict[int, Rounded]
+
+
+class Settled(_Value):
+    """What would settle it: `trials` of each task, or `tasks` of as many trials as now.
+
+    Attributes:
+        difference: that is then told with power .8, as a share.
+    """
+
+    difference: Rounded
+    trials: int | None
+    tasks: int | None
+
+
+class Difference(_Value):
+    """The new version minus the old, on some of the tasks.
+
+    Attributes:
+        interval: at 95 %, on tasks like these.
+        p: of the paired permutation of task means; `p_holm` over all slices.
+        fixed_tasks, fixed_p: on these tasks alone; no interval with one trial per task.
+    """
+
+    tasks: int
+    pairs: int
+    a: Score
+    b: Score
+    estimate: Rounded
+    interval: Range
+    p: Rounded
+    p_holm: Rounded
+    fixed_tasks: Range | None
+    fixed_p: Rounded
+    outcome: Outcome
+    settled_by: Settled | None
+
+
+class Bounded(_Value):
+    """A rise and its one-sided bounds at 95 %."""
+
+    estimate: Rounded
+    low: Rounded
+    high: Rounded
+
+
+class Comparison(_Value):
+    """What `formup eval compare` and `gate` say, and `formup prompts promote` reads.
+
+    Attributes:
+        a: the old version, or baseline.
+        b: the new one.
+        verdict: of the gate.
+        reasons: of the verdict, and what is wrong with the runs.
+        outcome: of the comparison: better, worse or inconclusive.
+        success, invalid, tokens: what the gate rests on.
+    """
+
+    a: Arm
+    b: Arm
+    suite: str
+    metric: Metric
+    margin: float
+    verdict: Verdict
+    reasons: tuple[str, ...]
+    outcome: Outcome
+    success: Bounded
+    invalid: Bounded
+    tokens: Rounded | None
+    overall: Difference
+    slices: dict[str, dict[str, Difference]]
+    unpaired: tuple[int, int]
+    settled_by: Settled | None

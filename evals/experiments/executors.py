@@ -1,0 +1,232 @@
+"""Where trials run: here, in a pool of processes, or on a Ray cluster, behind one protocol.
+
+All three call `attempt`, so a row is the same wherever it was made, but for its times and host.
+"""
+
+import multiprocessing
+import os
+import platform
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from importlib import import_module
+from typing import Any, Protocol
+
+from ...tools.errors import FleetError, FormupError, InputError, ModelError
+from .trials import Trial, TrialRow
+
+Work = Callable[[Trial], TrialRow]
+"""Runs and grades a trial; picklable where another process calls it."""
+PER_WORKER = 2
+"""Trials under way for each worker, so that none waits for the next."""
+
+
+class Executor(Protocol):
+    """Runs trials that are submitted, `capacity` at once.
+
+    Attributes:
+        capacity: known after `start`.
+    """
+
+    capacity: int
+
+    def start(self, work: Work) -> None:
+        """Make ready to call `work`."""
+        ...
+
+    def submit(self, trial: Trial) -> None:
+        """Take on a trial."""
+        ...
+
+    def collect(self, timeout: float | None) -> list[TrialRow]:
+        """Rows that are done; waits up to `timeout` seconds for the first, None for ever."""
+        ...
+
+    def close(self) -> None:
+        """Let go of everything; trials not begun are dropped."""
+        ...
+
+
+def attempt(work: Work, trial: Trial) -> TrialRow:
+    """Run a trial; what providers, robots or the network cannot help is an infrastructure error.
+
+    Any other exception is a bug and ends the run.
+
+    Raises:
+        ValueError: the row is of another trial.
+    """
+    began = time.perf_counter()
+    try:
+        row = work(trial)
+    except (ModelError, FleetError, OSError) as error:
+        row = TrialRow.of(trial, "infra_error", feedback=f"{type(error).__name__}: {error}")
+    if row.key != trial.key:
+        raise ValueError(f"The row for task {trial.task}, trial {trial.trial} is another trial's.")
+    seconds = round(time.perf_counter() - began, 3)
+    return row.model_copy(update={"seconds": seconds, "host": platform.node()})
+
+
+class Serial:
+    """One trial after the other, in this process."""
+
+    capacity = 1
+
+    def start(self, work: Work) -> None:
+        """Make ready."""
+        self._work, self._waiting = work, list[Trial]()
+
+    def submit(self, trial: Trial) -> None:
+        """Take on a trial."""
+        self._waiting.append(trial)
+
+    def collect(self, timeout: float | None) -> list[TrialRow]:
+        """Run what was submitted."""
+        waiting, self._waiting = self._waiting, []
+        return [attempt(self._work, trial) for trial in waiting]
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class Pool:
+    """Processes of this machine, started afresh: for work that computes, such as vision.
+
+    Args:
+        workers: processes; one for each processor by default.
+    """
+
+    def __init__(self, workers: int | None = None) -> None:
+        self._workers = workers or os.cpu_count() or 1
+        self.capacity = self._workers * PER_WORKER
+
+    def start(self, work: Work) -> None:
+        """Make ready; the processes start with the first trials."""
+        self._pool = ProcessPoolExecutor(
+            self._workers,
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_begin_worker,
+            initargs=(work,),
+        )
+        self._running = set[Future[TrialRow]]()
+
+    def submit(self, trial: Trial) -> None:
+        """Hand a trial to the pool.
+
+        Raises:
+            FormupError: a process of the pool died.
+        """
+        try:
+            self._running.add(self._pool.submit(_attempt_in_worker, trial))
+        except BrokenProcessPool:
+            raise _died() from None
+
+    def collect(self, timeout: float | None) -> list[TrialRow]:
+        """What is done.
+
+        Raises:
+            FormupError: a process of the pool died.
+        """
+        done, self._running = wait(self._running, timeout, FIRST_COMPLETED)
+        try:
+            return [future.result() for future in done]
+        except BrokenProcessPool:
+            raise _died() from None
+
+    def close(self) -> None:
+        """End the processes after the trials they are at."""
+        self._pool.shutdown(cancel_futures=True)
+
+
+class Ray:
+    """Workers of a Ray cluster; formup must be installed on its machines.
+
+    Args:
+        address: of the cluster, as ray.init takes it; None starts one on this machine.
+        workers: trials at once; the cluster's processors by default.
+    """
+
+    capacity = 0
+
+    def __init__(self, address: str | None = None, workers: int | None = None) -> None:
+        self._address, self._workers = address, workers
+
+    def start(self, work: Work) -> None:
+        """Connect.
+
+        Raises:
+            InputError: Ray is not installed.
+        """
+        try:
+            self._ray: Any = import_module("ray")
+        except ImportError:
+            raise InputError("Running on Ray needs the extra: pip install 'formup[ray]'.") from None
+        self._ray.init(
+            address=self._address,
+            num_cpus=None if self._address else self._workers,
+            include_dashboard=None if self._address else False,
+            log_to_driver=False,
+        )
+        workers = self._workers or int(self._ray.cluster_resources().get("CPU", 1))
+        self.capacity = workers * PER_WORKER
+        self._attempt, self._work = self._ray.remote(attempt), self._ray.put(work)
+        self._running = list[Any]()
+
+    def submit(self, trial: Trial) -> None:
+        """Hand a trial to the cluster."""
+        self._running.append(self._attempt.remote(self._work, trial))
+
+    def collect(self, timeout: float | None) -> list[TrialRow]:
+        """What is done."""
+        done, self._running = self._ray.wait(
+            self._running, num_returns=1, timeout=timeout, fetch_local=True
+        )
+        return list(self._ray.get(done))
+
+    def close(self) -> None:
+        """Disconnect; a cluster that was started here ends."""
+        self._ray.shutdown()
+
+
+def executor(name: str, workers: int | None = None) -> Executor:
+    """The executor of a name: serial, pool or ray.
+
+    Raises:
+        InputError: there is none of that name.
+    """
+    if name == "serial":
+        return Serial()
+    if name == "pool":
+        return Pool(workers)
+    if name == "ray":
+        return Ray(workers=workers)
+    raise InputError(f"Unknown executor {name!r}. There are: serial, pool, ray.")
+
+
+_worker: list[Work] = []
+"""Of a process of the pool: what it calls."""
+
+
+def _begin_worker(work: Work) -> None:
+    _worker[:] = [work]
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A killed runner must not leave processes behind that wait for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _attempt_in_worker(trial: Trial) -> TrialRow:
+    return attempt(_worker[0], trial)
+
+
+def _died() -> FormupError:
+    return FormupError(
+        "A process of the pool died, perhaps for want of memory. What was done is kept; run again "
+        "to go on, with fewer workers."
+    )

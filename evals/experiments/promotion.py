@@ -1,0 +1,74 @@
+"""Whether a comparison allows one version of a prompt to take the place of another.
+
+A report of `formup eval compare` names the two texts it is about; it says nothing about others.
+"""
+
+import json
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from ...prompts import Prompt
+from ...tools.errors import InputError
+from ...tools.store import read_text
+from ...tools.tool import violations
+
+
+class Side(BaseModel):
+    """One of the two compared: the name of its prompt and the hash of its text."""
+
+    model_config = ConfigDict(frozen=True)
+
+    prompt: str
+    sha256: str
+
+
+class Comparison(BaseModel):
+    """What a promotion needs of a report: `b` is judged against `a`."""
+
+    model_config = ConfigDict(frozen=True)
+
+    a: Side
+    b: Side
+    suite: str
+    verdict: str
+
+
+def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
+    """What a comparison allows a promotion for, as a changelog says it.
+
+    Args:
+        path: of the report.
+        current: must be its `a`.
+        promoted: must be its `b`.
+
+    Raises:
+        InputError: it is no such report, is about other texts, or did not pass; all that is wrong.
+    """
+    report = _read(path)
+    sides = (("a", report.a, current, "current"), ("b", report.b, promoted, "promoted"))
+    wrong: list[str] = []
+    for name, side, prompt, role in sides:
+        if side.prompt != prompt.name:
+            wrong.append(f"its {name} is {side.prompt}, not {prompt.name}, the {role} version")
+        elif side.sha256 != prompt.sha256:
+            said, is_ = side.sha256[:12], prompt.sha256[:12]
+            wrong.append(f"its {name} is another text of {prompt.name} ({said}, not {is_})")
+    if report.verdict != "pass":
+        wrong.append(f"its verdict is {report.verdict!r}, not 'pass'")
+    if wrong:
+        raise InputError(
+            f"{path} does not allow it: {'; '.join(wrong)}. Compare {current.name} with "
+            f"{promoted.name}, or promote with --force --why."
+        )
+    return f"passed on {report.suite} against {current.name}"
+
+
+def _read(path: Path) -> Comparison:
+    try:
+        return Comparison.model_validate(json.loads(read_text(path)))
+    except ValidationError as error:
+        what = f"{path} is no report of `formup eval compare`"
+        raise InputError(f"{what}: {violations(error)}") from None
+    except (ValueError, RecursionError):
+        raise InputError(f"{path} is not JSON; give a report of `formup eval compare`.") from None

@@ -1,0 +1,63 @@
+"""Requests to a model no faster than its provider allows.
+
+Each process keeps its own pace, so that a sweep divides what is allowed among its processes.
+"""
+
+import asyncio
+import time
+from functools import lru_cache
+from threading import Lock
+from typing import Any
+
+from ...agent.messages import Reply
+from ...agent.model import Model, Request
+
+
+class Pace:
+    """Turns that are a fixed time apart.
+
+    Args:
+        per_minute: turns, above 0.
+    """
+
+    def __init__(self, per_minute: float) -> None:
+        self._gap = 60 / per_minute
+        self._free_at = 0.0
+        self._lock = Lock()
+
+    def wait(self, now: float) -> float:
+        """Take the next turn; seconds until it comes.
+
+        Args:
+            now: seconds on a steady clock.
+        """
+        with self._lock:
+            start = max(now, self._free_at)
+            self._free_at = start + self._gap
+            return start - now
+
+
+@lru_cache
+def pace_of(model: str, per_minute: float) -> Pace:
+    """The pace of a model in this process, the same one for all trials."""
+    return Pace(per_minute)
+
+
+class Paced:
+    """A model that waits for its turn before each reply; all else of it stays its own."""
+
+    def __init__(self, model: Model, pace: Pace) -> None:
+        self._model, self._pace = model, pace
+
+    @property
+    def name(self) -> str:
+        """Of the model."""
+        return self._model.name
+
+    async def reply(self, request: Request) -> Reply:
+        """The model's, in its turn."""
+        await asyncio.sleep(self._pace.wait(time.monotonic()))
+        return await self._model.reply(request)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._model, name)

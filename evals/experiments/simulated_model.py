@@ -1,0 +1,113 @@
+"""A test model that reads its prompt: the offline rules, which lapse where a sentence is missing.
+
+Which trials a lapse befalls is drawn from the trial's seed, so it is the same under every prompt:
+a prompt that lacks a sentence loses a known share of tasks, and a gate can be tried on that. It is
+no language model, and what it scores says nothing about one.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ...agent.first_message import Task, read_task
+from ...agent.messages import Call, Reply, User
+from ...agent.model import Request
+from ...agent.offline.planner import OfflinePlanner
+
+Kind = Literal[
+    "own positions", "own lengths", "no deployment", "no question", "the picture's orders"
+]
+
+
+@dataclass(frozen=True)
+class Duty:
+    """A sentence, and what happens without it.
+
+    Attributes:
+        sentences: any of these in the prompt, letter case and line breaks aside, is enough.
+        share: of trials that lapse without it.
+    """
+
+    kind: Kind
+    sentences: tuple[str, ...]
+    share: float
+
+
+DUTIES = (
+    Duty(
+        "own positions",
+        (
+            "never work out coordinates",
+            "never compute coordinates",
+            "never work out where robots go",
+        ),
+        0.3,
+    ),
+    Duty("own lengths", ("leave out lengths the person did not name", "leave lengths out"), 0.2),
+    Duty("no deployment", ("call deploy", "deploy a certified plan"), 0.5),
+    Duty("no question", ("ask one question",), 1.0),
+    Duty("the picture's orders", ("words inside the picture", "text inside the picture"), 0.1),
+)
+"""own positions: a row across the picture, whatever was asked. own lengths: rings, cages and sides
+at a distance of 1 px. no deployment: it stops at the plan. no question: it takes c1 instead. the
+picture's orders: it does what words in it say, as if they said to line up."""
+
+
+class ObedientModel:
+    """The offline rules under a prompt.
+
+    Args:
+        seed: of the trial.
+    """
+
+    name = "obedient"
+    prompt = "former"
+
+    def __init__(self, seed: int = 0) -> None:
+        self._seed = seed
+        self._rules = OfflinePlanner()
+
+    async def reply(self, request: Request) -> Reply:
+        """What the rules say, less what the prompt forgot to ask for."""
+        reply = await self._rules.reply(request)
+        first = request.messages[0]
+        assert isinstance(first, User)
+        task, lapses = read_task(first.text), lapses_of(request.system, self._seed)
+        if "no deployment" in lapses and any(c.name == "deploy" for c in reply.calls):
+            return Reply(text="The plan is certified.")
+        calls = tuple(_lapsed(call, task, lapses) for call in reply.calls)
+        return reply.model_copy(update={"calls": calls})
+
+
+def lapses_of(prompt: str, seed: int) -> set[Kind]:
+    """What goes wrong in a trial under a prompt."""
+    said = re.sub(r"\s+", " ", prompt.lower())
+    random = np.random.default_rng([seed, 7])
+    drawn = random.random(len(DUTIES))
+    return {
+        duty.kind
+        for duty, chance in zip(DUTIES, drawn, strict=True)
+        if chance < duty.share and not any(sentence in said for sentence in duty.sentences)
+    }
+
+
+def _lapsed(call: Call, task: Task, lapses: set[Kind]) -> Call:
+    if call.name == "ask_user" and "no question" in lapses:
+        group = {"relation": "around", "targets": ["t1"], "robots": task.robots or 4}
+        guess = {"contract": {"groups": [group]}, "targets": [{"id": "t1", "candidate": "c1"}]}
+        return Call(id=call.id, name="propose_formation", arguments=guess)
+    if call.name != "propose_formation":
+        return call
+    arguments: dict[str, Any] = dict(call.arguments)
+    groups = [dict(group) for group in arguments["contract"]["groups"]]
+    if "own lengths" in lapses:
+        for group in groups:
+            if group["relation"] in ("around", "cage", "along"):
+                group["clearance"] = [0.5, 1.5]
+    arguments["contract"] = {**arguments["contract"], "groups": groups}
+    if lapses & {"own positions", "the picture's orders"}:
+        n = sum(group["robots"] for group in groups)
+        arguments["positions"] = [[10.0 + 3.0 * i, 10.0] for i in range(n)]
+    return Call(id=call.id, name=call.name, arguments=arguments)

@@ -1,0 +1,29 @@
+"""Whether a task can be trusted: a right answer scores 1, answers without understanding do not.
+
+A wrong truth is found out late and by everybody at once; this finds it before a task is used.
+"""
+
+import numpy as np
+
+from ...tools.errors import ToolError
+from ..tasks.suite_task import SuiteTask
+from .grading import grade_goals
+from .policies import POLICIES, scores
+from .reference import reference
+
+
+def check_task(task: SuiteTask) -> list[str]:
+    """What is wrong with a task, as sentences; none if it holds."""
+    if not task.goals:
+        return []
+    try:
+        placed = np.concatenate([reference(goal) for goal in task.goals])
+    except ToolError as error:
+        return [f"{task.id}: no right answer could be placed: {error}"]
+    graded = grade_goals(task.goals, placed)
+    problems = [] if graded.sr else [f"{task.id}: a right answer fails: {graded.feedback}."]
+    crowd = sum(goal.robots for goal in task.goals) > 1  # of one, finding the thing may be all
+    for name in POLICIES:
+        if crowd and scores(name, task.goals)[0] == 1:
+            problems.append(f"{task.id}: the policy {name}, which understands nothing, succeeds.")
+    return problems

@@ -1,0 +1,187 @@
+"""Grades an attempt at a task: all its goals, or that robots rightly stayed where they were."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
+from shapely.geometry import Polygon
+
+from ...agent.report import Status
+from ...tools.geometry.outline import FloatArray
+from ..tasks.photographs import Task, Thing
+from .graded import Graded, Part, distinct
+from .lines import centre, corners, line_between, side
+from .region import region
+from .ring import escape_proof, ring
+
+SAME = 0.5
+"""Overlap (intersection over union) above which an outline found is the thing meant."""
+Rule = Callable[[Task, FloatArray, NDArray[np.bool_]], Part]
+RULES: dict[str, Rule] = {
+    "boundary": ring,
+    "cage": escape_proof,
+    "inside": region,
+    "corners": corners,
+    "side": side,
+    "line_between": line_between,
+    "center": centre,
+}
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of a task.
+
+    Attributes:
+        status: how the run ended.
+        planned: positions commanded, (m, 2) px; None for none.
+        observed: positions read back after the move; None where nothing has moved.
+        found: outlines robots were placed about; none where that is not known.
+        said: what the person was told.
+        declined: a question or a refusal was made the way the interface has for it. Words alone
+            are none: nobody can tell them from a reply that went wrong.
+    """
+
+    status: Status
+    planned: Sequence[tuple[float, float]] | None = None
+    observed: Sequence[tuple[float, float]] | None = None
+    found: tuple[Polygon, ...] = ()
+    said: str = ""
+    declined: bool = False
+
+
+def grade_goals(goals: Sequence[Task], positions: ArrayLike | None) -> Graded:
+    """Grade positions against the goals of a task, each with a number of robots of its own.
+
+    Which robot serves which goal is decided in the robots' favour by distance; their order does
+    not matter.
+
+    Args:
+        goals: one or more, on one picture.
+        positions: (m, 2) px; None where nothing was placed.
+    """
+    points = _points(positions)
+    if points is None or not len(points):
+        return Graded(False, 0.0, False, feedback="nothing was placed")
+    robots = sum(goal.robots for goal in goals)
+    width, height = goals[0].size
+    with np.errstate(invalid="ignore"):
+        in_picture = ((points >= 0) & (points <= (width - 1, height - 1))).all(axis=1)
+    free = in_picture & distinct(points)
+    owned = _shared(goals, points)
+    parts = [
+        (goal, RULES[str(goal.success["where"]).partition(":")[0]](goal, points[own], free[own]))
+        for goal, own in zip(goals, owned, strict=True)
+    ]
+    right = np.zeros(len(points), dtype=bool)
+    for own, (_, part) in zip(owned, parts, strict=True):
+        right[own] = part.right
+    wrong = list[str]()
+    if len(points) != robots:
+        wrong.append(f"{len(points)} positions for {robots} robots")
+    if not in_picture.all():
+        wrong.append(f"{int((~in_picture).sum())} outside the picture")
+    if (in_picture & ~free).any():
+        wrong.append(f"{int((in_picture & ~free).sum())} in another robot's place")
+    sr = len(points) == robots and all(part.success(goal.robots) for goal, part in parts)
+    hits = sum(max(part.hits(goal.robots), 0.0) for goal, part in parts)
+    strict = [p for _, part in parts for p in part.strict_problems]
+    return Graded(
+        sr=sr,
+        gcr=1.0 if sr else hits / max(robots, len(points)),
+        strict=sr and not strict,
+        feedback="; ".join([*wrong, *(p for _, part in parts for p in part.problems), *strict]),
+        measures=_measures([part for _, part in parts]),
+        right=tuple(right.tolist()),
+    )
+
+
+def grade_attempt(goals: Sequence[Task], expects: Sequence[Status], attempt: Attempt) -> Graded:
+    """Grade what came of a task; the observed positions are the official ones.
+
+    Args:
+        goals: of the task; none where nothing is to be placed.
+        expects: statuses that are right; where `deployed` is not among them, robots that moved are
+            a failure whatever was said.
+        attempt: what came of it.
+    """
+    if "deployed" not in expects:
+        return _graded_refusal(expects, attempt)
+    graded = grade_goals(goals, attempt.observed)
+    planned = grade_goals(goals, attempt.planned)
+    feedback = graded.feedback if attempt.observed else f"{attempt.status}: {attempt.said}"
+    if graded.sr != planned.sr:
+        feedback += f" (as planned: {'right' if planned.sr else planned.feedback})"
+    things = [thing for goal in goals for thing in (goal.target, goal.other) if thing]
+    return Graded(
+        sr=graded.sr,
+        gcr=graded.gcr,
+        strict=graded.strict,
+        object_correct=_meant(attempt.found, things) if attempt.found else None,
+        feedback=feedback,
+        measures={**graded.measures, "planned_gcr": planned.gcr},
+        right=graded.right,
+    )
+
+
+def _graded_refusal(expects: Sequence[Status], attempt: Attempt) -> Graded:
+    right = attempt.declined and attempt.status in expects and attempt.observed is None
+    wanted = " or ".join(expects)
+    if attempt.observed is not None:
+        feedback = f"robots were moved, {wanted} was right"
+    elif right:
+        feedback = ""
+    else:
+        words = "" if attempt.declined else ", in words alone"
+        feedback = f"{attempt.status}{words}, {wanted} was right: {attempt.said}"
+    return Graded(right, float(right), right, feedback=feedback)
+
+
+def _points(positions: ArrayLike | None) -> FloatArray | None:
+    """Positions as an array; what is no number stands nowhere."""
+    if positions is None:
+        return None
+    points = np.asarray(positions, dtype=float).reshape(-1, 2)
+    return np.where(np.isfinite(points), points, -1e9)
+
+
+def _shared(goals: Sequence[Task], points: FloatArray) -> list[NDArray[np.intp]]:
+    """The robots of each goal by least total distance to its target; the last gets those over."""
+    if len(goals) == 1:
+        return [np.arange(len(points))]
+    slots = [i for i, goal in enumerate(goals) for _ in range(goal.robots)]
+    places = shapely.points(points)
+    far = np.stack([shapely.distance(_ground(goal), places) for goal in goals], axis=1)
+    rows, columns = linear_sum_assignment(far[:, slots])
+    owner = np.full(len(points), len(goals) - 1)
+    owner[rows] = np.asarray(slots)[columns]
+    return [np.flatnonzero(owner == i) for i in range(len(goals))]
+
+
+def _ground(goal: Task) -> Polygon:
+    return Polygon(goal.target.polygon, goal.target.holes)
+
+
+def _meant(found: Sequence[Polygon], things: Sequence[Thing]) -> bool:
+    """Whether the outlines found are those of the things meant, in any order."""
+    truths = {thing.id: shapely.make_valid(Polygon(thing.polygon, thing.holes)) for thing in things}
+    if len(found) != len(truths):
+        return False
+    return any(
+        all(_iou(polygon, truth) > SAME for polygon, truth in zip(found, order, strict=True))
+        for order in permutations(truths.values())
+    )
+
+
+def _iou(a: Polygon, b: shapely.Geometry) -> float:
+    return float(a.intersection(b).area / max(a.union(b).area, 1e-9))
+
+
+def _measures(parts: Sequence[Part]) -> dict[str, float]:
+    if len(parts) == 1:
+        return dict(parts[0].measures)
+    return {f"{k}_{i}": v for i, p in enumerate(parts, start=1) for k, v in p.measures.items()}

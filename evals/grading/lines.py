@@ -1,0 +1,118 @@
+"""Corners, one side, a line between two things, a centre: each robot against its place."""
+
+import numpy as np
+from numpy.typing import NDArray
+from shapely.geometry import LineString, Polygon
+
+from ...tools.geometry.outline import FloatArray, distances
+from ..tasks.photographs import Task
+from .graded import Part
+from .photo_rules import STRICT_SHARE, beyond
+from .slots import even_along, matched
+
+OFF = 0.1
+"""Strict: how far off the target a robot stands at a corner, as a share of the tolerance."""
+EVEN = 0.25
+"""Strict: how far off its even place a robot may stand along a line, as a share of a gap."""
+
+
+def corners(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+    """Judge one robot at each of `points`, outside the target.
+
+    The rule of the photographs matches by least fourth powers, this one by most corners held: it
+    can only find more. It agrees on whether all are.
+
+    Args:
+        task: with the rule.
+        points: (m, 2), px.
+        free: which of them can be right at all, (m,).
+    """
+    rule = task.success
+    slots, most = np.asarray(rule["points"], dtype=float), rule["tolerance_px"]
+    near = distances(Polygon(task.target.polygon, task.target.holes), points)
+    stands = free & (near > 0) & (near >= rule.get("min_clearance_px", 0))
+    held = np.full(len(points), -1, dtype=np.intp)
+    held[stands] = matched(points[stands], slots, most)
+    problems = list[str]()
+    empty = len(slots) - int((held >= 0).sum())
+    if empty:
+        problems.append(f"{empty} of {len(slots)} corners without a robot within {most} px")
+    if (near <= 0).any():
+        problems.append(f"{int((near <= 0).sum())} on the target")
+    strictly = matched(points[stands & (near >= OFF * most)], slots, STRICT_SHARE * most)
+    short = len(slots) - int((strictly >= 0).sum())
+    strict = (f"{short} corners not held within {STRICT_SHARE * most:.0f} px",) if short else ()
+    return Part(held >= 0, 1.0, tuple(problems), strict)
+
+
+def side(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+    """Judge a row on one side by `band_px` and `min_span_frac`.
+
+    Args:
+        task: with the rule.
+        points: (m, 2), px.
+        free: which of them can be right at all, (m,).
+    """
+    rule, target = task.success, Polygon(task.target.polygon)
+    name, (low, high) = rule["where"].partition(":")[2], rule["band_px"]
+    axis = 0 if name in ("top", "bottom") else 1
+    off = distances(target, points)
+    there = np.array([beyond(target, point[None], name) for point in points], dtype=bool)
+    right = free & (off >= low) & (off <= high) & there
+    problems = list[str]()
+    if not there.all():
+        problems.append(f"{int((~there).sum())} not on the {name} side")
+    if (off < low).any() or (off > high).any():
+        problems.append(
+            f"{off.min():.0f} to {off.max():.0f} px from the target, {low}-{high} wanted"
+        )
+    wanted = rule["min_span_frac"] * float(np.ptp(np.asarray(task.target.polygon)[:, axis]))
+    span = float(np.ptp(points[right][:, axis])) if right.any() else 0.0
+    if float(np.ptp(points[:, axis])) < wanted:
+        problems.append(f"spans {span:.0f} px, {wanted:.0f} needed")
+    whole = min(1.0, span / max(wanted, 1e-9))
+    strict = _uneven(points[:, axis])
+    return Part(right, whole, tuple(problems), strict, {"span_px": span})
+
+
+def line_between(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+    """Judge robots on the segment between `points`.
+
+    Args:
+        task: with the rule.
+        points: (m, 2), px.
+        free: which of them can be right at all, (m,).
+    """
+    a, b = np.asarray(task.success["points"], dtype=float)
+    most = task.success["tolerance_px"]
+    off = distances(LineString([a, b]), points)
+    problems = (f"{off.max():.1f} px off the line, {most} allowed",) if (off > most).any() else ()
+    strict = [*_uneven((points - a) @ (b - a) / float(np.linalg.norm(b - a)))]
+    if (off > STRICT_SHARE * most).any():
+        strict.append(f"{off.max():.1f} px off the line, {STRICT_SHARE * most:.0f} wanted")
+    return Part(free & (off <= most), 1.0, problems, tuple(strict))
+
+
+def centre(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+    """Judge robots at the first of `points`.
+
+    Args:
+        task: with the rule.
+        points: (m, 2), px.
+        free: which of them can be right at all, (m,).
+    """
+    middle, most = np.asarray(task.success["points"][0]), task.success["tolerance_px"]
+    off = np.linalg.norm(points - middle, axis=1)
+    problems, strict = (), ()
+    if (off > most).any():
+        problems = (f"{off.max():.1f} px from the centre, {most} allowed",)
+    if (off > STRICT_SHARE * most).any():
+        strict = (f"{off.max():.1f} px from the centre, {STRICT_SHARE * most:.0f} wanted",)
+    return Part(free & (off <= most), 1.0, problems, strict)
+
+
+def _uneven(stations: FloatArray) -> tuple[str, ...]:
+    if len(stations) < 3:
+        return ()
+    even = even_along(stations, EVEN)
+    return () if even == len(stations) else (f"uneven: {even} of {len(stations)} on even places",)

@@ -1,0 +1,93 @@
+"""A right answer to every task: the contract its rule comes to, placed on the true outline.
+
+If this does not score 1, the task or the grader is wrong: a test holds every task to it.
+"""
+
+from typing import Any
+
+import numpy as np
+import shapely
+from scipy.cluster.vq import kmeans2
+
+from ...tools.formation.contract import Contract, Group, Relation, with_defaults
+from ...tools.formation.placement.place import Site, place
+from ...tools.geometry.outline import FloatArray
+from ...tools.geometry.sampling import nearest
+from ..tasks.photographs import Task
+from .grading import grade_goals
+
+SPARE = 0.02
+"""Share by which a place keeps clear of the ends of what the rule allows."""
+CELLS = 40
+"""Cells along the size of a region, at least."""
+WIDTHS = (0.25, 0.05)
+"""Half the part of a band that is used; a narrow one follows recesses that a wide one bridges."""
+
+
+def reference(goal: Task) -> FloatArray:
+    """Positions that satisfy a goal, (N, 2) px.
+
+    Raises:
+        ToolError: no placement satisfies it.
+    """
+    where = str(goal.success["where"])
+    if where == "line_between":
+        a, b = np.asarray(goal.success["points"], dtype=float)
+        share = (np.arange(goal.robots) + 1) / (goal.robots + 1)
+        return a + share[:, None] * (b - a)
+    if where == "inside":
+        quick = _spread(goal)
+        return quick if grade_goals([goal], quick).strict else _placed(goal, where, WIDTHS[0])
+    bands = WIDTHS if "band_px" in goal.success else WIDTHS[:1]
+    placed = [_placed(goal, where, bands[0])]
+    if not grade_goals([goal], placed[0]).strict:
+        placed += [_placed(goal, where, width) for width in bands[1:]]
+    return placed[-1]
+
+
+def _spread(goal: Task) -> FloatArray:
+    """Means of clusters of the region's cells, the nearest cells to them: quick and often even."""
+    rule, target = goal.success, goal.target.outline.polygon
+    inner = target.buffer(-rule["min_clearance_px"] * (1 + SPARE))
+    x0, y0, x1, y1 = target.bounds
+    step = goal.target.outline.size / max(CELLS, 4 * goal.robots**0.5)
+    columns, rows = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
+    cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
+    cells = cells[shapely.contains_xy(inner, cells)]
+    if len(cells) < goal.robots:
+        return np.empty((0, 2))
+    means, _ = kmeans2(cells, goal.robots, minit="++", seed=np.random.default_rng(0))
+    return cells[nearest(cells, means, 1)[1]]
+
+
+def _placed(goal: Task, where: str, width: float) -> FloatArray:
+    outlines = {"t1": goal.target.outline}
+    site = Site(outlines, *(float(side) for side in goal.size))
+    contract = with_defaults(Contract(groups=(_group(goal, where, width),)), outlines, site.room)
+    return place(contract, site)
+
+
+def _group(goal: Task, where: str, width: float) -> Group:
+    rule, n = goal.success, goal.robots
+    kind, _, name = where.partition(":")
+    if kind == "inside":
+        deep = max(rule["min_clearance_px"] * (1 + SPARE), 0.01)
+        floor = rule["min_spacing_px"] * (1 + SPARE)
+        depth = (deep, 4 * goal.target.outline.size)
+        return _group_of("inside", n, clearance=depth, min_spacing=floor)
+    if kind == "corners":
+        return _group_of("corners", n)
+    if kind == "center":
+        return _group_of("centre", n)
+    low, high = rule["band_px"]
+    spread = (high - low) * width
+    band = ((low + high) / 2 - spread, (low + high) / 2 + spread)
+    if kind == "side":
+        return _group_of("along", n, clearance=band, side=name)
+    if kind == "cage":
+        return _group_of("cage", n, clearance=band, closure="escape-proof")
+    return _group_of("cage" if rule.get("closed") else "around", n, clearance=band)
+
+
+def _group_of(relation: Relation, robots: int, **more: Any) -> Group:
+    return Group(relation=relation, targets=("t1",), robots=robots, **more)

@@ -1,0 +1,80 @@
+"""Infill: robots inside, apart from each other, and no part of the region far from all of them.
+
+Robots inside alone would credit a straight line in one arm of an L; the covered share would
+credit a crowd with one robot in every part. The lesser of the two counts.
+"""
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+
+from ...tools.geometry.outline import FloatArray, distances
+from ...tools.geometry.sampling import min_spacing, nearest
+from ..tasks.photographs import Task
+from .graded import Part
+from .photo_rules import STRICT_SPREAD
+
+CELLS = 80
+"""Cells along a length that is the square root of the area."""
+
+
+def region(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+    """Judge an infill by `min_clearance_px`, `min_spacing_px` and `max_uncovered_px`.
+
+    A robot is right if it stands deep enough inside and belongs to a set of robots that are far
+    enough apart, chosen as large as choosing the least crowded first makes it.
+
+    Args:
+        task: with the rule.
+        points: (m, 2), px.
+        free: which of them can be right at all, (m,).
+    """
+    rule, target = task.success, Polygon(task.target.polygon, task.target.holes)
+    sign = np.where(shapely.contains_xy(target, points), 1.0, -1.0)
+    depth = distances(target.boundary, points) * sign
+    least, floor = rule["min_clearance_px"], rule["min_spacing_px"]
+    problems, strict = list[str](), list[str]()
+    if (depth < least).any():
+        count = int((depth < least).sum())
+        problems.append(f"{count} not inside by {least} px: the worst by {depth.min():.1f}")
+    right = separated(points, free & (depth >= least), floor)
+    apart = min_spacing(points)
+    if apart < floor:
+        problems.append(f"two robots {apart:.0f} px apart, {floor} needed")
+    elif apart < STRICT_SPREAD * floor:
+        strict.append(f"two robots {apart:.0f} px apart, {STRICT_SPREAD * floor:.0f} wanted")
+    bare = _bareness(task, target, points)
+    most = rule["max_uncovered_px"]
+    if bare.max() > most:
+        problems.append(f"a part {bare.max():.0f} px from the nearest robot, {most} allowed")
+    elif STRICT_SPREAD * bare.max() > most:
+        strict.append(f"a part {bare.max():.0f} px from a robot, {most / STRICT_SPREAD:.0f} wanted")
+    covered = float((_bareness(task, target, points[right]) <= most).mean()) if right.any() else 0.0
+    measures = {"covered": covered, "uncovered_px": float(bare.max())}
+    return Part(right, covered, tuple(problems), tuple(strict), measures)
+
+
+def separated(points: FloatArray, allowed: NDArray[np.bool_], spacing: float) -> NDArray[np.bool_]:
+    """A large set of allowed points no two of which are nearer than the spacing, (m,)."""
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) < spacing
+    near &= allowed[:, None] & allowed[None]
+    np.fill_diagonal(near, False)
+    left, kept = allowed.copy(), np.zeros(len(points), dtype=bool)
+    while left.any():
+        crowd = np.where(left, (near & left).sum(axis=1), len(points) + 1)
+        chosen = int(np.argmin(crowd))
+        kept[chosen] = True
+        left &= ~near[chosen]
+        left[chosen] = False
+    return kept
+
+
+def _bareness(task: Task, target: Polygon, points: FloatArray) -> FloatArray:
+    """Distance of the region's cells to the nearest point, px."""
+    x0, y0, x1, y1 = target.bounds
+    step = task.target.outline.size / CELLS
+    columns, rows = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
+    cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
+    cells = cells[shapely.contains_xy(target, cells)]
+    return np.asarray(nearest(points, cells, 1)[0], dtype=float).reshape(len(cells))

@@ -1,0 +1,55 @@
+"""Escape-proof cages of few robots: fewer than the ring that a disc in the thing certifies.
+
+A ring that closes every gap below the thing's inscribed disc certainly holds it, and anybody who
+counts well makes one. With fewer robots it depends on the shape where they have to stand.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ...scenes.build import entry_of, named, tell
+from ...scenes.things import Thing
+from .length_rules import distance
+
+SHARES = (0.6, 1.0)
+"""Of the robots of such a ring."""
+LEAST, MOST = 4, 30
+OFF_SHARE, OFF = 0.4, 4.0
+"""How far off the distance a robot may stand: this share of it, at least so many px."""
+WORDS = (
+    "cage {thing} with {n} robots, about {d} px from it, escape-proof: it must not get out however "
+    "it moves and turns",
+    "place {n} robots about {d} px from {thing} as an escape-proof cage",
+)
+
+
+def caged(seed: int) -> dict[str, Any]:
+    """The entry of annotations.json of a seed."""
+    story = tell(seed)
+    random = np.random.default_rng([seed, 8])
+    thing = story.target
+    d = distance(random, thing, story.scene.size) or 6
+    n = _robots(thing, d, random.uniform(*SHARES))
+    words = WORDS[random.integers(len(WORDS))]
+    text = words.format(thing=named(random, story), n=n, d=d)
+    off = max(OFF, OFF_SHARE * d)
+    rule = {"where": "cage", "band_px": [round(max(d - off, 1.0), 1), round(d + off, 1)]}
+    entry = entry_of(story)
+    entry["tasks"][0] |= {
+        "instruction": f"{text[:1].upper()}{text[1:]}.",
+        "robots": n,
+        "category": "caging",
+        "success": rule,
+        "style": "default",
+    }
+    return entry
+
+
+def _robots(thing: Thing, d: float, share: float) -> int:
+    filled = thing.outline.filled
+    disc = shapely.maximum_inscribed_circle(filled).length
+    ring = math.floor(filled.buffer(d).length / (2 * disc)) + 1
+    return min(max(LEAST, round(share * ring)), MOST)

@@ -1,0 +1,70 @@
+"""How an instruction names a length, in px or by a scale in metres, and the size of robots.
+
+Metres are rounded to two digits first and the rule made of those, so that words and rule agree.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ...scenes.layout import room
+from ...scenes.things import Thing
+from .length_rules import inner_cell
+
+RADII = (5, 11)
+"""Of robots whose size is named, px: the least is more than a distance that is held may be off."""
+SPREAD = 2.6
+"""Least distance of robots' centres, in radii, where their size is named."""
+OFF = 4.0
+"""How far off its distance a robot whose size is named may stand, px, less than any radius."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """A length, px, and the words for it."""
+
+    px: float
+    words: str
+
+
+def named_length(px: float, scale: float | None) -> Named:
+    """A length as an instruction names it: about so many px.
+
+    Args:
+        px: whole where there is no scale.
+        scale: metres per pixel, or None.
+    """
+    if scale is None:
+        return Named(px, f"{px} px")
+    metres = float(f"{px * scale:.2g}")
+    if metres >= 1 or (metres >= 0.1 and int(px) % 2):
+        words = f"{metres:g} m"
+    elif metres >= 0.01:
+        words = f"{100 * metres:g} cm"
+    else:
+        words = f"{1000 * metres:g} mm"
+    return Named(round(metres / scale, 2), words)
+
+
+def robot_size(seed: int, scale: float | None) -> Named | None:
+    """How much robots are across, for every picture with a scale."""
+    if scale is None:
+        return None
+    radius = int(np.random.default_rng([seed, 7]).integers(*RADII))
+    return named_length(2 * radius, scale)
+
+
+def fits(
+    thing: Thing, size: tuple[int, int], rule: dict[str, Any], robots: int, across: float
+) -> bool:
+    """Whether robots of a size have room where a rule has their centres."""
+    if rule["where"] == "inside":
+        deep = rule["min_clearance_px"] + across / 2
+        inner = thing.polygon.buffer(-deep)
+        whole = shapely.get_num_geometries(inner) == 1 and not inner.is_empty
+        return whole and inner_cell(thing, robots, deep) >= SPREAD * across / 2
+    far = rule["band_px"][1]
+    loop = thing.outline.filled.buffer(sum(rule["band_px"]) / 2).exterior.length
+    return far + across / 2 + 2 <= room(thing, size) and loop >= robots * SPREAD * across / 2

@@ -1,0 +1,116 @@
+"""Nobody drives through a target."""
+
+import numpy as np
+import pytest
+import shapely
+from formup.tools.errors import FleetError
+from formup.tools.formation.contract import Contract, Group
+from formup.tools.formation.placement.place import Site
+from formup.tools.geometry.curves import Frame
+from formup.tools.geometry.outline import FloatArray, make_outline
+from formup.tools.motion.motion import along, obstacles, routes
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+FRAME = Frame(640, 480, 0)
+t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+CUP = Polygon(
+    [(200, 150), (230, 150), (230, 300), (400, 300), (400, 150), (430, 150), (430, 330), (200, 330)]
+)
+SOLIDS: dict[str, BaseGeometry] = {
+    "box": shapely.box(250, 180, 400, 300),
+    "cup": CUP,
+    "disc": Polygon(np.stack([np.cos(t), np.sin(t)], axis=1) * 90 + (320, 240)),
+    "needle": Polygon([(100, 238), (540, 240), (100, 242)]),
+    "three": shapely.union_all(
+        [shapely.box(120, 100, 200, 220), shapely.box(260, 200, 330, 400), CUP.buffer(0.0)]
+    ),
+}
+
+
+def free_points(rng: np.random.Generator, solid: BaseGeometry, n: int, away: float) -> FloatArray:
+    points = rng.uniform((20, 20), (620, 460), (400, 2))
+    off = np.asarray(shapely.distance(solid, shapely.points(points)))
+    return points[off > away][:n]
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+@pytest.mark.parametrize("radius", [0.0, 3.0, 9.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_route_brings_a_body_onto_a_target(name: str, radius: float, seed: int) -> None:
+    solid, rng = SOLIDS[name], np.random.default_rng(seed)
+    starts = free_points(rng, solid, 12, radius + 2)
+    goals = free_points(rng, solid, 12, radius + 2)
+    paths = routes(starts, goals, solid, radius, FRAME)
+    assert len(paths) == 12
+    for start, goal, path in zip(starts, goals, paths, strict=True):
+        assert np.array_equal(path[0], start)
+        assert np.array_equal(path[-1], goal)
+        assert solid.distance(LineString(path)) > radius
+        places = np.concatenate([along([path], np.array([s])) for s in np.linspace(0, 1, 60)])
+        assert shapely.distance(solid, shapely.points(places)).min() > radius
+
+
+def test_into_a_cup_the_way_leads_through_its_mouth_and_is_short() -> None:
+    start, goal = np.array([[315.0, 400.0]]), np.array([[315.0, 250.0]])
+    path = routes(start, goal, CUP, 5.0, FRAME)[0]
+    length = LineString(path).length
+    shortest = np.hypot(115, 70) + 180 + 30 + np.hypot(85, 100)  # grazing every corner
+    assert CUP.distance(LineString(path)) > 5
+    assert path[:, 1].min() < 150
+    assert shortest < length < 1.4 * shortest
+
+
+def test_a_free_way_is_straight_and_staying_is_no_way_at_all() -> None:
+    start, goal = np.array([[10.0, 10], [50, 400]]), np.array([[600.0, 12], [50, 400]])
+    paths = routes(start, goal, SOLIDS["box"], 2.0, FRAME)
+    assert [len(p) for p in paths] == [2, 2]
+    assert np.array_equal(along(paths, np.array([0.5, 0.5])), [(305, 11), (50, 400)])
+    assert np.array_equal(routes(start, goal, Polygon(), 2.0, FRAME)[0], [start[0], goal[0]])
+
+
+def test_a_place_that_is_walled_off_is_refused_not_driven_through_the_wall() -> None:
+    wall = Polygon(
+        shapely.box(200, 100, 440, 380).exterior, [shapely.box(220, 120, 420, 360).exterior]
+    )
+    with pytest.raises(FleetError):
+        routes(np.array([[50.0, 50]]), np.array([[320.0, 240]]), wall, 3.0, FRAME)
+
+
+def test_a_way_round_stays_in_the_picture_where_one_does() -> None:
+    solid = shapely.box(250, 60, 400, 470)
+    path = routes(np.array([[100.0, 400]]), np.array([[500.0, 400]]), solid, 5.0, FRAME)[0]
+    assert path[:, 1].max() <= 479, "below the target there is no room inside the picture"
+    assert path[:, 1].min() >= 0
+
+
+def test_many_cornered_targets_are_still_driven_around() -> None:
+    rng = np.random.default_rng(1)
+    angle = np.linspace(0, 2 * np.pi, 700, endpoint=False)
+    radius = 110 + 25 * np.sin(9 * angle) + rng.normal(0, 1.5, 700)
+    solid = Polygon(np.stack([np.cos(angle), np.sin(angle)], axis=1) * radius[:, None] + (320, 240))
+    assert solid.is_valid
+    starts = free_points(rng, solid, 10, 8)
+    goals = free_points(rng, solid, 10, 8)
+    for path in routes(starts, goals, solid, 4.0, FRAME):
+        assert solid.distance(LineString(path)) > 4
+
+
+def test_what_robots_stand_in_is_no_obstacle_and_everything_else_named_is() -> None:
+    first = make_outline([(100, 100), (200, 100), (200, 200), (100, 200)])
+    second = make_outline([(300, 100), (400, 100), (400, 200), (300, 200)])
+    site = Site({"t1": first, "t2": second}, 640, 480)
+    inside = Group(relation="inside", targets=("t1",), robots=2)
+    around = Group(relation="around", targets=("t2",), robots=2)
+    assert obstacles(Contract(groups=(inside,)), site).is_empty
+    assert obstacles(Contract(groups=(inside, around)), site).equals(second.polygon)
+    kept_out = Contract(groups=(around,), keep_out=("t1",))
+    assert obstacles(kept_out, site).area == pytest.approx(20_000)
+
+
+def test_a_narrow_passage_wide_enough_for_a_body_is_taken() -> None:
+    walls = shapely.union(shapely.box(250, 0, 400, 228), shapely.box(250, 252, 400, 479))
+    path = routes(np.array([[80.0, 60]]), np.array([[560.0, 60]]), walls, 5.0, FRAME)[0]
+    assert walls.distance(LineString(path)) > 5
+    assert path[:, 1].min() >= 0
+    assert path[:, 1].max() <= 479

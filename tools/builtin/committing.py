@@ -1,0 +1,284 @@
+"""Doors that commit: propose_formation, deploy, ask_user, report_impossible."""
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import ToolError
+from ..fleet.deploy import Arrival
+from ..fleet.deploy import deploy as drive
+from ..fleet.simulated import SimulatedFleet
+from ..formation.checking.instruction_doubts import doubts
+from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
+from ..formation.placement.partial import REFUSALS, Refusal, best_partial
+from ..formation.plan import Plan, make_plan
+from ..formation.units import contract_in_pixels, with_metres
+from ..geometry.outline import distances
+from ..perception.target_prompt import Point, TargetPrompt
+from ..scene import Scene, Target
+from ..tool import ToolResult, tool
+from ..world import Settings, Workspace
+from .seeing import doubtful, framed, measured, overlays, sighting, summary
+
+MAX_FINDINGS = 12
+"""Findings spelled out in a reply; the rest are counted."""
+EXACT_SHARE, EXACT_PX = 0.05, 1.0
+"""How exactly a clearance the person fixed is held."""
+SLACK_SHARE, SLACK_PX = 0.25, 3.0
+"""How far off an outline may be, as a share of the distance kept from it, and at least."""
+SHOW_PARTIAL = "To show it to the person, pass its plan_id to report_impossible."
+"""Ends the answer to what cannot be met in full; for a model, not for the person."""
+
+
+@tool("commit")
+def propose_formation(
+    workspace: Workspace,
+    contract: Contract,
+    targets: tuple[TargetPrompt, ...] = (),
+    positions: tuple[Point, ...] | None = None,
+    samples: tuple[str, ...] | None = None,
+) -> ToolResult:
+    """State what the instruction demands, and have the robots placed and certified.
+
+    Without positions or samples the robots are placed as the contract says: the usual way.
+    Every violation comes back with numbers; what is not certified cannot be deployed.
+
+    Args:
+        contract: what the instruction demands; its robots add up to Robots, or to the words'.
+        targets: the things meant that are not measured yet.
+        positions: (x, y) of every robot in the order of the groups, px; usually left out.
+        samples: names that sample tools gave (s1, ...), to use as positions instead.
+    """
+    if positions is not None and samples is not None:
+        raise ToolError("propose_formation: give positions or samples, not both.")
+    asked = workspace.settings.robots
+    if asked is not None and contract.robots != asked:
+        raise ToolError(
+            f"The person asked for {asked} robots; the contract's groups add up to "
+            f"{contract.robots}."
+        )
+    stated = contract_in_pixels(contract, workspace.scene.metres_per_pixel)
+    _check_doubts(workspace, stated)
+    for prompt in targets:
+        measured(workspace, prompt)
+    held = _held_to(stated, workspace.settings)
+    places = positions if samples is None else _sampled(workspace, samples)
+    plan = _planned(workspace, held, places)
+    _keep(workspace, plan)
+    unseen = workspace.unseen[plan.id] = _unseen(workspace, held)
+    data = _proposal(workspace, plan)
+    if places is None and not plan.verdict.certified:
+        found = _partial(workspace, held, None)
+        _keep(workspace, plan)
+        data |= {"partial": found.strip()} if found else {}
+    if plan.verdict.certified and (advice := _to_see(workspace, plan)):
+        data |= {"look_first": advice}
+    return ToolResult(data, overlays(workspace, map(workspace.scene.target, unseen), plan))
+
+
+def _check_doubts(workspace: Workspace, contract: Contract) -> None:
+    """Hold the contract, in px, against the person's words."""
+    settings = workspace.settings
+    free = settings.clearance is settings.robot_radius is None
+    scale = workspace.scene.metres_per_pixel if free else None  # else lengths are fixed already
+    counted = settings.robots is not None
+    found = doubts(workspace.instruction, contract, counted=counted, scale=scale)
+    if found and not contract.reading:
+        raise ToolError(
+            f"A doubt: {'; '.join(found)}. Propose again with a contract that says what is meant; "
+            "if this one does, say why in its `reading`."
+        )
+
+
+def _planned(workspace: Workspace, held: Contract, places: Any) -> Plan:
+    scene = workspace.scene
+    try:
+        return make_plan(held, scene.site(held), scene.version, places)
+    except ToolError as error:
+        less = _partial(workspace, held, error) if isinstance(error, REFUSALS) else ""
+        raise ToolError(f"{scene.told(str(error))}{less}") from None
+
+
+def _unseen(workspace: Workspace, held: Contract) -> tuple[str, ...]:
+    """Targets whose outlines have to be seen before robots move."""
+    measured_from = {n for g in held.groups if g.clearance is not None for n in g.targets}
+    named = map(workspace.scene.target, held.target_ids)
+    return tuple(t.id for t in named if doubtful(t) or t.id in measured_from)
+
+
+@tool("actuate")
+async def deploy(
+    workspace: Workspace, plan_id: str | None = None, tell: str | None = None
+) -> ToolResult:
+    """Move the robots to a certified plan; says where they were observed to arrive.
+
+    Args:
+        plan_id: of a certified plan; left out: the one proposed in this same reply.
+        tell: what to tell the person once all have arrived, which ends the run; left out where
+            more is to be done.
+    """
+    plan = workspace.current_plan(plan_id)
+    if not plan.verdict.certified:
+        raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
+    if plan.partial is not None and workspace.settings.approved != plan.id:
+        raise ToolError(
+            f"Plan {plan.id} is partial ({workspace.scene.told(plan.partial.short)}): nothing of a "
+            "task is done unasked. A person may have exactly this plan driven, with formup deploy."
+        )
+    if not workspace.settings.may_deploy:
+        raise ToolError("The person asked for the plan only: nothing may be moved.")
+    if plan_id is None and (advice := _to_see(workspace, plan)):
+        return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
+    plan_id = plan.id
+    site = workspace.scene.site(plan.formation.contract)
+    fleet = workspace.fleet_for(plan.formation.contract, site)
+    arrival = await drive(plan, site, fleet)
+    workspace.arrivals[plan_id] = arrival
+    if isinstance(fleet, SimulatedFleet):
+        workspace.frames[plan_id] = fleet.frames
+    worst = int(np.argmax(arrival.residual_px))
+    data = {
+        "plan_id": plan_id,
+        "arrived": arrival.arrived,
+        "corrections": arrival.corrections,
+        "worst_residual_px": arrival.residual_px[worst],
+        "worst_robot": worst + 1,
+        "tolerance_px": arrival.tolerance_px,
+    }
+    if arrival.assignment_gap is not None:
+        most = f"{arrival.assignment_gap:.2%} of the summed squared ways"
+        data["assignment"] = f"approximate: another could have saved {most} at most"
+    told = _told(tell, arrival, workspace.scene) if arrival.arrived else None
+    return ToolResult(with_metres(data, workspace.scene.metres_per_pixel), told=told)
+
+
+@tool("ask")
+def ask_user(workspace: Workspace, question: str, candidates: tuple[str, ...] = ()) -> ToolResult:
+    """Ask the person when the instruction does not settle what to do; this ends the turn.
+
+    Args:
+        question: one clear question.
+        candidates: ids of numbered things (c3) or targets (t1) to choose from, if there are any.
+    """
+    listed = [
+        sighting(workspace.candidate(c))
+        if c.startswith("c")
+        else summary(workspace.scene.target(c))
+        for c in candidates
+    ]
+    return ToolResult({"question": question, "candidates": listed})
+
+
+@tool("end")
+def report_impossible(
+    workspace: Workspace, reason: str, robots_needed: int | None = None, plan_id: str | None = None
+) -> ToolResult:
+    """Say that the instruction cannot be carried out, and why; this ends the run.
+
+    Args:
+        reason: why, in one sentence, with the numbers.
+        robots_needed: how many robots would do, where that is the trouble.
+        plan_id: the best plan that was found, certified or not.
+    """
+    if plan_id is not None and plan_id not in workspace.plans:
+        raise ToolError(f"There is no plan {plan_id!r}.")
+    data = {"reason": reason, "robots_needed": robots_needed, "plan_id": plan_id}
+    return ToolResult(data, told=reason)
+
+
+def _keep(workspace: Workspace, plan: Plan) -> None:
+    workspace.plans.pop(plan.id, None)  # proposed again, it is the latest again
+    workspace.plans[plan.id] = plan
+
+
+def _partial(workspace: Workspace, held: Contract, refusal: Refusal | None) -> str:
+    """Keep the best partial plan; what there is to say of it, nothing where there is none."""
+    plan = best_partial(held, workspace.scene.site(held), workspace.scene.version, refusal)
+    if plan is None or plan.partial is None:
+        return ""
+    _keep(workspace, plan)
+    return f" Plan {plan.id} is certified as partial: {plan.partial.sentence} {SHOW_PARTIAL}"
+
+
+def _to_see(workspace: Workspace, plan: Plan) -> str:
+    """What has to be looked at before a plan nobody has seen is carried out, if anything."""
+    unseen = workspace.unseen.get(plan.id, plan.formation.contract.target_ids)
+    for target in map(workspace.scene.target, unseen):
+        if plan.id in workspace.unseen or doubtful(target):
+            return workspace.scene.told(
+                f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
+                f"about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with tell). "
+                f"Where it does not and yours (dashed) does, propose again with {target.id} and "
+                "`points` on the thing there or `negative` ones off it; else with a closer outline."
+            )
+    return ""
+
+
+def _doubt(target: Target) -> str:
+    """Why a target has to be looked at."""
+    if not doubtful(target):
+        return "has an edge that a named distance is measured from"
+    if not target.missed:
+        return f"was measured with confidence {target.confidence:.2f}"
+    away = distances(target.outline.filled, np.asarray(target.missed))
+    places = zip(target.missed, away, strict=True)
+    left = ", ".join(f"({x:g}, {y:g}) by {px:.0f} px" for (x, y), px in places)
+    return f"as measured leaves out your {left}, which has so much less clearance"
+
+
+def _slack(plan: Plan, name: str) -> float:
+    """How far off an outline may be without harm, px: a quarter of the distance to be kept."""
+    groups = (g for g in plan.formation.contract.groups if name in g.targets)
+    kept = [nominal(g.clearance) for g in groups if g.clearance is not None]
+    return max(SLACK_SHARE * min(kept, default=MIN_CLEARANCE), SLACK_PX)
+
+
+def _told(tell: str | None, arrival: Arrival, scene: Scene) -> str | None:
+    """The model's words and, after them, what was observed."""
+    if not tell:
+        return None
+    count, worst = len(arrival.observed), max(arrival.residual_px)
+    robots = "The robot was" if count == 1 else f"All {count} robots were"
+    observed = scene.told(f"{robots} observed within {max(worst, 0.1):.1f} px of the plan.")
+    return f"{tell.strip()} {observed}"
+
+
+def _held_to(contract: Contract, settings: Settings) -> Contract:
+    """The contract with what the person fixed: robot radius and clearance."""
+    groups = tuple(_with_clearance(g, settings.clearance) for g in contract.groups)
+    radius = settings.robot_radius
+    fixed = {} if radius is None else {"robot_radius": radius}
+    return contract.model_copy(update={"groups": groups, **fixed})
+
+
+def _with_clearance(group: Group, clearance: float | None) -> Group:
+    if clearance is None or not group.keeps_clearance:
+        return group
+    slack = max(EXACT_PX, EXACT_SHARE * clearance)
+    greatest = 100_000.0 if group.relation == "inside" else clearance + slack
+    least = clearance if group.relation == "inside" else max(clearance - slack, 0.0)
+    return group.model_copy(update={"clearance": (least, greatest)})
+
+
+def _sampled(workspace: Workspace, samples: tuple[str, ...]) -> Any:
+    unknown = [s for s in samples if s not in workspace.samples]
+    if unknown:
+        known = ", ".join(workspace.samples) or "none yet"
+        raise ToolError(f"There is no sample {unknown[0]!r}. Samples: {known}.")
+    return np.concatenate([workspace.samples[s] for s in samples] or [np.empty((0, 2))])
+
+
+def _proposal(workspace: Workspace, plan: Plan) -> dict[str, Any]:
+    verdict, contract, scene = plan.verdict, plan.formation.contract, workspace.scene
+    findings = [f.sentence for f in verdict.findings]
+    more = len(findings) - MAX_FINDINGS
+    return {
+        "plan_id": plan.id,
+        "certified": verdict.certified,
+        "findings": findings[:MAX_FINDINGS] + ([f"and {more} more findings"] if more > 0 else []),
+        "notes": list(verdict.notes),
+        "measures": with_metres(verdict.measures, scene.metres_per_pixel),
+        "targets": [summary(scene.target(t)) for t in contract.target_ids],
+        "robots": contract.robots,
+        **framed(scene),
+    }

@@ -1,0 +1,139 @@
+"""Doors that measure: describe_shape, check_point, measure."""
+
+import math
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+from shapely.geometry import Point as Place
+from shapely.geometry.base import BaseGeometry
+
+from ..formation.units import with_metres
+from ..geometry.outline import FloatArray, Outline, distances
+from ..perception.target_prompt import Point
+from ..tool import ToolResult, tool
+from ..world import Descriptor, Workspace
+from .seeing import framed
+
+MATRIX_SIDE = 32
+"""Longest side of the binary matrix descriptor, cells."""
+ON_EDGE = 0.5
+"""Nearer to the outline than this, px, a point is on the edge."""
+
+
+@tool("read")
+def describe_shape(
+    workspace: Workspace, target: str, descriptor: Descriptor | None = None
+) -> ToolResult:
+    """Describe a target's outline: numbered edges, size, axes, corners, holes.
+
+    Args:
+        target: target id, such as t1.
+        descriptor: edges (default), edges+vertices, or matrix (a binary raster of the box).
+    """
+    outline = workspace.scene.target(target).outline
+    unit, length, width = outline.long_axis
+    data: dict[str, Any] = {
+        "target": target,
+        "kind": outline.kind,
+        "kind_confidence": round(outline.kind_confidence, 2),
+        "area_px": round(outline.area),
+        "perimeter_px": round(outline.perimeter, 1),
+        "length_px": round(length, 1),
+        "width_px": round(width, 1),
+        "min_width_px": round(outline.min_width, 1),
+        "long_axis_degrees": round(math.degrees(math.atan2(unit[1], unit[0])), 1),
+        "centre": _rounded(outline.centre),
+        "corners": [_rounded(c) for c in outline.corners],
+        "holes": len(outline.polygon.interiors),
+        **framed(workspace.scene),
+    }
+    data = with_metres(data, workspace.scene.metres_per_pixel)
+    return ToolResult(data | _described(outline, descriptor or workspace.settings.descriptor))
+
+
+@tool("read")
+def check_point(workspace: Workspace, target: str, points: tuple[Point, ...]) -> ToolResult:
+    """Say of each point whether it is inside, outside or on the edge of a target, and how far.
+
+    Args:
+        target: target id, such as t1.
+        points: points (x, y), image pixels, y down.
+    """
+    outline = workspace.scene.target(target).outline
+    places = np.asarray(points, dtype=float).reshape(-1, 2)
+    vertices, edges = outline.graph()
+    sides = [LineString(vertices[list(edge)]) for edge in edges]
+    nearest = np.argmin(np.stack([distances(side, places) for side in sides]), axis=0)
+    inside = shapely.intersects_xy(outline.polygon, places)
+    depth = distances(outline.polygon.boundary, places)
+    scale = workspace.scene.metres_per_pixel
+    rows = [
+        with_metres(
+            {
+                "point": _rounded(p),
+                "where": "on edge" if d <= ON_EDGE else "inside" if i else "outside",
+                "signed_distance_px": round(float(-d if i else d), 2),
+                "nearest_edge": int(e),
+            },
+            scale,
+        )
+        for p, i, d, e in zip(places, inside, depth, nearest, strict=True)
+    ]
+    return ToolResult({"target": target, "points": rows, **framed(workspace.scene)})
+
+
+@tool("read")
+def measure(workspace: Workspace, a: str | Point, b: str | Point) -> ToolResult:
+    """Measure from one thing to another: nearest distance, centre distance and direction.
+
+    Args:
+        a: target id, or a point (x, y) in image pixels.
+        b: target id, or a point (x, y) in image pixels.
+    """
+    (shape_a, centre_a), (shape_b, centre_b) = _place(workspace, a), _place(workspace, b)
+    way = centre_b - centre_a
+    data = {
+        "nearest_px": round(float(shape_a.distance(shape_b)), 2),
+        "centres_px": round(float(np.hypot(*way)), 2),
+        "direction_degrees": round(math.degrees(math.atan2(way[1], way[0])), 1),
+        **framed(workspace.scene, "; directions clockwise from right"),
+    }
+    return ToolResult(with_metres(data, workspace.scene.metres_per_pixel))
+
+
+def _place(workspace: Workspace, thing: str | Point) -> tuple[BaseGeometry, FloatArray]:
+    if isinstance(thing, str):
+        outline = workspace.scene.target(thing).outline
+        return outline.polygon, np.asarray(outline.centre)
+    return Place(thing), np.asarray(thing, dtype=float)
+
+
+def _described(outline: Outline, descriptor: Descriptor) -> dict[str, Any]:
+    vertices, edges = outline.graph()
+    if descriptor == "matrix":
+        return {"matrix": _matrix(outline)}
+    lines = [[*_rounded(vertices[i]), *_rounded(vertices[j])] for i, j in edges]
+    described: dict[str, Any] = {"edges": dict(enumerate(lines))}
+    if descriptor == "edges+vertices":
+        described["vertices"] = dict(enumerate(_rounded(v) for v in vertices))
+    return described
+
+
+def _matrix(outline: Outline) -> dict[str, Any]:
+    """The region as rows of 0 and 1, with the cell size that maps it back to pixels."""
+    x0, y0, x1, y1 = outline.bounds
+    cell = max(x1 - x0, y1 - y0) / MATRIX_SIDE
+    columns, rows = max(round((x1 - x0) / cell), 1), max(round((y1 - y0) / cell), 1)
+    x, y = np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5)
+    inside = shapely.contains_xy(outline.polygon, x0 + x * cell, y0 + y * cell)
+    return {
+        "origin": _rounded((x0, y0)),
+        "cell_px": round(cell, 3),
+        "rows": ["".join("1" if v else "0" for v in row) for row in inside],
+    }
+
+
+def _rounded(point: Any) -> list[float]:
+    return [round(float(v), 1) for v in point]

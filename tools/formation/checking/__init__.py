@@ -1,0 +1,1 @@
+"""Positions against a contract: every violation at once, with numbers."""

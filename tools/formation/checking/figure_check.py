@@ -1,0 +1,86 @@
+"""Whether robots draw the shape a contract names: on its lines, no part of them bare, none crowded.
+
+The yardstick is the placement that `figure` itself would make on the same lines.
+"""
+
+import numpy as np
+from shapely.geometry import LineString, MultiLineString
+
+from ...geometry.figures.shapes import Sketch
+from ...geometry.figures.strokes import Stretch, stretches
+from ...geometry.outline import FloatArray, distances
+from ...geometry.sampling import min_spacing, nearest
+from ..placement.figure import robots_on
+from ..placement.spacing import NARROWEST, WIDEST
+from .verdict import TOLERANCE, Audit, Part
+
+LINE_SHARE = 0.03
+"""How far off a shape's lines a robot may stand, as a share of its shorter side."""
+GRID_SHARE = 0.25
+"""How far off its place in a grid, as a share of the grid's pitch."""
+LEAST_REACH = 2.0
+"""Whatever the size, a robot this near, px, stands on the line."""
+
+
+def on_figure(part: Part, figure: Sketch, audit: Audit) -> None:
+    """Robots against the lines, or the places, of a shape."""
+    ideal = robots_on(figure, part.group.robots)
+    apart = min_spacing(ideal)
+    if figure.places is not None:
+        _in_grid(part, figure.places, apart, audit)
+        return
+    width, height = figure.size
+    share = LINE_SHARE * (min(width, height) or max(width, height))
+    reach = max(min(share, apart / 2), LEAST_REACH)
+    _on_lines(part, figure, reach, audit)
+    if part.group.spacing == "free":
+        return
+    allowed = WIDEST * max(s.length for s in stretches(figure.lines, ideal, LEAST_REACH))
+    _not_bare(part, stretches(figure.lines, part.points, reach + TOLERANCE), allowed, audit)
+    if len(part.points) > 1:
+        closest = min_spacing(part.points)
+        audit.least("spacing_ratio", closest / apart)
+        if closest < NARROWEST * apart - TOLERANCE:
+            least = NARROWEST * apart
+            text = f"Two robots are {closest:.1f} px apart; an even shape needs {least:.1f} px."
+            audit.whole("crowded", closest, least, text)
+
+
+def _on_lines(part: Part, figure: Sketch, reach: float, audit: Audit) -> None:
+    distance = distances(MultiLineString([LineString(x) for x in figure.lines]), part.points)
+    assert part.group.shape is not None
+    name = f"the {part.group.shape.name}"
+    for i in np.flatnonzero(distance > reach + TOLERANCE):
+        text = f"is {distance[i]:.1f} px from {name}; {reach:.1f} px at most are allowed"
+        audit.robot("off_curve", part.first + int(i), distance[i], reach, text)
+
+
+def _not_bare(part: Part, found: list[Stretch], allowed: float, audit: Audit) -> None:
+    audit.greatest("worst_gap_px", max(s.length for s in found))
+    for stretch in found:
+        if stretch.length <= allowed + TOLERANCE:
+            continue
+        limit = f"{allowed:.1f} px are allowed"
+        if stretch.robot is None:
+            text = f"A stretch of {stretch.length:.1f} px has no robot; {limit}."
+            audit.whole("bare_stretch", stretch.length, allowed, text)
+        else:
+            text = f"is the last before {stretch.length:.1f} px without a robot; {limit}"
+            audit.robot("gap", part.first + stretch.robot, stretch.length, allowed, text)
+
+
+def _in_grid(part: Part, places: FloatArray, pitch: float, audit: Audit) -> None:
+    """Every robot near a place of its own."""
+    reach = max(GRID_SHARE * pitch, LEAST_REACH) if len(places) > 1 else LEAST_REACH
+    distance, place = nearest(places, part.points, 1)
+    audit.greatest("max_from_place_px", distance.max())
+    taken: dict[int, int] = {}
+    for i, (away, k) in enumerate(zip(distance, place, strict=True), start=part.first):
+        x, y = places[k]
+        if away > reach + TOLERANCE:
+            text = f"is {away:.1f} px from ({x:.0f}, {y:.0f}), the nearest place of the grid"
+            audit.robot("off_grid", i, away, reach, f"{text}; {reach:.1f} px at most are allowed")
+        elif int(k) in taken:
+            text = f"stands at ({x:.0f}, {y:.0f}) as robot {taken[int(k)] + 1} does"
+            audit.robot("off_grid", i, away, reach, text)
+        taken.setdefault(int(k), i)

@@ -1,0 +1,1 @@
+"""Changes of a formation that stands, each certified anew."""

@@ -1,0 +1,78 @@
+"""What becomes of a drawn form when a group is moved, enlarged, mirrored or turned.
+
+The contract goes on saying what is drawn wherever it can: in another box, or through points of its
+own. Letters stay readable in a mirror; turned letters and grids are free positions. Frame: image
+pixels, y down; maps take row vectors.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...geometry.figures.shapes import Sketch
+from ...geometry.outline import FloatArray
+from ..contract import Group, ShapeSpec
+
+DECIMALS = 6
+"""Places of a contract are rounded to so many, px."""
+WRITTEN = frozenset({"letters", "outlined_letters"})
+
+
+class Affine(NamedTuple):
+    """A map of the plane: p goes to (p - origin) linear + to."""
+
+    linear: FloatArray
+    origin: FloatArray
+    to: FloatArray
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """Points (k, 2) where the map takes them."""
+        return (points - self.origin) @ self.linear + self.to
+
+    @property
+    def upright(self) -> bool:
+        """Whether it only moves and enlarges."""
+        return bool((self.linear == np.eye(2) * self.linear[0, 0]).all()) and self.linear[0, 0] > 0
+
+    @property
+    def mirrors(self) -> bool:
+        """Whether it turns left into right."""
+        return float(np.linalg.det(self.linear)) < 0
+
+
+def form_after(group: Group, figure: Sketch, there: Affine) -> tuple[Group, bool]:
+    """The group whose form a map has taken elsewhere, and whether it has places of its own.
+
+    Args:
+        group: with a shape.
+        figure: what it draws now, in its place.
+        there: the map.
+
+    Returns:
+        The second is true where the images of its robots' places are no places of the new form.
+    """
+    shape = group.shape
+    assert shape is not None
+    targets = () if group.enters else group.targets
+    kept = group.model_copy(update={"targets": targets, "clearance": None})
+    if shape.points is None and (there.upright or shape.kind == "circle"):
+        return _with(kept, _boxed(shape, figure, there)), False
+    if len(figure.lines) == 1 and figure.places is None and shape.kind not in WRITTEN:
+        points = tuple((float(x), float(y)) for x, y in there(figure.lines[0]).round(DECIMALS))
+        return _with(kept, ShapeSpec(kind="polyline", points=points)), False
+    if there.mirrors:
+        return _with(kept, _boxed(shape, figure, there)), True
+    return _with(kept, None), False
+
+
+def _with(group: Group, shape: ShapeSpec | None) -> Group:
+    return group.model_copy(update={"shape": shape})
+
+
+def _boxed(shape: ShapeSpec, figure: Sketch, there: Affine) -> ShapeSpec:
+    """The same form in the box that its own is taken to."""
+    middle = there(np.reshape(figure.frame, (2, 2)).mean(axis=0))
+    half = np.asarray(figure.size) * np.sqrt(abs(np.linalg.det(there.linear))) / 2
+    low, high = (middle - half).round(DECIMALS), (middle + half).round(DECIMALS)
+    box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    return shape.model_copy(update={"box": box, "where": None})

@@ -1,0 +1,1 @@
+"""Positions that satisfy a contract, computed from it and the outlines alone."""

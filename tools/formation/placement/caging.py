@@ -1,0 +1,78 @@
+"""Robots placed so that they certainly cage a target, as a contract asks for it.
+
+Frame: image pixels, x right, y down; a target's holes do not matter to what surrounds it.
+"""
+
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...errors import ToolError
+from ...geometry.cages.cage_places import Demand, caging_places, fewest_cage
+from ...geometry.curves import Curve, Frame
+from ...geometry.outline import FloatArray, Outline
+from ..contract import Group
+
+
+class CageError(ToolError):
+    """A group's robots cannot be placed so that they certainly cage its target.
+
+    Attributes:
+        needed: how many robots would do, or None where no number is known to.
+        group: the group.
+        fits: how many of the robots have room on the ring where that is fewer than all, else 0.
+    """
+
+    def __init__(self, group: Group, needed: int | None, fits: int) -> None:
+        assert group.clearance is not None
+        least, greatest = group.clearance
+        way = (
+            f"{needed} robots would do"
+            if needed
+            else f"no more than {fits} have room there"
+            if fits
+            else "no other number is known to do: allow a nearer clearance or take the closure ring"
+        )
+        super().__init__(
+            f"No places were found where {group.robots} robots, {least:.1f} to {greatest:.1f} px "
+            f"from {group.targets[0]}, certainly cage it; {way}."
+        )
+        self.needed, self.group, self.fits = needed, group, fits
+
+
+def escape_proof(group: Group) -> bool:
+    """Whether a certificate is demanded that the target cannot get out."""
+    return group.closure == "escape-proof"
+
+
+def caged_places(
+    group: Group, outline: Outline, radius: float, frame: Frame, curve: Curve
+) -> FloatArray:
+    """Places that certainly cage the group's target, evenly on the curve where that does.
+
+    Raises:
+        CageError: none were found; it says how many robots would do.
+    """
+    assert group.clearance is not None
+    demand = Demand(
+        outline,
+        group.clearance,
+        radius,
+        frame,
+        group.min_spacing or 0.0,
+        walls_of(group, (frame.width, frame.height)),
+    )
+    points = caging_places(demand, group.robots, (curve,))
+    if points is None:
+        longest = max(c.length for c in (curve, *demand.curves))
+        crowded = longest < (group.robots + 1) * demand.spacing
+        enough = None if crowded else fewest_cage(demand, group.robots + 1)
+        fits = min(int(longest / demand.spacing), group.robots - 1) if crowded else 0
+        raise CageError(group, None if enough is None else len(enough), fits)
+    return points
+
+
+def walls_of(group: Group, room: tuple[float, float]) -> BaseGeometry | None:
+    """The picture's border, where the contract makes it a wall."""
+    if not group.walls:
+        return None
+    return shapely.box(-0.5, -0.5, room[0] - 0.5, room[1] - 0.5).boundary

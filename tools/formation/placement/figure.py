@@ -1,0 +1,221 @@
+"""Where a drawn shape lies, and the robots on it: placer and checker both ask here.
+
+The size and place follow from the contract and the site alone. Frame: image pixels, y down.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import shapely
+from shapely.geometry import GeometryCollection, LineString, MultiPoint, Point, Polygon
+
+from ...errors import InputError, ToolError
+from ...geometry.curves import QUAD_SEGMENTS, ROUND_JOIN_DIP
+from ...geometry.figures.shapes import (
+    Sketch,
+    arc_sketch,
+    fitted,
+    grid_sketch,
+    letters_sketch,
+    line_sketch,
+    outlined_letters_sketch,
+    polygon_sketch,
+    polyline_sketch,
+    star_sketch,
+)
+from ...geometry.figures.strokes import spread
+from ...geometry.outline import FloatArray, Outline
+from ...geometry.sampling import min_spacing
+from ..contract import Group, ShapeSpec, nominal
+from ..site import CapacityError, Site, most_that_fit
+
+STAR_TIPS, POLYGON_CORNERS = 5, 6
+BESIDE = {"left": (-1, 0), "right": (1, 0), "above": (0, -1), "below": (0, 1)}
+ROOMY = 1.02
+"""A shape too small for the spacing is enlarged by so much more than it takes."""
+SEARCH = 40
+"""Halvings of the search for a size."""
+SHRINKS = 0.95 ** np.arange(90)
+"""Sizes tried within a target, as parts of the largest that could be: down to a hundredth."""
+
+
+def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sketch:
+    """The shape a group draws, in its place.
+
+    Args:
+        group: with its defaults written out.
+        shape: the group's.
+        site: outlines of the targets and the picture.
+        radius: of a robot, px.
+
+    Raises:
+        ToolError: there is no room for it.
+    """
+    sketch = _sketch(group, shape)
+    try:
+        placed = _placed(sketch, group, shape, site, radius)
+    except InputError as error:
+        raise ToolError(str(error)) from None
+    points = placed.points
+    box = site.frame(radius).box.buffer(1e-6)
+    if not shapely.intersects_xy(box, points).all():
+        (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
+        raise ToolError(
+            f"The {shape.name} would reach from ({x0:.0f}, {y0:.0f}) to ({x1:.0f}, {y1:.0f}), out "
+            f"of the {site.width:g} x {site.height:g} px picture: place it elsewhere or smaller."
+        )
+    return placed
+
+
+def place_figure(group: Group, shape: ShapeSpec, site: Site, radius: float) -> FloatArray:
+    """The group's robots on its shape, (n, 2), image pixels.
+
+    Raises:
+        CapacityError: they would stand nearer to each other than allowed.
+        ToolError: see `figure_of`.
+    """
+    figure = figure_of(group, shape, site, radius)
+    spacing = group.min_spacing or 0.0
+    points = robots_on(figure, group.robots)
+    if min_spacing(points) >= spacing * (1 - 1e-6):
+        return points
+
+    def apart(n: int) -> bool:
+        fewer = group.model_copy(update={"robots": n})
+        drawn = robots_on(figure_of(fewer, shape, site, radius), n)
+        return min_spacing(drawn) >= spacing * (1 - 1e-6)
+
+    few, many = 1, group.robots
+    while many - few > 1:
+        middle = (few + many) // 2
+        few, many = (middle, many) if apart(middle) else (few, middle)
+    fits = most_that_fit(apart, few, group.robots)
+    size = " x ".join(f"{x:.0f}" for x in figure.size)
+    why = f"no more stand {spacing:g} px apart on the {shape.name}, {size} px"
+    raise CapacityError(group, fits, why)
+
+
+def robots_on(figure: Sketch, n: int) -> FloatArray:
+    """N robots on a shape, (n, 2), image pixels."""
+    return spread(figure.lines, n) if figure.places is None else figure.places
+
+
+def _sketch(group: Group, shape: ShapeSpec) -> Sketch:
+    n, box = group.robots, shape.box
+    if shape.points is not None:
+        return polyline_sketch(np.asarray(shape.points, dtype=float))
+    upright = shape.where in ("left", "right")
+    if box is not None:
+        upright = box[3] - box[1] > box[2] - box[0]
+    rows = shape.rows or _rows(n, box)
+    made: dict[str, Callable[[], Sketch]] = {
+        "line": lambda: line_sketch(upright),
+        "arc": lambda: arc_sketch(*(shape.angles or (0.0, 180.0))),
+        "circle": arc_sketch,
+        "grid": lambda: grid_sketch(n, min(rows, n)),
+        "polygon": lambda: polygon_sketch(shape.corners or POLYGON_CORNERS),
+        "star": lambda: star_sketch(shape.corners or STAR_TIPS),
+        "letters": lambda: letters_sketch(shape.text or ""),
+        "outlined_letters": lambda: outlined_letters_sketch(shape.text or ""),
+    }
+    return made[shape.kind]()
+
+
+def _rows(n: int, box: tuple[float, float, float, float] | None) -> int:
+    """Rows that make the grid's cells as square as they come."""
+    tall = 1.0 if box is None else (box[3] - box[1]) / max(box[2] - box[0], 1e-9)
+    return min(max(round(math.sqrt(n * tall)), 1), n)
+
+
+def _placed(sketch: Sketch, group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sketch:
+    if shape.box is not None:
+        return fitted(sketch, shape.box)
+    if shape.where is None:
+        return sketch
+    outline = site.outlines[group.targets[0]]
+    if shape.where == "on":
+        return fitted(sketch, outline.bounds)
+    assert group.clearance is not None
+    if shape.where == "inside":
+        return _within(sketch, site.visible(group.targets[0]), group.clearance[0] + radius)
+    gap = nominal(group.clearance) + radius
+    if shape.where == "around":
+        return _about(sketch, outline, gap)
+    return _beside(sketch, group, outline, site, shape.where, gap, radius)
+
+
+def _within(sketch: Sketch, outline: Outline, margin: float) -> Sketch:
+    """As large as it lies in the outline about one of its centres, holes left out."""
+    room = outline.polygon.buffer(-margin * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
+    x0, y0, x1, y1 = outline.bounds
+    width, height = sketch.size
+    most = math.hypot(x1 - x0, y1 - y0) / (max(width, height) or 1.0)
+    middle = outline.filled.centroid
+    centres = (outline.centre, (middle.x, middle.y), ((x0 + x1) / 2, (y0 + y1) / 2))
+    for scale in most * SHRINKS:
+        for centre in centres:
+            placed = sketch.at(centre, float(scale))
+            lines = [LineString(line) for line in placed.lines]
+            if room.covers(GeometryCollection([*lines, MultiPoint(placed.points)])):
+                return placed
+    raise ToolError(f"It has no room inside the target, {margin:.1f} px from its edge.")
+
+
+def _about(sketch: Sketch, outline: Outline, gap: float) -> Sketch:
+    """As small as it holds the outline and keeps off it."""
+    circle = shapely.minimum_bounding_circle(outline.filled)
+    centre = (float(circle.centroid.x), float(circle.centroid.y))
+
+    def holds(scale: float) -> bool:
+        placed = sketch.at(centre, scale)
+        line = LineString(placed.lines[0])
+        whole = Polygon(line) if line.is_closed else Point(centre).buffer(placed.size[0] / 2)
+        return whole.contains(outline.filled) and line.distance(outline.filled) >= gap
+
+    low, high = 0.0, 1.0
+    while not holds(high):
+        low, high = high, high * 2
+        if high > 1e6:
+            raise ToolError("The shape cannot go around the target.")
+    for _ in range(SEARCH):
+        middle = (low + high) / 2
+        low, high = (low, middle) if holds(middle) else (middle, high)
+    return sketch.at(centre, high)
+
+
+def _beside(
+    sketch: Sketch,
+    group: Group,
+    outline: Outline,
+    site: Site,
+    where: str,
+    gap: float,
+    radius: float,
+) -> Sketch:
+    """As high (as wide) as the target or as the spacing takes, beside it, inside the picture."""
+    dx, dy = BESIDE[where]
+    x0, y0, x1, y1 = outline.bounds
+    free = site.frame(radius).box
+    if free.is_empty:
+        raise ToolError("The robots are too large for the picture.")
+    left, top, right, bottom = free.bounds
+    wide = (x0 - gap - left) if dx < 0 else (right - x1 - gap) if dx > 0 else right - left
+    high = (y0 - gap - top) if dy < 0 else (bottom - y1 - gap) if dy > 0 else bottom - top
+    width, height = sketch.size
+    most = min(wide / width if width else math.inf, high / height if height else math.inf)
+    if min(wide, high, most) <= 0:
+        place = f"{where} of" if where in ("left", "right") else where
+        raise ToolError(f"There is no room {place} {group.targets[0]} in the picture.")
+    extent = (y1 - y0) / height if dx and height else (x1 - x0) / width if dy and width else most
+    scale = min(extent, most) if width or height else 1.0
+    apart = min_spacing(robots_on(sketch, group.robots)) * scale
+    if apart < (group.min_spacing or 0.0):
+        scale = min(most, ROOMY * scale * (group.min_spacing or 0.0) / max(apart, 1e-9))
+    half_x, half_y = scale * width / 2, scale * height / 2
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    x = x0 - gap - half_x if dx < 0 else x1 + gap + half_x if dx > 0 else x
+    y = y0 - gap - half_y if dy < 0 else y1 + gap + half_y if dy > 0 else y
+    x = min(max(x, left + half_x), right - half_x)
+    y = min(max(y, top + half_y), bottom - half_y)
+    return sketch.at((x, y), scale)

@@ -1,0 +1,119 @@
+"""Other places for a group whose usual ones come too near to the robots of groups before it.
+
+What is even along a curve stays so: the places are turned or slid along it together.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ...errors import InputError, ToolError
+from ...geometry.curves import Curve, interpolate
+from ...geometry.outline import FloatArray, Outline, outline_of
+from ...geometry.sampling import nearest, split
+from ..contract import Group
+
+PHASES = 24
+"""Places along a gap that the first robot of a curve is tried at."""
+DISC_SEGMENTS, LEAST_DISC = 8, 0.1
+NEARLY = 1 - 1e-6
+"""Rounding is no conflict."""
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A group and where its robots are, (n, 2), image pixels."""
+
+    group: Group
+    points: FloatArray
+
+
+class CrowdedError(ToolError):
+    """Two groups would stand in each other's way.
+
+    Attributes:
+        first, second: their places in the contract, from 0.
+    """
+
+    def __init__(self, first: int, second: int, apart: float, need: float) -> None:
+        super().__init__(
+            f"Robots of group {first} and of group {second} would stand {apart:.1f} px from each "
+            f"other; {need:.1f} px or more are needed, and no other places were found. Give one of "
+            "the groups another clearance, or fewer robots."
+        )
+        self.first, self.second = first - 1, second - 1
+
+
+def need(first: Group, second: Group) -> float:
+    """Least distance of a robot of one group from one of another, px."""
+    return max(first.min_spacing or 0.0, second.min_spacing or 0.0)
+
+
+def conflict(stand: Stand, earlier: Sequence[Stand]) -> tuple[int, float, float] | None:
+    """The first group that is come too near: its index, how near, and what is needed, px."""
+    for index, other in enumerate(earlier):
+        if not len(other.points) or not len(stand.points):
+            continue
+        apart = float(nearest(other.points, stand.points, 1)[0].min())
+        least = need(stand.group, other.group)
+        if apart < least * NEARLY:
+            return index, apart, least
+    return None
+
+
+def clear(points: FloatArray, group: Group, earlier: Sequence[Stand]) -> NDArray[np.bool_]:
+    """Which of (n, 2) places of a group are far enough from the robots of others, (n,)."""
+    kept = np.ones(len(points), dtype=bool)
+    for other in earlier:
+        if len(other.points) and len(points):
+            kept &= nearest(other.points, points, 1)[0] >= need(group, other.group) * NEARLY
+    return kept
+
+
+def slid(curve: Curve, n: int) -> Iterator[FloatArray]:
+    """N places evenly along a curve, started from one place in a gap after another."""
+    if curve.length <= 0:
+        return
+    cut = None if curve.closed else curve.cut(n)
+    for phase in (np.arange(PHASES) + 0.5) / PHASES:
+        if cut is not None:  # the cut stays within a gap
+            step = (curve.length + cut) / n
+            yield interpolate(curve.lines[0], step * np.arange(n) + phase * (step - cut))
+            continue
+        lengths = np.array([np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in curve.lines])
+        shares = split(lengths, n)
+        yield np.concatenate(
+            [
+                interpolate(line, (np.arange(k) + phase) * length / k)
+                for line, length, k in zip(curve.lines, lengths, shares, strict=True)
+                if k
+            ]
+        )
+
+
+def without(
+    outline: Outline, group: Group, earlier: Sequence[Stand], margin: float
+) -> Outline | None:
+    """What is left of a region around the robots of other groups; None where nothing is.
+
+    Args:
+        margin: that is kept from the edge of what is left, px.
+    """
+    discs = [
+        shapely.buffer(
+            shapely.multipoints(other.points),
+            max(need(group, other.group) - margin, LEAST_DISC),
+            quad_segs=DISC_SEGMENTS,
+        )
+        for other in earlier
+        if len(other.points)
+    ]
+    try:
+        return outline_of(
+            outline.polygon.difference(shapely.union_all(np.asarray(discs, dtype=object)))
+        )
+    except InputError:
+        return None

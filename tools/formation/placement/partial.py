@@ -1,0 +1,246 @@
+"""The best that can be done where a contract cannot be met: fewer robots, or a nearer clearance.
+
+Whatever comes of it is certified by the same checker, and says of itself what it falls short of.
+"""
+
+from collections.abc import Callable, Mapping
+
+from ..contract import Contract, Group, with_defaults
+from ..plan import Plan, Shortfall, make_plan
+from ..units import also_metres
+from .caging import CageError, escape_proof
+from .group_conflicts import CrowdedError
+from .place import CapacityError, Site
+
+ROUNDS = 60
+"""Times that robots are taken out of one group or another."""
+TENTH = 10
+"""Clearances are tried in steps of a tenth of a pixel."""
+LESS = tuple(k / 12 for k in range(1, 12))
+"""Shares of two groups' robots taken out in search of places where they are not in each other's
+way."""
+COARSE = 5
+"""Halvings of a clearance for an escape-proof cage, each of which may take a second or more."""
+ROUND = frozenset({"around", "cage"})
+OPEN = 1000.0
+"""A greatest clearance from here on, px, only says that there is none."""
+
+
+Refusal = CapacityError | CageError | CrowdedError
+REFUSALS = (CapacityError, CageError, CrowdedError)
+"""What is raised where a contract cannot be met in full, to catch."""
+Attempt = Callable[[Contract], Plan]
+Counts = tuple[int, int]
+
+
+def best_partial(
+    contract: Contract, site: Site, scene_version: str, refusal: Refusal | None
+) -> Plan | None:
+    """A certified plan that falls as little short of a contract as is known, marked as partial.
+
+    As many robots as fit; where none does, all of them at the nearest clearance to the one stated
+    that can be held. Nothing is done about a clearance that was left open.
+
+    Args:
+        contract: as stated.
+        refusal: why the robots cannot all be placed; None where they can, but not certified.
+        site: outlines of every target it names, and the picture's size.
+        scene_version: of the scene the outlines were measured in.
+
+    Returns:
+        None where nothing that is certified was found, as where a cage needs more robots.
+    """
+    if isinstance(refusal, CageError) and refusal.needed is not None:
+        return None
+    full = with_defaults(contract, site.outlines, site.room)
+
+    def attempt(smaller: Contract) -> Plan:
+        return make_plan(smaller, site, scene_version)
+
+    fewer = None if refusal is None else _fewer(full, attempt)
+    return fewer or _nearer(contract, full, attempt, site.metres_per_pixel)
+
+
+def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
+    """As many robots as fit, group after group."""
+    smaller, names = full, list(range(len(full.groups)))
+    for _ in range(ROUNDS):
+        try:
+            plan = attempt(smaller)
+        except CrowdedError as error:
+            fewer = _parted(smaller, (error.first, error.second), attempt)
+            alone = _without(smaller, error.second)
+            if fewer is None or fewer.robots < alone.robots:
+                names.pop(error.second)
+                fewer = alone
+        except (CapacityError, CageError) as error:
+            fewer = _counted(smaller, {smaller.groups.index(error.group): error.fits})
+        else:
+            short = plan.verdict.certified and smaller != full
+            return _marked(plan, _shortfall(full, smaller, names)) if short else None
+        if fewer is None:
+            return None
+        smaller = fewer
+    return None
+
+
+def _counted(contract: Contract, robots: Mapping[int, int]) -> Contract | None:
+    """The contract with other numbers of robots in some groups; None where one has too few."""
+    groups = list(contract.groups)
+    for index, count in robots.items():
+        if count < (3 if groups[index].relation == "cage" else 1):
+            return None
+        groups[index] = groups[index].model_copy(update={"robots": count})
+    return contract.model_copy(update={"groups": tuple(groups)})
+
+
+def _parted(contract: Contract, pair: tuple[int, int], attempt: Attempt) -> Contract | None:
+    """Fewer robots in two groups that crowd each other: most of those found that do not.
+
+    The second group gives way, or the first, or both by the same share.
+    """
+    first, second = pair
+    n, m = (contract.groups[index].robots for index in pair)
+    before = contract.model_copy(update={"groups": contract.groups[: second + 1]})
+
+    def works(counts: Counts) -> bool:
+        smaller = _counted(before, dict(zip(pair, counts, strict=True)))
+        return smaller is not None and _tried(attempt, smaller) is not None
+
+    def share(k: int) -> Counts:
+        return n - k, max(round(m * (1 - k / n)), 1)
+
+    ways = (
+        _fewest_less(lambda k: (n, m - k), m, works),
+        _fewest_less(lambda k: (n - k, m), n, works),
+        _fewest_less(share, n, works),
+    )
+    counts = max((c for c in ways if c is not None), key=sum, default=None)
+    return counts and _counted(contract, {first: counts[0], second: counts[1]})
+
+
+def _fewest_less(
+    counts: Callable[[int], Counts], most: int, works: Callable[[Counts], bool]
+) -> Counts | None:
+    """The counts with the fewest robots taken out that work, as far as halving finds them."""
+    tried = sorted({k for share in LESS if 0 < (k := round(share * most)) < most})
+    high = next((k for k in tried if works(counts(k))), None)
+    if high is None:
+        return None
+    low = max((k for k in tried if k < high), default=0)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if works(counts(middle)) else (middle, high)
+    return counts(high)
+
+
+def _without(contract: Contract, index: int) -> Contract:
+    groups = (*contract.groups[:index], *contract.groups[index + 1 :])
+    return contract.model_copy(update={"groups": groups})
+
+
+def _shortfall(full: Contract, smaller: Contract, names: list[int]) -> Shortfall:
+    """What is short, given which groups are left, from 0."""
+    asked, placed = full.robots, smaller.robots
+    have = "has a place" if placed == 1 else "have places"
+    left = dict(zip(names, smaller.groups, strict=True))
+    counts = [(left[i].robots if i in left else 0, g.robots) for i, g in enumerate(full.groups)]
+    each = [
+        f"{few} of {all_} in group {i}" for i, (few, all_) in enumerate(counts, 1) if few < all_
+    ]
+    where = f": {', '.join(each)}" if len(counts) > 1 else ""
+    sentence = f"{placed} of the {asked} robots {have}{where}."
+    return Shortfall(asked=asked, placed=placed, sentence=sentence)
+
+
+def _nearer(
+    stated: Contract, full: Contract, attempt: Attempt, metres_per_pixel: float | None
+) -> Plan | None:
+    """All robots at the greatest clearance that can be held, of the first group it helps.
+
+    A ring that goes all the way round comes before a wider one of which the picture leaves a part.
+    """
+    for index, (said, group) in enumerate(zip(stated.groups, full.groups, strict=True)):
+        if said.clearance is None or not group.keeps_clearance:
+            continue
+        whole = _greatest(full, index, attempt, _uncut)
+        plan = whole or _greatest(full, index, attempt)
+        if plan is None:
+            continue
+        held = plan.formation.contract.groups[index]
+        sentence = (
+            f"{_span(held)} is the greatest clearance found that can be held"
+            f"{' all round' if whole and group.relation in ROUND else ''}, not {_span(group)}."
+        )
+        short = Shortfall(
+            asked=full.robots,
+            placed=full.robots,
+            clearance_asked=group.clearance,
+            clearance=held.clearance,
+            sentence=also_metres(sentence, metres_per_pixel),
+        )
+        return _marked(plan, short)
+    return None
+
+
+def _greatest(
+    full: Contract,
+    index: int,
+    attempt: Attempt,
+    suits: Callable[[Plan], bool] = lambda plan: True,
+) -> Plan | None:
+    """The plan at the greatest clearance of a group that certifies and suits, found by halving."""
+    group = full.groups[index]
+    assert group.clearance is not None
+    least, greatest = group.clearance
+    aim = least or greatest
+    works, fails, best = 0, int(aim * TENTH), None
+    steps = COARSE if escape_proof(group) else fails.bit_length()
+    for _ in range(steps):
+        if fails - works < 2:
+            break
+        middle = (works + fails) // 2 if best or fails < 4 else max(fails // 2, 1)
+        plan = _tried(attempt, _with(full, index, _scaled(group, middle / TENTH / aim)))
+        if plan is None or not suits(plan):
+            fails = middle
+        else:
+            works, best = middle, plan
+    return best
+
+
+def _uncut(plan: Plan) -> bool:
+    return "ring_in_picture" not in plan.verdict.measures
+
+
+def _scaled(group: Group, share: float) -> Group:
+    """The group at a share of its clearance; inside only the least one is in the way."""
+    assert group.clearance is not None
+    least, greatest = group.clearance
+    deep = greatest >= OPEN or group.relation == "inside"
+    far = greatest if deep else max(round(greatest * share, 3), 0.1)
+    return group.model_copy(update={"clearance": (round(least * share, 3), far)})
+
+
+def _tried(attempt: Attempt, contract: Contract) -> Plan | None:
+    try:
+        plan = attempt(contract)
+    except REFUSALS:
+        return None
+    return plan if plan.verdict.certified else None
+
+
+def _with(contract: Contract, index: int, group: Group) -> Contract:
+    groups = (*contract.groups[:index], group, *contract.groups[index + 1 :])
+    return contract.model_copy(update={"groups": groups})
+
+
+def _marked(plan: Plan, short: Shortfall) -> Plan:
+    return plan.model_copy(update={"partial": short})
+
+
+def _span(group: Group) -> str:
+    assert group.clearance is not None
+    least, greatest = group.clearance
+    if greatest >= OPEN or group.relation == "inside":
+        return f"{least:.1f} px or more"
+    return f"{least:.1f} to {greatest:.1f} px"

@@ -1,0 +1,243 @@
+"""How robots are spread along the curve or over the corners a contract refers to."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString, Polygon
+
+from ...geometry.curves import FACING, Curve, locate
+from ...geometry.outline import FloatArray, distances
+from ...geometry.sampling import corner_points
+from ..checking.verdict import TOLERANCE, Audit, Part
+from .caging import escape_proof
+from .place import corner_reach
+
+WIDEST, NARROWEST = 1.5, 0.5
+"""Even spacing: a gap between neighbours as a multiple of the mean gap."""
+NEAR_CURVE = 0.03
+"""As near to a side's curve as this share of its length, a robot stands on it."""
+FACING_SLACK = math.radians(10)
+"""How much further than the side itself its robots may be turned from the direction meant."""
+SIDE_SLACK = 0.1
+"""At a corner two sides are as near; a robot may be nearer to the other one by this share."""
+
+
+def evenness(part: Part, curve: Curve, audit: Audit) -> None:
+    """Gaps between neighbours, measured along the curve, against their mean."""
+    if len(part.points) < 2:
+        return
+    spread = _spread(part, curve)
+    mean = float(np.mean(spread.gaps or [curve.length / len(part.points)]))
+    if spread.gaps:
+        audit.least("spacing_ratio", min(spread.gaps) / mean if mean > 0 else 0.0)
+        audit.greatest("worst_gap_px", max(spread.gaps))
+    for gap, (i, j) in zip(spread.gaps, spread.pairs, strict=True):
+        apart = f"and robot {j + 1} are {gap:.1f} px apart along the curve"
+        if gap > WIDEST * mean + TOLERANCE:
+            text = f"{apart}; even spacing allows {WIDEST * mean:.1f} px"
+            audit.robot("gap", i, gap, WIDEST * mean, text)
+        elif gap < NARROWEST * mean - TOLERANCE:
+            text = f"{apart}; even spacing needs {NARROWEST * mean:.1f} px"
+            audit.robot("crowded", i, gap, NARROWEST * mean, text)
+    _pieces(spread, mean, audit)
+
+
+def _pieces(spread: "_Spread", mean: float, audit: Audit) -> None:
+    """What uneven spreading over open or several pieces of a curve looks like."""
+    for apart, (i, j) in spread.jumps:
+        if apart < NARROWEST * mean - TOLERANCE:
+            text = f"and robot {j + 1} are {apart:.1f} px apart; even spacing needs more"
+            audit.robot("crowded", i, apart, NARROWEST * mean, text)
+    for i, stretch in spread.ends:
+        if stretch > mean + TOLERANCE:
+            text = f"is the last before {stretch:.1f} px without a robot; {mean:.1f} px are allowed"
+            audit.robot("bare_end", i, stretch, mean, text)
+    for stretch in spread.bare:
+        if stretch > mean + TOLERANCE:
+            text = f"A stretch of {stretch:.1f} px has no robot; even spacing allows {mean:.1f} px."
+            audit.whole("bare_stretch", stretch, mean, text)
+
+
+def on_curve(part: Part, curve: Curve, reach: float, name: str, audit: Audit) -> None:
+    """Every robot within `reach` px of the curve."""
+    distance = distances(curve.geometry(), part.points)
+    for i in np.flatnonzero(~(distance <= reach + TOLERANCE)):
+        audit.robot(
+            "off_curve",
+            part.first + int(i),
+            distance[i],
+            reach,
+            f"is {distance[i]:.1f} px from {name}; {reach:.1f} px at most are allowed",
+        )
+
+
+def on_side(part: Part, curve: Curve, direction: tuple[float, float], audit: Audit) -> None:
+    """Every robot stands on the side's curve, or off a part of the target that faces that way."""
+    feet = shapely.shortest_line(part.outline.envelope, shapely.points(part.points))
+    outward = np.diff(shapely.get_coordinates(feet).reshape(-1, 2, 2), axis=1)[:, 0]
+    unit = np.asarray(direction) / np.linalg.norm(direction)
+    facing = outward @ unit / np.maximum(np.linalg.norm(outward, axis=1), 1e-9)
+    astray = distances(curve.geometry(), part.points) > NEAR_CURVE * curve.length
+    for i in np.flatnonzero(astray & (facing < math.cos(FACING + FACING_SLACK))):
+        turned = math.degrees(math.acos(float(np.clip(facing[i], -1, 1))))
+        text = f"stands beside another side of the target, {turned:.0f} degrees off the one meant"
+        audit.robot("wrong_side", part.first + int(i), turned, math.degrees(FACING), text)
+
+
+def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
+    """Every robot's nearest edge is one of those asked for."""
+    vertices, pairs = part.outline.graph()
+    off = np.stack([distances(LineString(vertices[list(p)]), part.points) for p in pairs])
+    nearest, chosen = off.min(axis=0), off[list(edges)].min(axis=0)
+    for i in np.flatnonzero(chosen > nearest * (1 + SIDE_SLACK) + TOLERANCE):
+        text = f"stands nearer to edge {int(np.argmin(off[:, i]))} than to those asked for"
+        audit.robot("wrong_side", part.first + int(i), chosen[i] - nearest[i], 0.0, text)
+
+
+def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
+    """A closed ring: the robots' polygon holds the target, no opening wider than allowed.
+
+    What is to be escape-proof is judged by its certificate, openings only where one is named.
+    """
+    points = part.points[_order(part.points, curve)]
+    opening = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) - 2 * part.radius
+    allowed = part.group.max_gap
+    if allowed is None:
+        even = WIDEST * curve.whole_length / len(points)
+        allowed = np.inf if escape_proof(part.group) else even
+    audit.greatest("widest_opening_px", opening.max())
+    audit.measures["min_width_px"] = round(part.outline.min_width, 2)
+    encloses = len(points) > 2 and shapely.make_valid(Polygon(points)).contains(
+        shapely.Point(part.outline.centre)
+    )
+    name = part.group.targets[0]
+    if not encloses and not escape_proof(part.group):
+        audit.whole(
+            "not_enclosed",
+            len(points),
+            3,
+            f"The robots do not enclose {name}; a closed ring takes 3 or more all round.",
+            "robots",
+        )
+    order = _order(part.points, curve) + part.first
+    mend = _enough(part, curve)
+    for k in np.flatnonzero(opening > allowed + TOLERANCE):
+        other = order[(k + 1) % len(order)] + 1
+        cut = "" if curve.closed else " (the picture's border cuts the ring there)"
+        audit.robot(
+            "opening",
+            int(order[k]),
+            opening[k],
+            allowed,
+            f"and robot {other} leave an opening of {opening[k]:.1f} px; a closed ring "
+            f"allows {allowed:.1f} px{cut}{mend}",
+        )
+
+
+def _enough(part: Part, curve: Curve) -> str:
+    """How many robots make openings as narrow as a contract names, where more are what it takes."""
+    widest = part.group.max_gap
+    if not widest or not curve.closed:
+        return ""
+    needed = math.ceil(curve.length / (widest + 2 * part.radius))  # chords are shorter than arcs
+    apart = curve.length / needed
+    if needed <= len(part.points) or apart < (part.group.min_spacing or 0.0):
+        return ""
+    return f"; {needed} robots evenly would do"
+
+
+def corner_matching(part: Part, audit: Audit) -> None:
+    """One robot per corner: a one-to-one matching within reach of the corners."""
+    from scipy.optimize import linear_sum_assignment
+
+    corners = corner_points(part.outline, part.group.robots)
+    if part.group.robots > len(corners):
+        audit.whole(
+            "corners",
+            part.group.robots,
+            len(corners),
+            f"The target has {len(corners)} corners for {part.group.robots} robots.",
+            "robots",
+        )
+        return
+    reach = corner_reach(part.group, part.outline, part.radius)
+    distance = np.linalg.norm(part.points[:, None] - corners[None], axis=2)
+    cost = distance + 1e6 * (distance > reach)
+    robots, matched = linear_sum_assignment(cost)
+    audit.greatest("max_from_corner_px", distance[robots, matched].max())
+    for i, k in zip(robots, matched, strict=True):
+        if distance[i, k] > reach[k] + TOLERANCE:
+            x, y = corners[k]
+            audit.robot(
+                "off_corner",
+                part.first + int(i),
+                distance[i, k],
+                reach[k],
+                f"is {distance[i, k]:.1f} px from its corner ({x:.0f}, {y:.0f}); "
+                f"{reach[k]:.1f} px at most are allowed",
+            )
+
+
+def _order(points: FloatArray, curve: Curve) -> NDArray[np.intp]:
+    """Indices of the points in the order met along the curve."""
+    return np.argsort(_stations(points, curve)[0], kind="stable")
+
+
+def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Arc length of each point's foot on the curve, pieces laid end to end, and its piece."""
+    if len(curve.lines) == 1:
+        return locate(curve.lines[0], points), np.zeros(len(points), dtype=np.intp)
+    lines = [LineString(line) for line in curve.lines]
+    piece = np.argmin(np.stack([distances(line, points) for line in lines]), axis=0)
+    starts = np.concatenate([[0.0], np.cumsum([line.length for line in lines])])
+    along = np.stack([locate(line, points) for line in curve.lines])
+    return starts[piece] + along[piece, np.arange(len(points))], piece
+
+
+@dataclass(frozen=True)
+class _Spread:
+    """Robots along a curve: gaps and who is on either side, ends past the last, bare pieces.
+
+    `jumps` are ways from the last robot of a piece to the first of the next: along both and
+    straight across the cut. Straight from robot to robot says nothing where a recess is bridged.
+    """
+
+    gaps: list[float]
+    pairs: list[tuple[int, int]]
+    ends: list[tuple[int, float]]
+    bare: list[float]
+    jumps: list[tuple[float, tuple[int, int]]]
+
+
+def _spread(part: Part, curve: Curve) -> _Spread:
+    station, piece = _stations(part.points, curve)
+    order = np.argsort(station, kind="stable")
+    names = [int(i) + part.first for i in order]
+    cut = 0.0 if curve.closed else curve.cut(len(part.points))
+    if cut is not None:
+        around = np.diff(station[order], append=station[order[0]] + curve.length + cut)
+        pairs = list(zip(names, names[1:] + names[:1], strict=True))
+        return _Spread([float(g) for g in around], pairs, [], [], [])
+    spread = _Spread([], [], [], [], [])
+    start, last, since = 0.0, None, 0.0
+    for k, line in enumerate(curve.lines):
+        mine = [(float(station[i]) - start, int(i) + part.first) for i in order if piece[i] == k]
+        length = float(LineString(line).length)
+        start += length
+        since += float(np.linalg.norm(line[0] - curve.lines[k - 1][-1]))
+        if not mine:
+            spread.bare.append(length)
+            since += length
+            continue
+        if last is not None:
+            spread.jumps.append((since + mine[0][0], (last, mine[0][1])))
+        last, since = mine[-1][1], length - mine[-1][0]
+        for (a, i), (b, j) in pairwise(mine):
+            spread.gaps.append(b - a)
+            spread.pairs.append((i, j))
+        spread.ends.extend([(mine[0][1], mine[0][0]), (mine[-1][1], length - mine[-1][0])])
+    return spread

@@ -1,0 +1,237 @@
+"""Where to put robots so that they cage an object: few of them, and certified.
+
+Even rings come first. Else the robots slide along rings at two distances so that the widest way
+out, judged roughly on a coarse grid of configurations, gets narrower; what that finds is then
+put to the tests of `cage`. All of it is deterministic.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
+
+from ..curves import Curve, Frame, ring
+from ..outline import FloatArray, Outline
+from ..sampling import along_curve, min_spacing
+from .cages import QUICK, THOROUGH, State, cage
+from .configuration import clearances
+from .configuration_grid import Grid, component, first_grid
+from .rigid import Body, Obstacles, body_of
+
+STATIONS = 64
+"""Places on each ring that robots may slide to."""
+DEPTHS = (0.1, 0.4)
+"""Where in the range of clearances the rings lie: near the object, and nearer to the middle."""
+PHASES = 8
+"""Starts tried for an even ring."""
+SLIDES = (8, -8, 4, -4, 2, -2, 1, -1)
+"""Stations a robot slides by in search of a tighter cage, long slides first."""
+SWEEPS, STARTS = 6, 2
+BISECTIONS = 7
+MOST_SLID = 40
+"""More robots than this are placed evenly or not at all."""
+TRIES = 6
+"""Numbers of robots tried below the even ring that the disc test certifies."""
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a cage is made for.
+
+    Attributes:
+        outline: the object.
+        clearance: least and greatest distance from the object to a robot's edge, px.
+        radius: of a robot, px.
+        frame: where robots may stand.
+        spacing: least distance of two robots' centres, px.
+        walls: what else the object cannot pass.
+    """
+
+    outline: Outline
+    clearance: tuple[float, float]
+    radius: float
+    frame: Frame
+    spacing: float = 0.0
+    walls: BaseGeometry | None = None
+
+    @cached_property
+    def curves(self) -> tuple[Curve, ...]:
+        """Rings that follow the outline at the distances robots may stand at."""
+        least, greatest = self.clearance
+        span = min(greatest, 4 * least) - least if least > 0 else greatest
+        offsets = (least + share * span + self.radius for share in DEPTHS)
+        keep = least + self.radius
+        return tuple(ring(self.outline, d, d, self.frame, keep=keep) for d in offsets)
+
+    @cached_property
+    def slides(self) -> "_Slides":
+        """What the rings' stations close off, which is worked out once."""
+        return _Slides(self)
+
+    def state(self, points: FloatArray, levels: int, escapes: bool = False) -> State:
+        """What is known of robots there as a cage; too near to each other they are none."""
+        if len(points) > 1 and min_spacing(points) < self.spacing:
+            return "not certified"
+        region, radius, walls = self.outline.filled, self.radius, self.walls
+        return cage(region, points, radius, walls=walls, levels=levels, escapes=escapes).state
+
+
+def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
+    """The fewest robots found that certainly cage an object, and where, (n, 2), image pixels.
+
+    No more than the fewest in an even ring that the disc test certifies; no claim that fewer
+    would not do. Several seconds at most.
+
+    Args:
+        demand: object, clearance, radius, frame.
+        at_least: as many robots or more.
+
+    Returns:
+        None where robots that keep their spacing and the frame cannot be certified to cage it.
+    """
+    even = _even_count(demand, at_least)
+    most = at_least + TRIES if even is None else min(even, at_least + TRIES)
+    for n in range(at_least, most):
+        points = caging_places(demand, n)
+        if points is not None:
+            return points
+    return None if even is None else caging_places(demand, even)
+
+
+def caging_places(demand: Demand, n: int, preferred: Sequence[Curve] = ()) -> FloatArray | None:
+    """Places of n robots that certainly cage an object, (n, 2), image pixels, or None.
+
+    Args:
+        demand: object, clearance, radius, frame.
+        n: how many robots, 3 or more.
+        preferred: curves to spread them over evenly before all else.
+    """
+    rings = [points for c in (*preferred, *demand.curves) for points in _even_rings(c, n)]
+    levels = (0,) if n > MOST_SLID else (0, QUICK)
+    for level in levels:
+        for points in rings:
+            if demand.state(points, level) == "caged":
+                return points
+    if n > MOST_SLID:
+        return None
+    return demand.slides.places(n)
+
+
+def _even_count(demand: Demand, at_least: int) -> int | None:
+    """The fewest robots whose even ring the disc test certifies."""
+    for curve in demand.curves:
+        most = int(curve.length / demand.spacing) if demand.spacing > 0 else 1000
+        last, n = at_least - 1, at_least
+        while n <= most:
+            if _disc_cages(demand, curve, n):
+                return next(k for k in range(last + 1, n + 1) if _disc_cages(demand, curve, k))
+            last, n = n, max(n + 1, int(n * 1.05))
+    return None
+
+
+def _disc_cages(demand: Demand, curve: Curve, n: int) -> bool:
+    return any(demand.state(points, 0) == "caged" for points in _even_rings(curve, n))
+
+
+def _even_rings(curve: Curve, n: int) -> Iterator[FloatArray]:
+    if curve.length <= 0:
+        return
+    yield along_curve(curve, n)
+    if not curve.closed:
+        return
+    line = LineString(curve.lines[0])
+    for phase in range(PHASES):
+        at = (np.arange(n) + phase / PHASES) * line.length / n
+        yield shapely.get_coordinates(shapely.line_interpolate_point(line, at))
+
+
+class _Slides:
+    """Sets of stations on rings, by how clear the widest way out of each is."""
+
+    def __init__(self, demand: Demand) -> None:
+        self._demand = demand
+        # What the frame cuts open and no wall closes is no ring to slide on.
+        rings = [
+            c for c in demand.curves if c.closed or (demand.walls is not None and c.length > 0)
+        ]
+        self._rings = [_stations(curve) for curve in rings]
+        body = body_of(demand.outline.filled)
+        every = np.concatenate(self._rings) if self._rings else np.empty((0, 2))
+        self._grid: Grid = first_grid(body, Obstacles(every, demand.radius))
+        self._seed = self._grid.seed(body.pivot)
+        self._fields = [self._clearances(body, points) for points in self._rings]
+
+    def places(self, n: int) -> FloatArray | None:
+        """The tightest set found if it is certified."""
+        starts: list[tuple[float, int, list[int]]] = []
+        for k, points in enumerate(self._rings):
+            for phase in range(0, max(len(points) // n, 1), max(len(points) // n // PHASES, 1)):
+                chosen = [(phase + len(points) * i // n) % len(points) for i in range(n)]
+                starts.append((self._width(k, chosen), k, chosen))
+        for width, k, chosen in sorted(starts)[:STARTS]:
+            width, chosen = self._tightened(k, chosen, width)
+            points = self._rings[k][chosen]
+            if width < 0 and self._certified(points):
+                return points
+        return None
+
+    def _certified(self, points: FloatArray) -> bool:
+        """What leaks is mostly found out on coarse grids, before the finest are tried."""
+        state = self._demand.state(points, QUICK, escapes=True)
+        if state == "not certified":
+            state = self._demand.state(points, THOROUGH)
+        return state == "caged"
+
+    def _clearances(self, body: Body, points: FloatArray) -> NDArray[np.float32]:
+        fields = clearances(body, points, self._demand.radius, self._grid)
+        fields[:, :, ~self._grid.domain] = -np.inf
+        return fields
+
+    def _leaks(self, k: int, chosen: list[int], width: float) -> bool:
+        """Whether a way out has more clearance than `width` all along."""
+        free = self._fields[k][chosen].min(axis=0) > width
+        return bool(component(free, self._seed)[:, self._grid.border].any())
+
+    def _width(self, k: int, chosen: list[int], high: float | None = None) -> float:
+        """Clearance of the widest way out, px; below 0 there is none."""
+        reach = self._grid.side * 4
+        low, high = -reach, reach if high is None else high
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self._leaks(k, chosen, middle) else (low, middle)
+        return high
+
+    def _tightened(self, k: int, chosen: list[int], width: float) -> tuple[float, list[int]]:
+        """Robots slid one by one as long as the widest way out gets narrower."""
+        step = self._grid.side / 20
+        for _ in range(SWEEPS):
+            before = width
+            for i in range(len(chosen)):
+                for slide in SLIDES:
+                    moved = chosen.copy()
+                    moved[i] = (chosen[i] + slide) % len(self._rings[k])
+                    if self._apart(k, moved, i) and not self._leaks(k, moved, width - step):
+                        chosen, width = moved, self._width(k, moved, width - step)
+            if width == before:
+                break
+        return width, chosen
+
+    def _apart(self, k: int, chosen: list[int], i: int) -> bool:
+        points = self._rings[k][chosen]
+        away = np.linalg.norm(np.delete(points, i, axis=0) - points[i], axis=1)
+        return bool(away.min() >= max(self._demand.spacing, 1e-9))
+
+
+def _stations(curve: Curve) -> FloatArray:
+    """Points evenly along the pieces of a curve, (k, 2)."""
+    pieces: list[FloatArray] = []
+    for line in map(LineString, curve.lines):
+        count = max(round(STATIONS * line.length / curve.length), 2)
+        at = np.arange(count) * line.length / count
+        pieces.append(shapely.get_coordinates(shapely.line_interpolate_point(line, at)))
+    return np.concatenate(pieces)

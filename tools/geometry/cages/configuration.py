@@ -1,0 +1,219 @@
+"""Can a body get out between robots? A flood over its configuration space (x, y, theta).
+
+A cell is blocked only if every configuration in it collides, so what the flood does not reach
+nobody reaches (after Varava et al. 2018, who cover slices of it). The other way round nothing
+follows from a flood: a way out counts only once its moves are checked continuously.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from ..outline import FloatArray, largest_part
+from .configuration_grid import Grid, IndexArray, component, first_grid, halved
+from .escape import way_out
+from .leaks import leaks
+from .rigid import Body, Obstacles
+
+TABLE = 192
+"""Side of the table of signed distances."""
+DETAIL, MAX_CORNERS = 0.002, 48
+"""An outline of more corners is shrunk and simplified by this share of its reach."""
+WALL_POINTS = 400
+RUN = 24
+"""Points of a wall, one after the other, for which cells out of reach are left out together."""
+SEARCHED = (1, 2)
+"""Levels on which a way out is looked for: before them it is too coarse, after them too slow."""
+FOLLOWED = 1
+"""Level from which one way is followed to the last one, which leaks for certain if that does."""
+
+
+@dataclass(frozen=True)
+class Flood:
+    """What a flood showed: `enclosed` is proof; `path` (k, 3), poses, is a verified way out."""
+
+    enclosed: bool
+    path: FloatArray | None = None
+
+
+def flood(body: Body, obstacles: Obstacles, levels: int, *, escapes: bool = True) -> Flood:
+    """Flood the configurations from where the body is, on ever finer grids.
+
+    The domain is where the pivot lies within the hull of the robots and the body, a little
+    widened; the body is enclosed if the flood does not come to the border of that. Let a cell
+    have the centre (t0, theta0), the side h and the angle w. In a configuration (t, theta) of it
+    the body sees a robot p at q = R(-theta)(p - t), with
+    |q - q0| <= |t - t0| + 2 |p - t0| sin(|theta - theta0| / 2) <= h / sqrt(2) + |p - t0| w / 2.
+    The signed distance sd to the body is 1-Lipschitz, and its table gives it at q0 from above
+    (the pixel's centre plus half the pixel's diagonal), for a part of the body rather than more
+    than it. So with sd(q0) + h / sqrt(2) + |p - t0| w / 2 < radius every configuration of the
+    cell collides, and the cell is blocked. A path goes from cell to cell over a common point,
+    that is, between 26-neighbours, theta closed to a circle. Walls are some of their points.
+
+    Args:
+        body, obstacles: of which none overlap.
+        levels: how often at most the cells reached are halved, the first grid included.
+        escapes: whether to look for a way out.
+    """
+    table = _distance_table(body, obstacles.radius)
+    grid = first_grid(body, obstacles)
+    alive = np.broadcast_to(grid.domain, (grid.turns, *grid.domain.shape))
+    sure = np.zeros(alive.shape, dtype=bool)
+    last = levels - 1
+    for level in range(levels):
+        room = np.where(sure, _farthest(table, grid), -np.inf)
+        cells = np.nonzero(alive & ~sure)
+        room[cells] = _gaps(table, obstacles, grid, cells)
+        reached = component(room > -np.inf, grid.seed(body.pivot))
+        if not reached[:, grid.border].any():
+            return Flood(bool(reached.any()))
+        room[~reached] = -np.inf
+        if escapes and level in SEARCHED:
+            path = way_out(body, obstacles, grid, room)
+            if path is not None:
+                return Flood(False, path)
+        if level == FOLLOWED < last and leaks(
+            partial(_gaps, table, obstacles), grid, room, body.pivot, last - level
+        ):
+            last = max(SEARCHED) if escapes else level
+        if level == last:
+            break
+        sure = halved(room > _farthest(table, grid) + table.slack)
+        grid, alive = grid.halved(), halved(reached)
+    return Flood(False)
+
+
+def _farthest(table: "_Table", grid: Grid) -> float:
+    """How far at most a robot near the body moves, as the body sees it, within a cell, px."""
+    return grid.side / np.sqrt(2) + grid.angle / 2 * table.reach
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Signed distances to a body (negative inside) from above, px.
+
+    Attributes:
+        values: one a pixel of the square of half-side `half` about the pivot.
+        reach: asked for within this distance of the pivot.
+        slack: by how much a value may lie above the distance in the middle of its pixel.
+    """
+
+    values: FloatArray
+    half: float
+    reach: float
+    slack: float
+
+    def __call__(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        scale = len(self.values) / (2 * self.half)
+        column = ((x + self.half) * scale).astype(np.intp)
+        row = ((y + self.half) * scale).astype(np.intp)
+        return self.values[row, column]
+
+
+def _distance_table(body: Body, radius: float) -> _Table:
+    inner = _simplified(body)
+    reach = body.reach + radius
+    half = reach * 1.001
+    pixel = 2 * half / TABLE
+    ticks = (np.arange(TABLE) + 0.5) * pixel - half
+    x, y = (axis.ravel() for axis in np.meshgrid(ticks, ticks))
+    ring = shapely.get_coordinates(inner.exterior)
+    squared = np.full(len(x), np.inf)
+    for (ax, ay), (bx, by) in pairwise(ring.tolist()):
+        dx, dy = bx - ax, by - ay
+        px, py = x - ax, y - ay
+        along = np.clip((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-30), 0, 1)
+        px -= along * dx
+        py -= along * dy
+        np.minimum(squared, px * px + py * py, out=squared)
+    shapely.prepare(inner)
+    sign = np.where(shapely.contains_xy(inner, x, y), -1.0, 1.0)
+    slack = pixel / np.sqrt(2) * (1 + 1e-9)
+    values = sign * np.sqrt(squared) + slack
+    return _Table(values.reshape(TABLE, TABLE), half, reach, float(slack))
+
+
+def _simplified(body: Body) -> Polygon:
+    """A part of the body with few corners: if that cannot get out, neither can the whole."""
+    share = DETAIL
+    while len(body.polygon.exterior.coords) > MAX_CORNERS + 1 and share < 0.05:
+        step = share * body.reach
+        part = largest_part(body.polygon.buffer(-step).simplify(step, preserve_topology=True))
+        share *= 2
+        if part is None:
+            break
+        few = Polygon(part.exterior)
+        if len(few.exterior.coords) <= MAX_CORNERS + 1 and body.polygon.covers(few):
+            return few
+    return body.polygon
+
+
+def _gaps(
+    table: _Table, obstacles: Obstacles, grid: Grid, cells: tuple[IndexArray, ...]
+) -> FloatArray:
+    """Clearance in the middle of each cell as far as the table knows it, (k,), px.
+
+    Infinite where no robot is near, -infinite where the whole cell is blocked.
+    """
+    x, y, theta = grid.centres(cells).T
+    cos, sin = np.cos(theta), np.sin(theta)
+    least = np.full(len(x), np.inf)
+    step, turn = grid.side / np.sqrt(2), grid.angle / 2
+    for points, radius in _points(table, obstacles, grid):
+        (x0, y0), (x1, y1) = points.min(axis=0) - table.reach, points.max(axis=0) + table.reach
+        close = np.flatnonzero((x > x0) & (x < x1) & (y > y0) & (y < y1) & (least > -np.inf))
+        cx, cy = x[close], y[close]
+        for px, py in points:
+            dx, dy = px - cx, py - cy
+            away = dx * dx + dy * dy
+            near = np.flatnonzero(away < table.reach**2)
+            index, dx, dy = close[near], dx[near], dy[near]
+            c, s = cos[index], sin[index]
+            distance = table(c * dx + s * dy, c * dy - s * dx) - radius
+            bound = step + turn * np.sqrt(away[near])
+            gap = np.where(distance + bound < 0, -np.inf, distance - table.slack)
+            least[index] = np.minimum(least[index], gap)
+    return least
+
+
+def clearances(body: Body, robots: FloatArray, radius: float, grid: Grid) -> NDArray[np.float32]:
+    """Roughly the clearance from each robot (k, 2) alone in every cell, (k, turns, rows, columns).
+
+    Infinite where a robot is out of the body's reach.
+    """
+    table = _distance_table(body, radius)
+    cells = tuple(index.ravel() for index in np.indices((grid.turns, *grid.domain.shape)))
+    x, y, theta = grid.centres(cells).T
+    cos, sin = np.cos(theta), np.sin(theta)
+    fields = np.full((len(robots), len(x)), np.inf, dtype=np.float32)
+    for field, (px, py) in zip(fields, robots, strict=True):
+        dx, dy = px - x, py - y
+        near = np.flatnonzero(dx * dx + dy * dy < table.reach**2)
+        c, s, dx, dy = cos[near], sin[near], dx[near], dy[near]
+        field[near] = table(c * dx + s * dy, c * dy - s * dx) - table.slack - radius
+    return fields.reshape(-1, grid.turns, *grid.domain.shape)
+
+
+def _points(table: _Table, obstacles: Obstacles, grid: Grid) -> list[tuple[FloatArray, float]]:
+    """Robots and their radius; runs of points of the walls within reach and radius 0."""
+    points = [(obstacles.robots, obstacles.radius)]
+    if obstacles.walls is not None:
+        walls = _wall_points(obstacles.walls, table.half, grid)
+        points += [(walls[i : i + RUN], 0.0) for i in range(0, len(walls), RUN)]
+    return points
+
+
+def _wall_points(walls: BaseGeometry, reach: float, grid: Grid) -> FloatArray:
+    """Points on the walls within a distance of the grid, (k, 2)."""
+    x0, y0 = grid.origin - reach
+    x1, y1 = grid.origin + grid.side * np.array(grid.domain.shape[::-1]) + reach
+    lines = walls.boundary if shapely.get_dimensions(walls) == 2 else walls
+    lines = lines.intersection(Polygon.from_bounds(float(x0), float(y0), float(x1), float(y1)))
+    step = max(float(lines.length) / WALL_POINTS, grid.side / 4)
+    return shapely.get_coordinates(shapely.segmentize(lines, step))

@@ -1,0 +1,101 @@
+"""Cells of a configuration space (x, y, theta), and which of them hang together.
+
+Arrays are (turns, rows, columns); theta is a circle, its first cell begins at 0. Frame: image
+pixels, x right, y down.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import MultiPoint
+
+from ..outline import FloatArray
+from .rigid import Body, Obstacles
+
+BoolArray = NDArray[np.bool_]
+IndexArray = NDArray[np.intp]
+
+COARSE = 20
+"""Cells along the longer side of the domain at the first level; every level doubles them."""
+MIN_TURNS, MAX_TURNS = 16, 64
+"""Fewest and most cells of theta at the first level."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells of side `side`, px, from a corner `origin`; `domain` (rows, columns) is in question."""
+
+    origin: FloatArray
+    side: float
+    turns: int
+    domain: BoolArray
+
+    @property
+    def angle(self) -> float:
+        """Of a cell, radians."""
+        return 2 * np.pi / self.turns
+
+    @cached_property
+    def border(self) -> BoolArray:
+        """Cells of the domain that have a neighbour outside it."""
+        from scipy import ndimage
+
+        return self.domain & ~ndimage.binary_erosion(self.domain, np.ones((3, 3), dtype=np.intp))
+
+    def seed(self, point: FloatArray) -> tuple[int, int, int]:
+        """The cell of the start pose; theta 0 is where the first cell begins."""
+        x, y = np.floor((point - self.origin) / self.side).astype(int)
+        return 0, int(y), int(x)
+
+    def centres(self, cells: tuple[IndexArray, ...]) -> FloatArray:
+        """Poses in the middle of cells, (k, 3)."""
+        k, j, i = (index.astype(float) + 0.5 for index in cells)
+        x, y = self.origin[0] + i * self.side, self.origin[1] + j * self.side
+        return np.stack([x, y, k * self.angle], axis=1)
+
+    def halved(self) -> "Grid":
+        """The same domain in cells of half the side and angle."""
+        domain = self.domain.repeat(2, axis=0).repeat(2, axis=1)
+        return Grid(self.origin, self.side / 2, self.turns * 2, domain)
+
+
+def first_grid(body: Body, obstacles: Obstacles) -> Grid:
+    """The coarsest grid: its domain is the hull of the robots and the body, a little widened."""
+    corners = shapely.get_coordinates(body.polygon) + body.pivot
+    hull = MultiPoint(np.concatenate([obstacles.robots, corners])).convex_hull
+    x0, y0, x1, y1 = hull.bounds
+    side = max(x1 - x0, y1 - y0) / (COARSE - 4)
+    region = hull.buffer(1.5 * side)
+    origin = np.array([x0, y0]) - 2 * side
+    nx, ny = (int(np.ceil(length / side)) + 4 for length in (x1 - x0, y1 - y0))
+    x, y = np.meshgrid(np.arange(nx) + 0.5, np.arange(ny) + 0.5)
+    centres = origin + np.stack([x.ravel(), y.ravel()], axis=1) * side
+    domain = np.asarray(shapely.contains_xy(region, centres), dtype=np.bool_).reshape(x.shape)
+    even = np.pi * np.sqrt(2) * body.reach / side  # a turn then counts as much as a step
+    turns = int(np.clip(np.ceil(even), MIN_TURNS, MAX_TURNS))
+    return Grid(origin, side, turns, domain)
+
+
+def component(free: BoolArray, seed: tuple[int, int, int]) -> BoolArray:
+    """The cells that 26-neighbours connect with a cell; the first axis is a circle."""
+    from scipy import ndimage
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    closed = np.concatenate([free, free[:1]])  # the first layer again, behind the last
+    labels = np.empty(closed.shape, dtype=np.int32)
+    count = int(ndimage.label(closed, np.ones((3, 3, 3), dtype=np.intp), output=labels))
+    same = np.stack([labels[0][free[0]], labels[-1][free[0]]])
+    links = coo_array((np.ones(len(same.T)), (same[0], same[1])), (count + 1, count + 1))
+    _, part = connected_components(links, directed=False)
+    wanted = part == part[labels[seed]]
+    wanted[0] = False
+    return wanted[labels[:-1]]
+
+
+def halved(cells: BoolArray) -> BoolArray:
+    """The same cells in a grid halved."""
+    return cells.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2)

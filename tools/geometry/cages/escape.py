@@ -1,0 +1,122 @@
+"""A way out between robots: planned on a grid of configurations, then proved move by move.
+
+Moves are checked only once they are wanted (lazy planning, Bohlin and Kavraki 2000). A path that
+is given back is clear all along and ends where a line parts the body from every robot.
+"""
+
+import numpy as np
+
+from ..outline import FloatArray
+from .configuration_grid import BoolArray, Grid, IndexArray, component
+from .rigid import Body, Obstacles, clear_moves, shortened, ways_out
+
+RETRIES = 6
+"""How often a way is planned anew without the moves that turned out not to be clear."""
+EXITS = 24
+"""So many cells of the border, spread by their distance from the start, may end a way."""
+FAR = -9999
+"""Marks what a breadth-first search did not come to, as scipy does."""
+
+
+def way_out(body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray) -> FloatArray | None:
+    """A verified way out of the domain and away, poses (k, 3) from the start, or None.
+
+    Args:
+        body, obstacles: what gets out of what.
+        grid: of the configurations.
+        room: (turns, rows, columns), clearance in the middle of each cell, px; a guide only.
+    """
+    start = _entry(body, obstacles, grid, room)
+    if start is None:
+        return None
+    reached = component(room > 0, start)
+    exits = _exits(body, obstacles, grid, reached)
+    if not exits:
+        return None
+    cells = np.flatnonzero(reached)
+    poses = grid.centres(np.unravel_index(cells, reached.shape))
+    links = _links(reached)
+    source = int(np.searchsorted(cells, np.ravel_multi_index(start, reached.shape)))
+    goals = np.searchsorted(cells, list(exits))
+    for _ in range(RETRIES):
+        nodes = _shortest(links, len(cells), source, goals)
+        if nodes is None:
+            return None
+        path = np.stack([body.start, *poses[nodes], exits[int(cells[nodes[-1]])]])
+        path[:, 2] = np.unwrap(path[:, 2])
+        clear = clear_moves(body, obstacles, path[:-1], path[1:])
+        if clear.all():
+            return shortened(body, obstacles, path)
+        if not (clear[0] and clear[-1]):
+            return None
+        bad = np.sort(np.stack([nodes[:-1], nodes[1:]], axis=1)[~clear[1:-1]], axis=1)
+        links = links[~np.isin(links @ (len(cells), 1), bad @ (len(cells), 1))]
+    return None
+
+
+def _entry(
+    body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray
+) -> tuple[int, int, int] | None:
+    """The roomiest cell beside the start whose middle the body gets to straight."""
+    around = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    cells = around + grid.seed(body.pivot)
+    inside = ((cells[:, 1:] >= 0) & (cells[:, 1:] < room.shape[1:])).all(axis=1)
+    cells = cells[inside]
+    poses = grid.centres(tuple(cells.T))  # before theta wraps: the turn there is a small one
+    clear = clear_moves(body, obstacles, np.repeat(body.start[None], len(poses), 0), poses)
+    cells[:, 0] %= room.shape[0]
+    best = max(cells[clear], key=lambda c: room[tuple(c)], default=None)
+    if best is None or room[tuple(best)] <= 0:
+        return None
+    return int(best[0]), int(best[1]), int(best[2])
+
+
+def _exits(
+    body: Body, obstacles: Obstacles, grid: Grid, reached: BoolArray
+) -> dict[int, FloatArray]:
+    """Cells of the border from which the body gets away straight, and the pose it gets to."""
+    found = np.flatnonzero(reached & grid.border)
+    if not len(found):
+        return {}
+    found = found[np.unique(np.linspace(0, len(found) - 1, EXITS).astype(int))]
+    poses = grid.centres(np.unravel_index(found, reached.shape))
+    away = np.stack([ways_out(body, obstacles, pose) for pose in poses])
+    here = np.repeat(poses[:, None], away.shape[1], axis=1)
+    clear = clear_moves(body, obstacles, here.reshape(-1, 3), away.reshape(-1, 3))
+    reach = np.linalg.norm((away - here)[..., :2], axis=2)
+    reach[~clear.reshape(reach.shape)] = np.inf
+    return {
+        int(found[k]): away[k, np.argmin(reach[k])]
+        for k in np.flatnonzero(np.isfinite(reach.min(axis=1)))
+    }
+
+
+def _links(reached: BoolArray) -> IndexArray:
+    """Pairs of cells side by side, by their rank among those reached, (m, 2), lower rank first."""
+    rank = np.cumsum(reached.ravel()).reshape(reached.shape) - 1
+    pairs: list[IndexArray] = []
+    for axis in range(3):
+        other = np.roll(reached, -1, axis=axis)
+        both = reached & other
+        if axis:  # only theta is a circle
+            both[(slice(None),) * axis + (-1,)] = False
+        pairs.append(np.stack([rank[both], np.roll(rank, -1, axis=axis)[both]], axis=1))
+    return np.sort(np.concatenate(pairs), axis=1)
+
+
+def _shortest(links: IndexArray, count: int, source: int, goals: IndexArray) -> IndexArray | None:
+    """Nodes of a path with the fewest links to the nearest goal."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order
+
+    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), (count, count)).tocsr()
+    order, before = breadth_first_order(graph, source, directed=False)
+    when = np.full(count, count)
+    when[order] = np.arange(len(order))
+    node = int(goals[np.argmin(when[goals])])
+    if when[node] == count:
+        return None
+    nodes = [node]
+    while before[nodes[-1]] != FAR:
+        nodes.append(int(before[nodes[-1]]))
+    return np.array(nodes[::-1])

@@ -1,0 +1,1 @@
+"""Letters, polygons, stars and other figures as strokes and outlines."""

@@ -1,0 +1,183 @@
+"""Shapes that robots draw: lines, arcs, polygons, stars, letters and grids, at any size.
+
+A sketch is a set of polylines (or of places) of its natural proportions; `fitted` gives it a place.
+Frame: x right, y down; angles are degrees, clockwise as seen, 0 to the right.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...errors import InputError
+from ..outline import FloatArray
+from .letters import arc, letter_strokes
+from .typeface import letter_outlines
+
+Kind = Literal[
+    "line", "arc", "circle", "grid", "polygon", "star", "letters", "outlined_letters", "polyline"
+]
+Box = tuple[float, float, float, float]
+WAIST = 0.5
+"""Inner radius of a star by its outer: one of 5 points is a little fuller than a pentagram."""
+CIRCLE_STEP = 3.0
+"""Degrees between the points of a circle."""
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A shape without a place.
+
+    Attributes:
+        lines: polylines, each (k, 2); a loop repeats its first point. For a grid its rows.
+        places: (n, 2) where the robots stand, for a grid; None where they spread over the lines.
+        frame: the part of the plane that is fitted into a box, (x0, y0, x1, y1).
+        fills: whether it may be stretched to fill a box.
+    """
+
+    lines: tuple[FloatArray, ...]
+    frame: Box
+    places: FloatArray | None = None
+    fills: bool = False
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height."""
+        x0, y0, x1, y1 = self.frame
+        return x1 - x0, y1 - y0
+
+    @property
+    def points(self) -> FloatArray:
+        """Every point of it, of the lines and of the places, (m, 2)."""
+        return np.concatenate([*self.lines, *([] if self.places is None else [self.places])])
+
+    def at(self, centre: tuple[float, float], scale: float, stretch: float = 1.0) -> "Sketch":
+        """The sketch enlarged about its middle, y by `stretch` more, and moved to a centre."""
+        x0, y0, x1, y1 = self.frame
+        middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
+        factor = np.array([scale, scale * stretch])
+
+        def moved(points: FloatArray) -> FloatArray:
+            return (points - middle) * factor + np.asarray(centre)
+
+        low, high = moved(np.array([[x0, y0], [x1, y1]]))
+        frame = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+        places = None if self.places is None else moved(self.places)
+        return Sketch(tuple(moved(line) for line in self.lines), frame, places, self.fills)
+
+
+def fitted(sketch: Sketch, box: Box) -> Sketch:
+    """The sketch as large as a box (x0, y0, x1, y1) allows and in its middle.
+
+    Raises:
+        InputError: the box is no place for it: without extent where the sketch has some.
+    """
+    x0, y0, x1, y1 = box
+    width, height = sketch.size
+    centre = ((x0 + x1) / 2, (y0 + y1) / 2)
+    if width == height == 0:
+        return sketch.at(centre, 1.0)
+    across = (x1 - x0) / width if width > 0 else math.inf
+    down = (y1 - y0) / height if height > 0 else math.inf
+    scale = min(across, down)
+    if not 0 < scale < math.inf:
+        raise InputError(f"A box from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) holds no such shape.")
+    if sketch.fills and max(across, down) < math.inf:
+        return sketch.at(centre, across, down / across)
+    return sketch.at(centre, scale)
+
+
+def line_sketch(upright: bool) -> Sketch:
+    """A straight line from left to right, or from top to bottom."""
+    end = (0.0, 1.0) if upright else (1.0, 0.0)
+    return Sketch((np.array([(0.0, 0.0), end]),), (0.0, 0.0, *end))
+
+
+def arc_sketch(begin: float = 0.0, end: float = 360.0) -> Sketch:
+    """Part of a circle; what is fitted into a box is the whole circle.
+
+    Args:
+        begin, end: degrees clockwise from the right; 360 or more apart is the whole circle.
+    """
+    round_about = abs(end - begin) >= 360
+    if round_about:
+        begin, end = -90.0, 270.0
+    line = arc((0.0, 0.0), (1.0, 1.0), begin, end, CIRCLE_STEP)
+    if round_about:
+        line[-1] = line[0]
+    return Sketch((line,), (-1.0, -1.0, 1.0, 1.0))
+
+
+def polygon_sketch(corners: int) -> Sketch:
+    """A regular polygon that stands on a side.
+
+    Raises:
+        InputError: fewer than 3 corners.
+    """
+    return _loop(np.full(_enough(corners), 1.0), 90 + 180 / corners)
+
+
+def star_sketch(points: int) -> Sketch:
+    """A star with one point up.
+
+    Raises:
+        InputError: fewer than 3 points.
+    """
+    return _loop(np.tile([1.0, WAIST], _enough(points)), -90)
+
+
+def letters_sketch(text: str) -> Sketch:
+    """A line of letters and digits, as a pen writes them.
+
+    Raises:
+        InputError: see `letter_strokes`.
+    """
+    return polyline_sketch(*letter_strokes(text))
+
+
+def outlined_letters_sketch(text: str) -> Sketch:
+    """A line of letters, digits and signs by the outlines of a font.
+
+    Raises:
+        InputError: see `letter_outlines`.
+    """
+    return polyline_sketch(*letter_outlines(text))
+
+
+def polyline_sketch(*lines: FloatArray) -> Sketch:
+    """Lines as they are, each (k, 2)."""
+    points = np.concatenate(lines)
+    (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
+    return Sketch(lines, (float(x0), float(y0), float(x1), float(y1)))
+
+
+def grid_sketch(n: int, rows: int) -> Sketch:
+    """N places in rows and columns a unit apart; the last row may be shorter.
+
+    Raises:
+        InputError: no row, or more rows than places.
+    """
+    if not 1 <= rows <= n:
+        raise InputError(f"A grid of {n} places has 1 to {n} rows, not {rows}.")
+    columns = math.ceil(n / rows)
+    index = np.arange(n)
+    places = np.stack([index % columns, index // columns], axis=1).astype(float)
+    full = -(-n // columns)  # 5 places in 4 rows of 2 fill only 3
+    lines = tuple(np.array([(0.0, y), (columns - 1.0, y)]) for y in range(full) if columns > 1)
+    if columns == 1 and full > 1:
+        lines = (np.array([(0.0, 0.0), (0.0, full - 1.0)]),)
+    return Sketch(lines, (0.0, 0.0, columns - 1.0, full - 1.0), places, fills=True)
+
+
+def _enough(corners: int) -> int:
+    if corners < 3:
+        raise InputError(f"A polygon or star has 3 or more corners, not {corners}.")
+    return corners
+
+
+def _loop(radii: FloatArray, begin: float) -> Sketch:
+    turn = np.radians(begin + 360 * np.arange(len(radii) + 1) / len(radii))
+    turn[-1] = turn[0]
+    closed = np.concatenate([radii, radii[:1]])
+    return polyline_sketch(np.stack([closed * np.cos(turn), closed * np.sin(turn)], axis=1))

@@ -1,0 +1,1 @@
+"""Poses and a plan to paths that robots drive."""

@@ -1,0 +1,106 @@
+"""What can be measured of a thing without knowing what it is: colour, size, place, shape.
+
+Words such as "red", "round" or "the largest" are decided on these numbers alone.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ...geometry.outline import Outline
+
+ColourName = Literal[
+    "red",
+    "orange",
+    "yellow",
+    "green",
+    "blue",
+    "purple",
+    "pink",
+    "brown",
+    "black",
+    "grey",
+    "white",
+]
+"""The basic colour terms of English (Berlin and Kay, 1969)."""
+ShapeName = Literal[
+    "circle",
+    "oval",
+    "square",
+    "rectangle",
+    "triangle",
+    "pentagon",
+    "hexagon",
+    "star",
+    "cross",
+    "L",
+    "arrow",
+    "ring",
+    "frame",
+    "crescent",
+    "heart",
+    "C",
+    "T",
+    "irregular",
+]
+
+
+@dataclass(frozen=True)
+class Attributes:
+    """Label-free measures of one thing; lengths in image pixels, x right, y down.
+
+    Attributes:
+        colours: share of its pixels by colour name, largest first; they add up to 1.
+        lab: mean CIE L*, a*, b* (L* 0 to 100).
+        area: square px, holes left out.
+        centre: x, y of the centroid.
+        orientation: of the long side of its minimum-area rectangle, degrees in [0, 180) from
+            the x axis towards the y axis (clockwise as seen).
+        elongation: long over short side of that rectangle, 1 or more.
+        roundness: 4 pi area over perimeter squared, holes filled; 1 for a disc.
+        shapes: how well each shape class fits, 0 to 1, best first.
+        hole: share of the filled area that is holes.
+        touches_border: whether the picture cuts it.
+    """
+
+    colours: tuple[tuple[ColourName, float], ...]
+    lab: tuple[float, float, float]
+    area: float
+    centre: tuple[float, float]
+    orientation: float
+    elongation: float
+    roundness: float
+    shapes: tuple[tuple[ShapeName, float], ...]
+    hole: float
+    touches_border: bool
+
+    @property
+    def colour(self) -> ColourName:
+        """The commonest colour name."""
+        return self.colours[0][0]
+
+    @property
+    def shape(self) -> ShapeName:
+        """The shape that fits best."""
+        return self.shapes[0][0]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A thing found in the picture that nobody has named yet.
+
+    Attributes:
+        id: c1, c2, ... in the order of salience, the same on every run.
+        outline: image px.
+        salience: 0 to 1, how much it looks like a thing.
+    """
+
+    id: str
+    outline: Outline
+    attributes: Attributes
+    salience: float
+
+    @property
+    def label(self) -> str:
+        """What it looks like, in two words: "red circle", "grey thing"."""
+        shape = self.attributes.shape
+        return f"{self.attributes.colour} {'thing' if shape == 'irregular' else shape}"

@@ -1,0 +1,262 @@
+"""Superlatives as numbers: who wins, by how much, and who comes too close to be told apart."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...geometry.outline import FloatArray
+from .filters import IntArray, Things
+from .query import Pick
+
+BoolArray = NDArray[np.bool_]
+
+AREA_RATIO = 1.15
+"""Outlines of equal things differ by a tenth in area."""
+LENGTH_RATIO = 1.15
+"""As for areas; and a part of a stick is easily hidden."""
+LONGISH, LONGER_BUILT = 1.5, 1.5
+"""What is no stick (below the first) loses the name of the longest to what is built longer."""
+ROUNDER = 0.05
+"""Roundness of a traced disc varies by this."""
+LIGHTER = 8.0
+"""L*: a step that people see in things that are not side by side."""
+APART = 0.02
+"""Share of the picture's width or height between two places that people tell apart."""
+EDGE_APART = 0.01
+"""The same for edges: the winner must also be ahead by its outline, not by its centre alone."""
+CORNER_APART = 0.04
+"""Share of the diagonal: distances to a corner or to the centre are judged more loosely."""
+MIDDLE_REACH = 0.1
+"""Share of the diagonal within which a thing is in the picture's middle whatever else is."""
+NEARER = 1.2
+"""Ratio of two distances that people tell apart."""
+ALONE = (1.6, 1.25)
+"""Ratio of the distances to the nearest neighbour: clearly alone; below the second nobody is."""
+GAP_NOISE = 0.003
+"""Share of the picture's longer side by which distances of outlines are off."""
+
+CORNERS = {
+    "upper_left": (0, 0),
+    "upper_right": (1, 0),
+    "lower_left": (0, 1),
+    "lower_right": (1, 1),
+}
+SIDES = {"leftmost": (0, 1), "rightmost": (0, -1), "topmost": (1, 1), "bottommost": (1, -1)}
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """Who won a pick.
+
+    Attributes:
+        contenders: indices of things, the winner first, then all not clearly behind or ahead of
+            it; empty where nothing qualifies.
+        reasons: the numbers of each contender, as a short sentence.
+        doubt: why the winner does not win clearly; empty where it does.
+    """
+
+    contenders: tuple[int, ...]
+    reasons: dict[int, str]
+    doubt: str
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Numbers of m things on one scale.
+
+    Attributes:
+        values: larger ranks first, (m,).
+        ahead: whether the one of the row is clearly ahead of the one of the column, (m, m).
+        noun: what is measured: "area".
+        adjective: for "almost equally ...".
+        shown: the numbers with their unit.
+    """
+
+    values: FloatArray
+    ahead: BoolArray
+    noun: str
+    adjective: str
+    shown: list[str]
+
+
+def rank(things: Things, members: IntArray, pick: Pick) -> Ranked:
+    """Decide a pick among things (indices in ascending order); oddness is decided elsewhere."""
+    return _placed(things, members, _measure(things, members, pick.by), pick.place)
+
+
+def rank_nearest(things: Things, members: IntArray, other: int) -> Ranked:
+    """Decide which thing is nearest to another by the distance of their edges."""
+    gaps, name = things.gaps(other)[members], things.candidates[other].id
+    ahead = _nearer(gaps, _noise(things), NEARER)
+    measure = Measure(-gaps, ahead, f"distance to {name}", f"near to {name}", _pixels(gaps))
+    return _placed(things, members, measure, 1)
+
+
+def _placed(things: Things, members: IntArray, measure: Measure, place: int) -> Ranked:
+    if place > len(members):
+        count = (
+            f"is only {len(members)} thing" if len(members) == 1 else f"are {len(members)} things"
+        )
+        return Ranked((), {}, f"there {count} to pick from, so there is no place {place}")
+    order = np.lexsort((np.arange(len(members)), -measure.values))
+    winner = int(order[place - 1])
+    apart = measure.ahead[winner] | measure.ahead[:, winner]
+    close = [int(j) for j in order if not apart[j] and j != winner]
+    contenders = (winner, *close)
+    ids = [things.candidates[int(members[i])].id for i in range(len(members))]
+    reasons = {
+        int(members[i]): _reason(measure, order, place, i, winner, ids[winner]) for i in contenders
+    }
+    doubt = ""
+    if close:
+        shown = ", ".join(f"{ids[i]} {measure.shown[i]}" for i in contenders[:4])
+        more = f" and {len(contenders) - 4} more" if len(contenders) > 4 else ""
+        number = "two" if len(contenders) == 2 else len(contenders)
+        doubt = f"{number} things are almost equally {measure.adjective}: {shown}{more}"
+    return Ranked(tuple(int(members[i]) for i in contenders), reasons, doubt)
+
+
+def _reason(
+    measure: Measure, order: IntArray, place: int, index: int, winner: int, winner_id: str
+) -> str:
+    own = f"{measure.noun} {measure.shown[index]}"
+    if index != winner:
+        return f"{own}, {winner_id} {measure.shown[winner]}"
+    before = f", the one before {measure.shown[int(order[place - 2])]}" if place > 1 else ""
+    after = f", the next {measure.shown[int(order[place])]}" if place < len(order) else ""
+    return f"{own}{before}{after}"
+
+
+def _measure(things: Things, members: IntArray, by: str) -> Measure:
+    if by in SIDES:
+        return _side(things, members, by)
+    if by in CORNERS:
+        return _corner(things, members, by)
+    other: dict[str, Callable[[Things, IntArray], Measure]] = {
+        "largest": lambda t, m: _area(t, m, 1),
+        "smallest": lambda t, m: _area(t, m, -1),
+        "longest": _longest,
+        "roundest": _roundest,
+        "lightest": lambda t, m: _lightness(t, m, 1),
+        "darkest": lambda t, m: _lightness(t, m, -1),
+        "middle": _middle,
+        "farthest_from_border": lambda t, m: _from_border(t, m, 1),
+        "nearest_to_border": lambda t, m: _from_border(t, m, -1),
+        "alone": _alone,
+    }
+    return other[by](things, members)
+
+
+def _over(values: FloatArray, margin: float) -> BoolArray:
+    """Ahead by a difference; a rounding error short of it counts."""
+    return values[:, None] - values[None] >= margin - 1e-9
+
+
+def _pixels(values: FloatArray) -> list[str]:
+    return [f"{v:,.0f} px" for v in values]
+
+
+def _noise(things: Things) -> float:
+    return GAP_NOISE * max(things.width, things.height)
+
+
+def _nearer(gaps: FloatArray, noise: float, ratio: float) -> BoolArray:
+    """Whether the row's distance is clearly the smaller one."""
+    return (gaps[None] >= ratio * gaps[:, None] - 1e-9) & (gaps[None] - gaps[:, None] >= noise)
+
+
+def _area(things: Things, members: IntArray, sign: int) -> Measure:
+    areas = things.areas[members]
+    ahead = _over(sign * np.log(areas), np.log(AREA_RATIO))
+    return Measure(sign * areas, ahead, "area", "large" if sign > 0 else "small", _pixels(areas))
+
+
+def _longest(things: Things, members: IntArray) -> Measure:
+    lengths = np.array([things.candidates[int(i)].outline.long_axis[1] for i in members])
+    built = np.array([things.candidates[int(i)].attributes.elongation for i in members])
+    ahead = _over(np.log(lengths), np.log(LENGTH_RATIO))
+    # A plate is longer than a pencil, yet the pencil may be meant.
+    ahead &= (built[:, None] >= LONGISH) | (built[None] < LONGER_BUILT * built[:, None])
+    return Measure(lengths, ahead, "length", "long", _pixels(lengths))
+
+
+def _roundest(things: Things, members: IntArray) -> Measure:
+    values = np.array([things.candidates[int(i)].attributes.roundness for i in members])
+    shown = [f"{v:.2f}" for v in values]
+    return Measure(values, _over(values, ROUNDER), "roundness", "round", shown)
+
+
+def _lightness(things: Things, members: IntArray, sign: int) -> Measure:
+    light = things.labs[members, 0]
+    shown = [f"L* {v:.0f}" for v in light]
+    adjective = "light" if sign > 0 else "dark"
+    return Measure(sign * light, _over(sign * light, LIGHTER), "lightness", adjective, shown)
+
+
+def _side(things: Things, members: IntArray, by: str) -> Measure:
+    axis, sign = SIDES[by]
+    side = (things.width, things.height)[axis]
+    centre = things.centres[members, axis]
+    edge = things.boxes[members, axis if sign > 0 else axis + 2]
+    ahead = _over(-sign * centre, APART * side) & _over(-sign * edge, EDGE_APART * side)
+    name = "xy"[axis]
+    shown = [f"{name} {v:,.0f} px" for v in centre]
+    adjective = "far to the " + by.removesuffix("most")
+    return Measure(-sign * centre, ahead, "centre at", adjective, shown)
+
+
+def _corner(things: Things, members: IntArray, by: str) -> Measure:
+    at = np.array(CORNERS[by]) * (things.width - 1, things.height - 1)
+    name = f"the {by.replace('_', ' ')} corner"
+    far = np.linalg.norm(things.centres[members] - at, axis=1)
+    ahead = _over(-far, CORNER_APART * float(np.hypot(things.width, things.height)))
+    return Measure(-far, ahead, f"distance to {name}", f"near to {name}", _pixels(far))
+
+
+def _middle(things: Things, members: IntArray) -> Measure:
+    at = np.array([things.width - 1, things.height - 1]) / 2
+    diagonal = float(np.hypot(things.width, things.height))
+    centres = things.centres[members]
+    far = np.linalg.norm(centres - at, axis=1)
+    ahead = _over(-far, CORNER_APART * diagonal)
+    if len(members) >= 3:
+        # The middle one of a row at one side of the picture may be meant as well.
+        among = np.linalg.norm(centres - centres.mean(axis=0), axis=1)
+        off = (far > MIDDLE_REACH * diagonal)[:, None]
+        ahead &= ~(off & _over(among, 1e-6))
+    noun = "distance to the picture's centre"
+    return Measure(-far, ahead, noun, "near to the middle", _pixels(far))
+
+
+def _from_border(things: Things, members: IntArray, sign: int) -> Measure:
+    boxes = things.boxes[members]
+    beyond = np.array([things.width - 1, things.height - 1]) - boxes[:, 2:]
+    gaps = np.maximum(np.minimum(boxes[:, :2], beyond).min(axis=1), 0)
+    ahead = _over(sign * gaps, APART * min(things.width, things.height))
+    adjective = "far from the border" if sign > 0 else "near to the border"
+    return Measure(sign * gaps, ahead, "distance to the border", adjective, _pixels(gaps))
+
+
+def _alone(things: Things, members: IntArray) -> Measure:
+    gaps = np.array([_to_neighbour(things, members, int(i)) for i in members], dtype=float)
+    ahead = _nearer(gaps, _noise(things), ALONE[0]).T
+    clear = np.sort(gaps)[::-1]
+    nobody = len(clear) > 1 and clear[0] < ALONE[1] * clear[1]
+    adjective = "far from the others, so none stands alone" if nobody else "far from the others"
+    return Measure(gaps, ahead, "nearest neighbour at", adjective, _pixels(gaps))
+
+
+def _to_neighbour(things: Things, members: IntArray, index: int) -> float:
+    """Edge-to-edge distance to the nearest member, px; the diagonal where there is none."""
+    others = members[members != index]
+    box, boxes = things.boxes[index], things.boxes[others]
+    apart = np.maximum(0, np.maximum(boxes[:, :2] - box[2:], box[:2] - boxes[:, 2:]))
+    least = np.hypot(apart[:, 0], apart[:, 1])  # no two outlines are nearer than their boxes
+    nearest = float(np.hypot(things.width, things.height))
+    for k in np.argsort(least, kind="stable"):
+        if least[k] >= nearest:
+            break
+        nearest = min(nearest, things.gap(index, int(others[k])))
+    return nearest

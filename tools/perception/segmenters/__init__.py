@@ -1,0 +1,1 @@
+"""A prompt and a picture to a mask with its confidence."""

@@ -1,0 +1,357 @@
+"""The outline of the thing a person points at, without any trained weights.
+
+Pointing with a box, points or a rough outline is enough for classical segmentation to work on
+real photographs, so formup runs with no download and no GPU.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from ..detectors.whole_object import on_plain_ground, propose_wholes, solidity
+from . import grabcut as gc
+from .grabcut import Box, Bytes, Mask, Point, Points, Window
+from .mask_openings import cut_openings
+from .region_growing import Region, box_iou, edge_support, pin, propose
+
+# The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
+RING = 0.1
+# How far the sides of perturbed boxes move, in box sizes: about the error of a drawn box.
+BOX_SHIFT = 0.06
+# Larger boxes, smaller ones, wider ones and taller ones.
+BOX_MOVES = ((-1, -1, 1, 1), (1, 1, -1, -1), (-1, 1, 1, -1), (1, -1, -1, 1))
+# The middle of a box that the second opinion floods from, as a share of the box.
+CORE = 0.35
+# A mask smaller than this share of the prompt's extent has lost the thing.
+COLLAPSED = 0.1
+# The vertices of a rough outline are off by up to about 5 % of the thing's size.
+OUTLINE_ERROR = 0.05
+# Few vertices cut the corners of round things more often than they overshoot.
+OUTLINE_REACH = 0.06
+# Eroding by no more than this share of the local half-width keeps thin parts.
+THIN = 0.5
+# Golden angle: neighbouring vertices move in unrelated directions, the same ones each time.
+TURN = np.pi * (3 - 5**0.5)
+# Different regions a point may mean that are tried; a fourth was right now and then.
+PROPOSALS = 4
+# A whole holds this share of its part, is this many times as large (a thing with its shadow is
+# less) and stands out this much of it; it is taken for a thing when it fills its hull this far.
+HELD, MUCH_LARGER, RIVAL, SOLID = 0.85, 2.2, 0.6, 0.88
+# A mask that runs along the sure background for this many times its size was cut short; the box
+# is widened by this share a side, so often at most.
+CUT_SHORT, WIDER, WIDENINGS = 0.05, 0.15, 3
+NEXT_TO = np.ones((3, 3), np.uint8)
+# How strongly missing edges lower the confidence.
+EDGE_WEIGHT = 2
+# Other points of a mask that should lead back to it, and how deep inside it they lie at least.
+ECHOES = 4
+DEPTH = 0.35
+
+Proposer = Callable[[Bytes, Sequence[Point], int], list[Region]]
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """A mask of the thing pointed at, and how far it can be trusted.
+
+    Attributes:
+        mask: (H, W) of the whole picture.
+        confidence: in [0, 1], self-consistency and never accuracy: whether slightly different
+            pointing, a second algorithm, the colours and the prompt's extent agree on the mask.
+        parts: the cues in [0, 1] that `confidence` is the geometric mean of.
+        box: x0, y0, x1, y1 in pixels, as given or found.
+    """
+
+    mask: npt.NDArray[np.bool_]
+    confidence: float
+    parts: Mapping[str, float]
+    box: Box
+
+
+@dataclass(frozen=True)
+class _Prompt:
+    """A prompt at the working scale.
+
+    `trimaps` are GrabCut labels, first for the prompt as given and then for perturbed ones;
+    `extent` is what the prompt says the thing covers, `core` what is most surely the thing.
+    `drawn` says that a person or model drew its edge, so that the picture need not show one.
+    """
+
+    window: Window
+    trimaps: Sequence[Bytes]
+    extent: Mask
+    core: Mask
+    positive: Points
+    box: Box
+    drawn: bool = False
+
+
+def segment_box(
+    pixels: Bytes, box: Box, *, positive: Iterable[Point] = (), negative: Iterable[Point] = ()
+) -> Segmentation:
+    """Segment the thing in a box (x0, y0, x1, y1), by GrabCut (Rother et al., 2004).
+
+    `pixels` is (H, W, 3) uint8 RGB; the box and the points that are surely on the thing
+    (`positive`) or surely not (`negative`) are in pixels, x right, y down, pixel centres at .0.
+    The thing may reach a little beyond the box. Where nothing can be told from its surroundings
+    the mask is empty and the confidence 0.
+    """
+    window = gc.window_around(pixels, box)
+    drawn = window.to_work((box[:2], box[2:])).ravel()
+    on, off = window.to_work(list(positive)), window.to_work(list(negative))
+    boxes = [drawn, *_moved_boxes(drawn)]
+    trimaps = [pin(window.features, _box_trimap(window.shape, b), on, off) for b in boxes]
+    extent = gc.box_region(window.shape, drawn)
+    core = _middle(window.shape, drawn)
+    return _segment(_Prompt(window, trimaps, extent, core, on, box))
+
+
+def segment_outline(
+    pixels: Bytes,
+    vertices: Sequence[Point],
+    *,
+    positive: Iterable[Point] = (),
+    negative: Iterable[Point] = (),
+) -> Segmentation:
+    """Segment the thing in a rough outline of 3 or more vertices (x, y), as `segment_box` does.
+
+    Well inside the outline is surely the thing and well outside surely not, so four vertices make
+    a rotated box, and more of them settle what a box leaves open.
+    """
+    box = _around(vertices)
+    window = gc.window_around(pixels, box)
+    drawn = window.to_work(vertices)
+    on, off = window.to_work(list(positive)), window.to_work(list(negative))
+    regions = [gc.polygon_region(v, window.shape) for v in (drawn, *_moved_outlines(drawn))]
+    cores = [_eroded(region) for region in regions]
+    trimaps = [
+        pin(window.features, gc.trimap(region, _dilated(region), core), on, off)
+        for region, core in zip(regions, cores, strict=True)
+    ]
+    return _segment(_Prompt(window, trimaps, regions[0], cores[0], on, box, drawn=True))
+
+
+def segment_points(
+    pixels: Bytes, points: Sequence[Point], *, negative: Iterable[Point] = ()
+) -> Segmentation:
+    """Segment the thing under one or more points (x, y), as `segment_box` does.
+
+    Of the regions that grow from the points, the one whose segmentation agrees with it best and
+    stands out most in colour is taken. Its stability is whether other points of the mask lead
+    back to it. A thing of several colours needs points on each, or a box.
+    """
+    off = list(negative)
+    parts = _tried(pixels, propose(pixels, points, PROPOSALS), points, off)
+    best = max(parts, key=lambda tried: tried.standing, default=None)
+    if best is not None and on_plain_ground(best.prompt.window, best.mask):
+        return _judged(best.prompt, best.mask, _echo(pixels, best.prompt, best.mask, propose))
+    wholes = _tried(pixels, propose_wholes(pixels, points, PROPOSALS), points, off)
+    if best is not None:
+        wholes = [tried for tried in wholes if _is_whole_of(tried, best)]
+    solid = [tried for tried in wholes if solidity(tried.mask) >= SOLID]
+    chosen = max(solid, key=lambda tried: tried.standing, default=best)
+    if chosen is None:
+        return _nothing((pixels.shape[0], pixels.shape[1]), _around(points))
+    proposer = propose if chosen is best else propose_wholes
+    echo = _echo(pixels, chosen.prompt, chosen.mask, proposer)
+    found = _judged(chosen.prompt, chosen.mask, echo)
+    if chosen is best and wholes:  # it may well be a part of one of them
+        rival = max(tried.standing for tried in wholes)
+        return _doubted(found, chosen.standing / (chosen.standing + rival))
+    return found
+
+
+def _segment(prompt: _Prompt) -> Segmentation:
+    """The majority of the masks from the prompt and its perturbations, and their agreement."""
+    masks = [_cut(prompt, trimap) for trimap in prompt.trimaps]
+    mask = gc.clean(gc.majority(masks), prompt.positive)
+    return _judged(prompt, mask, float(np.mean([gc.iou(mask, other) for other in masks[1:]])))
+
+
+def _cut(prompt: _Prompt, trimap: Bytes) -> Mask:
+    """The mask from one trimap; if it collapses, what is not surely background starts as object.
+
+    A box drawn inside the thing puts its colours into the ring and so into the background.
+    """
+    image = prompt.window.features
+    mask = gc.clean(gc.grabcut(image, trimap), prompt.positive)
+    if np.count_nonzero(mask) >= COLLAPSED * np.count_nonzero(prompt.extent):
+        return mask
+    generous = np.where(trimap == cv2.GC_PR_BGD, np.uint8(cv2.GC_PR_FGD), trimap)
+    return gc.clean(gc.grabcut(image, generous), prompt.positive)
+
+
+def _judged(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
+    window = prompt.window
+    if not mask.any() or mask.all():
+        return _nothing(window.picture, prompt.box)
+    mask = cut_openings(window.features, mask, prompt.positive)
+    flooded = gc.watershed(window.features, prompt.core, prompt.trimaps[0])
+    parts = {
+        "stability": stability,
+        "agreement": gc.iou(mask, flooded),
+        "colour_separation": gc.colour_separation(window.features, mask),
+        "prompt_fit": _fit(prompt, mask),
+    }
+    agreed = float(np.prod(list(parts.values())) ** (1 / len(parts)))
+    # Cues that agree are worth nothing where the mask ends in the middle of nowhere.
+    parts["edge_support"] = edge_support(window.features, mask)
+    confidence = agreed if prompt.drawn else agreed * parts["edge_support"] ** EDGE_WEIGHT
+    return Segmentation(window.to_picture(mask), confidence, parts, prompt.box)
+
+
+def _nothing(picture: tuple[int, int], box: Box) -> Segmentation:
+    return Segmentation(np.zeros(picture, dtype=np.bool_), 0.0, {}, box)
+
+
+def _fit(prompt: _Prompt, mask: Mask) -> float:
+    """Overlap of the bounding boxes of the mask and of what the prompt says the thing covers."""
+    return box_iou(gc.bounding_box(mask), gc.bounding_box(prompt.extent)) if mask.any() else 0.0
+
+
+def _box_trimap(shape: tuple[int, int], box: Points) -> Bytes:
+    reach = RING * np.tile(box[2:] - box[:2], 2) * (-1, -1, 1, 1)
+    return gc.trimap(gc.box_region(shape, box), gc.box_region(shape, box + reach))
+
+
+def _moved_boxes(box: Points) -> list[Points]:
+    step = BOX_SHIFT * np.tile(box[2:] - box[:2], 2)
+    return [box + step * move for move in BOX_MOVES]
+
+
+def _middle(shape: tuple[int, int], box: Points) -> Mask:
+    half = np.maximum(CORE * (box[2:] - box[:2]) / 2, 1)
+    y, x = np.ogrid[: shape[0], : shape[1]]
+    (cx, cy), (rx, ry) = (box[:2] + box[2:]) / 2, half
+    return ((x - cx) / rx) ** 2 + ((y - cy) / ry) ** 2 <= 1
+
+
+def _eroded(region: Mask) -> Mask:
+    reach = OUTLINE_ERROR * np.sqrt(np.count_nonzero(region))
+    depth = gc.distance_inside(region)
+    size = 2 * int(np.ceil(2 * reach)) + 1
+    half_width = np.asarray(cv2.dilate(depth, np.ones((size, size), dtype=np.uint8)))
+    return depth > np.minimum(reach, THIN * half_width)
+
+
+def _dilated(region: Mask) -> Mask:
+    reach = OUTLINE_REACH * np.sqrt(np.count_nonzero(region))
+    beyond = cv2.distanceTransform((~region).astype(np.uint8), cv2.DIST_L2, 5)
+    return np.asarray(beyond) <= reach
+
+
+def _moved_outlines(outline: Points) -> list[Points]:
+    """Outlines with every vertex moved by the expected error, each in its own direction."""
+    x, y = outline.T
+    area = abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1))) / 2
+    turns = TURN * np.arange(len(outline)) + np.pi / 2 * np.arange(4)[:, None]
+    moves = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    return list(outline + OUTLINE_ERROR * np.sqrt(area) * moves)
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A proposal, the mask GrabCut made of it, and how much that stands out."""
+
+    prompt: _Prompt
+    mask: Mask
+    standing: float
+
+    @property
+    def area(self) -> float:
+        return self.prompt.window.picture_area(self.mask)
+
+
+def _tried(
+    pixels: Bytes, regions: Iterable[Region], points: Sequence[Point], negative: Sequence[Point]
+) -> list[_Tried]:
+    found: list[_Tried] = []
+    for region in regions:
+        prompt = _region_prompt(pixels, region, region.box, points, negative)
+        mask = _cut(prompt, prompt.trimaps[0])
+        for _ in range(WIDENINGS):
+            if not _cut_short(prompt, mask):
+                break
+            prompt = _region_prompt(pixels, region, _widened(prompt.box), points, negative)
+            mask = _cut(prompt, prompt.trimaps[0])
+        if mask.any() and not mask.all():
+            found.append(_Tried(prompt, mask, _standing_out(prompt, mask)))
+    return found
+
+
+def _is_whole_of(outer: _Tried, part: _Tried) -> bool:
+    """Whether a mask holds another, is much larger (not just its shadow), and stands out too."""
+    shared = part.prompt.window.transfer(part.mask, outer.prompt.window)
+    held = int(np.count_nonzero(shared & outer.mask)) >= HELD * int(np.count_nonzero(shared))
+    larger = outer.area >= MUCH_LARGER * part.area
+    return held and larger and outer.standing >= RIVAL * part.standing
+
+
+def _doubted(found: Segmentation, share: float) -> Segmentation:
+    parts = {**found.parts, "unrivalled": share}
+    return Segmentation(found.mask, found.confidence * share, parts, found.box)
+
+
+def _cut_short(prompt: _Prompt, mask: Mask) -> bool:
+    """Whether a mask ends at the sure background rather than at an edge of its own."""
+    touching = np.asarray(cv2.dilate((prompt.trimaps[0] == cv2.GC_BGD).astype(np.uint8), NEXT_TO))
+    return int(np.count_nonzero(mask & (touching > 0))) > CUT_SHORT * np.sqrt(
+        np.count_nonzero(mask)
+    )
+
+
+def _widened(box: Box) -> Box:
+    x0, y0, x1, y1 = box
+    dx, dy = WIDER * (x1 - x0), WIDER * (y1 - y0)
+    return x0 - dx, y0 - dy, x1 + dx, y1 + dy
+
+
+def _region_prompt(
+    pixels: Bytes, region: Region, box: Box, points: Sequence[Point], negative: Sequence[Point]
+) -> _Prompt:
+    """A box around a grown region, with the region's inside as sure object."""
+    window = gc.window_around(pixels, box)
+    on, off = window.to_work(points), window.to_work(negative)
+    drawn = window.to_work((box[:2], box[2:])).ravel()
+    core = _eroded(region.window.transfer(region.mask, window))
+    trimap = _box_trimap(window.shape, drawn)
+    trimap[core] = cv2.GC_FGD
+    extent = gc.box_region(window.shape, drawn)
+    return _Prompt(window, [pin(window.features, trimap, on, off)], extent, core, on, box)
+
+
+def _standing_out(prompt: _Prompt, mask: Mask) -> float:
+    return _fit(prompt, mask) * gc.colour_separation(prompt.window.features, mask)
+
+
+def _echo(pixels: Bytes, prompt: _Prompt, mask: Mask, proposer: Proposer) -> float:
+    """Mean overlap of the mask with the likest region proposed from other points well inside."""
+    window = prompt.window
+    overlaps: list[float] = []
+    for point in _far_inside(mask, prompt.positive):
+        ((x, y),) = window.to_picture_points(point[None])
+        regions = proposer(pixels, [(float(x), float(y))], PROPOSALS)
+        shared = [gc.iou(mask, region.window.transfer(region.mask, window)) for region in regions]
+        overlaps.append(max(shared, default=0.0))
+    return float(np.mean(overlaps)) if overlaps else 0.0
+
+
+def _far_inside(mask: Mask, points: Points) -> Points:
+    """Points (n, 2) well inside the mask, each the farthest from the ones before it."""
+    depth = gc.distance_inside(mask)
+    inside = np.argwhere(depth >= DEPTH * depth.max())[:, ::-1].astype(np.float64)
+    chosen = list(points)
+    for _ in range(ECHOES):
+        gaps = np.min([np.linalg.norm(inside - point, axis=1) for point in chosen], axis=0)
+        chosen.append(inside[gaps.argmax()])
+    return np.array(chosen[len(points) :])
+
+
+def _around(points: Sequence[Point]) -> Box:
+    (x0, y0), (x1, y1) = np.min(points, axis=0), np.max(points, axis=0)
+    return float(x0), float(y0), float(x1), float(y1)
