@@ -1,6 +1,6 @@
 """A tool is a typed function with a docstring; its JSON Schema is read from both, once.
 
-The first parameter is the Workspace the call works on; the rest is what the model fills in.
+The first parameter is the Context the call works with; the rest is what the model fills in.
 Every parameter must be described, with unit and frame where it has one: this fails at import.
 """
 
@@ -19,11 +19,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .errors import ArgumentsError
 from .schema import compact_schema, without_bounds
-from .world import Workspace
+from .context import Context
+from .world import World
 
 Kind = Literal["read", "commit", "actuate", "ask", "end"]
-"""read: changes nothing outside the workspace; commit: makes a plan; actuate: moves robots;
-ask: a person answers; end: gives up, which closes the run."""
+"""read: finds things out; commit: makes a plan; actuate: moves robots; ask: a person answers;
+end: gives up, which ends the turn."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,14 @@ class ToolResult:
     Attributes:
         data: JSON object; what the model reads.
         images: PNG or JPEG files, for models that see.
-        told: what the person is told, where this closes the run.
+        world: what is known and decided from now on; None where nothing has changed.
+        message: what the person is told, where this ends the turn.
     """
 
     data: dict[str, Any]
     images: tuple[bytes, ...] = field(default=(), repr=False)
-    told: str | None = None
+    world: World | None = field(default=None, repr=False)
+    message: str | None = None
 
     @property
     def text(self) -> str:
@@ -83,7 +86,7 @@ class Tool:
         except ValidationError as error:
             raise ArgumentsError(f"{self.name}: {violations(error)}") from None
 
-    async def call(self, workspace: Workspace, arguments: Mapping[str, Any]) -> ToolResult:
+    async def call(self, context: Context, arguments: Mapping[str, Any]) -> ToolResult:
         """Validate and run; a plain function runs in a thread of its own.
 
         Raises:
@@ -93,9 +96,9 @@ class Tool:
         parsed = self.parse(arguments)
         values = {name: getattr(parsed, name) for name in type(parsed).model_fields}
         if inspect.iscoroutinefunction(self.function):
-            answer = await self.function(workspace, **values)
+            answer = await self.function(context, **values)
         else:
-            answer = await _in_thread(lambda: self.function(workspace, **values))
+            answer = await _in_thread(lambda: self.function(context, **values))
         return answer if isinstance(answer, ToolResult) else ToolResult(dict(answer))
 
 
@@ -134,7 +137,7 @@ async def _in_thread(work: Callable[[], Any]) -> Any:
 def tool(kind: Kind) -> Callable[[ToolFunction], Tool]:
     """Make a Tool of a function: name, types and docstring become name, schema and description.
 
-    The function takes the Workspace and what the model fills in, and returns a ToolResult or, where
+    The function takes the Context and what the model fills in, and returns a ToolResult or, where
     there are no pictures, its data alone. It may be async; if not it runs in a thread.
 
     Raises:

@@ -1,290 +1,305 @@
-"""What one conversation works on: the scene, the plans made in it, and the person's settings.
+"""World: all that is known and decided in a conversation, as one frozen value.
 
-The one mutable object of the tools; they read it and put new values in, so that a plan id or a
-target id means the same in the next call.
+Tools read it from their Context and return the next one; only the loop puts that in place. Files
+and logs hold it as its JSON. Frame everywhere: image pixels as the person sees them, x right, y
+down, pixel centres at whole numbers.
 """
 
-import math
-from collections.abc import Mapping
-from copy import copy
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
 
-import numpy as np
+import shapely
+from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, field_validator
 
-from .errors import InputError, ToolError
-from .fleet.deploy import Arrival, Fleet
-from .fleet.simulated import MAX_ROBOTS, SimulatedFleet, checked_starts, spread_starts
-from .formation.contract import Contract
+from .errors import ToolError
+from .fleet.deploy import Arrival
+from .fleet.protocol import Pose
 from .formation.placement.place import Site
-from .formation.plan import Plan
-from .geometry.outline import FloatArray, Outline, distances
-from .motion.motion import obstacles
-from .perception.contours import outline_of_mask
-from .perception.detectors.candidates import find_candidates, segment_candidate
-from .perception.referring.attributes import Candidate
-from .perception.segmenters.drawn_outline import straightened, within
-from .perception.segmenters.registry import segmenter_named, visible_vertices
-from .perception.target_prompt import MAX_POINTS, Point, TargetPrompt
-from .scene import Scene, Target
+from .formation.plan import Plan, scene_version
+from .formation.contract import Contract
+from .formation.units import also_metres, check_scale
+from .formation.value import Value
+from .geometry.outline import Outline, make_outline
+from .perception.image import Picture
+from .perception.target_prompt import Box, Point, TargetPrompt
 
-Descriptor = Literal["edges", "edges+vertices", "matrix"]
-FLEETS = ("simulated",)
-MISSED = 0.06
-"""Rough outlines are off by up to this share of the thing's size."""
+Ring = tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True)
-class Settings:
-    """What the person fixed; code holds the model to it.
+def outline_rings(outline: Outline) -> dict[str, Any]:
+    """An outline as JSON: the ring around it and those around its holes, (x, y) px."""
+    polygon = outline.polygon
+    rings = [list(ring.coords[:-1]) for ring in (polygon.exterior, *polygon.interiors)]
+    return {"outline": rings[0]} | ({"holes": rings[1:]} if rings[1:] else {})
+
+
+def _read_outline(value: Any) -> Outline:
+    if isinstance(value, Outline):
+        return value
+    return make_outline(value["outline"], value.get("holes", ()))
+
+
+OutlineField = Annotated[
+    Outline, PlainValidator(_read_outline), PlainSerializer(outline_rings, when_used="json")
+]
+
+
+class PictureFacts(Value):
+    """Which picture it is; its pixels are fetched through the Context."""
+
+    sha256: str
+    width: int
+    height: int
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.width, self.height
+
+
+class Target(Value):
+    """An object of interest.
 
     Attributes:
-        robots: how many, or None where the person left it open.
-        robot_radius: px, 0 is a point; None leaves it to the contract.
-        clearance: exact distance wanted from the target, px, or None for the default.
-        segmenter: name of the segmenter.
-        threshold: t, the least confidence a mask is used at; None for the segmenter's own.
-        descriptor: how describe_shape puts shapes into text.
-        fleet: name of the fleet.
-        starts: (n, 2) starting positions of simulated robots, px, or None to spread them.
-        seed: of everything random in the simulator.
-        may_deploy: whether robots may be moved at all in this run.
-        approved: id of the one plan a person has approved although it is partial.
-        numbered: whether what stands out is numbered in the picture a model gets.
+        id: t1, t2, ... in order of finding.
+        label: what it is called; "the thing pointed at" where nobody named it.
+        box: x0, y0, x1, y1.
+        confidence: alpha, 0 to 1: self-consistency of the segmentation, not accuracy.
+        outline: measured, holes kept.
+        prompt: what it was found from: point, box, outline or candidate.
+        parts: what alpha was made of.
+        source: what it was found from, if that was an outline somebody drew.
+        missed: vertices of the rough outline it was found from that lie well outside of `outline`.
+    """
+
+    id: str
+    label: str
+    box: Box
+    confidence: float
+    outline: OutlineField
+    prompt: str
+    parts: dict[str, float] = Field(default_factory=dict)
+    missed: tuple[Point, ...] = ()
+    source: TargetPrompt | None = None
+
+
+class KeepOut(Value):
+    """A region that robots stay off and drive around.
+
+    Attributes:
+        reason: why, in a few words.
+        hard: whether a plan that enters it cannot be certified; else it is avoided where possible.
+    """
+
+    id: str
+    outline: OutlineField
+    reason: str
+    hard: bool = True
+
+
+class ShownCandidate(Value):
+    """A candidate that a question offered, so that its id means the same in the answer."""
+
+    id: str
+    label: str
+    box: Box
+
+
+class PlanNode(Value):
+    """A plan in the tree of plans.
+
+    Attributes:
+        parent: id of the plan it was made from by an edit.
+        edit: the edit, in the terms of the tool that made it.
+        unseen: targets whose outlines are to be looked at before robots move.
+    """
+
+    plan: Plan
+    parent: str | None = None
+    edit: str | None = None
+    unseen: tuple[str, ...] = ()
+
+
+class World(Value):
+    """What is known and decided, and nothing else.
+
+    Attributes:
+        picture: content hash and size.
         metres_per_pixel: of a picture taken straight from above; None where it is not known.
-    """
-
-    robots: int | None = None
-    robot_radius: float | None = None
-    clearance: float | None = None
-    segmenter: str = "grabcut"
-    threshold: float | None = None
-    descriptor: Descriptor = "edges"
-    fleet: str = "simulated"
-    starts: FloatArray | None = None
-    seed: int = 0
-    may_deploy: bool = True
-    approved: str | None = None
-    numbered: bool = False
-    metres_per_pixel: float | None = None
-
-    def check(self) -> None:
-        """Refuse names that do not exist.
-
-        Raises:
-            InputError: unknown segmenter or fleet; the text lists those there are.
-        """
-        segmenter_named(self.segmenter)
-        if self.fleet not in FLEETS:
-            raise InputError(f"Unknown fleet {self.fleet!r}. There are: {', '.join(FLEETS)}.")
-
-
-@dataclass
-class Workspace:
-    """The state tools share.
-
-    Attributes:
         pointed: what the person pointed at, in order t1, t2, ...
-        instruction: the person's words, if there are any.
-        samples: positions kept by the sampling tools under s1, s2, ...
-        unseen: by plan id, targets whose outlines are to be looked at before robots move.
+        targets: measured things.
+        keep_out: regions robots stay off.
+        plans: by id, in the order they were last proposed.
+        current: the id of the plan that edits apply to.
+        arrivals: by plan id, what was observed after its last deployment, the latest last.
+        robots: last observed pose of each robot; a snapshot, the fleet knows.
+        shown: candidates that a question offered.
+        samples: positions that sampling tools named, s1, s2, ...
         doubted: what was found last with too little confidence, for a person to look at.
-        found: what was found in the picture, once somebody has asked.
-        arrivals: by plan id, what was observed after a deployment, and the way there.
+
+    Raises:
+        InputError: metres per pixel that no picture has.
     """
 
-    scene: Scene
-    settings: Settings = field(default_factory=Settings)
+    picture: PictureFacts
+    metres_per_pixel: float | None = None
     pointed: tuple[TargetPrompt, ...] = ()
-    instruction: str = ""
-    plans: dict[str, Plan] = field(default_factory=dict[str, Plan])
-    samples: dict[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    targets: tuple[Target, ...] = ()
+    keep_out: tuple[KeepOut, ...] = ()
+    plans: dict[str, PlanNode] = Field(default_factory=dict)
+    current: str | None = None
+    arrivals: dict[str, Arrival] = Field(default_factory=dict)
+    robots: tuple[Pose, ...] = ()
+    shown: tuple[ShownCandidate, ...] = ()
+    samples: dict[str, tuple[Point, ...]] = Field(default_factory=dict)
     doubted: Target | None = None
-    unseen: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
-    found: tuple[Candidate, ...] | None = None
-    arrivals: dict[str, Arrival] = field(default_factory=dict[str, Arrival])
-    frames: dict[str, list[FloatArray]] = field(default_factory=dict[str, list[FloatArray]])
 
-    def __post_init__(self) -> None:
-        self.settings.check()
-        if self.settings.metres_per_pixel is not None:
-            self.scene = replace(self.scene, metres_per_pixel=self.settings.metres_per_pixel)
-        problems = [p for q in self.pointed for p in q.problems(*self.scene.picture.size)]
-        if problems:
-            raise InputError(" ".join(problems))
+    @field_validator("metres_per_pixel")
+    @classmethod
+    def _possible_scale(cls, scale: float | None) -> float | None:
+        check_scale(scale)
+        return scale
 
-    def copy(self) -> "Workspace":
-        """One to work on that leaves this one as it is."""
-        made = copy(self)
-        for name in ("plans", "samples", "arrivals", "frames", "unseen"):
-            setattr(made, name, dict(getattr(self, name)))
-        return made
+    @classmethod
+    def of(cls, picture: Picture, **parts: Any) -> "World":
+        """The world of a picture in which nothing has been found yet, or what `parts` give."""
+        facts = PictureFacts(sha256=picture.sha256, width=picture.width, height=picture.height)
+        return cls(picture=facts, **parts)
 
-    def adopt(self, other: "Workspace") -> None:
-        """Become what a copy has become."""
-        vars(self).update(vars(other))
+    def having(self, **parts: Any) -> "World":
+        """The world with other parts, which are not validated again."""
+        return self.model_copy(update=parts)
 
-    def segment(self, prompt: TargetPrompt) -> Target:
-        """Find the outline of the thing pointed at and keep it as a target.
+    @property
+    def version(self) -> str:
+        """Changes with all that a certificate depends on: picture, scale, targets, keep-outs."""
+        outlines = {t.id: _canonical(t.outline) for t in self.targets}
+        outlines |= {f"-{k.id}": _canonical(k.outline) for k in self.keep_out if k.hard}
+        return scene_version(self.picture.sha256, outlines, self.metres_per_pixel)
 
-        Points alone, for a target found from an outline that was drawn, correct that.
+    def with_metres(self, text: str) -> str:
+        """A text with each length in px given in metres too, where the scale is known."""
+        return also_metres(text, self.metres_per_pixel)
 
-        Raises:
-            ToolError: the prompt does not fit the picture, or the mask is not to be believed.
-        """
-        picture = self.scene.picture
-        prompt = self._with_outline(prompt)
-        problems = prompt.problems(picture.width, picture.height)
-        if problems:
-            raise ToolError(" ".join(problems))
-        threshold = self.threshold(prompt.how)
-        try:
-            outline, confidence, parts = self._measured(prompt)
-        except InputError as error:
-            text = f"Insufficient segmentation accuracy. {error} {ADVICE[prompt.how]}"
-            raise ToolError(text) from None
-        target = Target(
-            id=prompt.id,
-            label=prompt.label or "the thing pointed at",
-            box=outline.bounds,
-            confidence=round(confidence, 3),
-            outline=outline,
-            prompt=prompt.how,
-            parts=tuple((name, round(value, 3)) for name, value in parts.items()),
-            missed=_missed(outline, prompt),
-            source=None if prompt.outline is None else prompt,
-        )
-        if confidence < threshold:
-            self.doubted = target
-            raise ToolError(_insufficient(confidence, threshold, prompt.how))
-        self.scene = self.scene.with_target(target)
-        return target
-
-    def _with_outline(self, prompt: TargetPrompt) -> TargetPrompt:
-        """The prompt, with the outline that its points correct if it has no way of its own."""
-        known = next((t.source for t in self.scene.targets if t.id == prompt.id), None)
-        if prompt.how == "point" and known is not None:
-            mended = known.mended_by(prompt)
-            most = max(len(mended.points or ()), len(mended.negative))
-            if most > MAX_POINTS:
-                raise ToolError(
-                    f"{prompt.id} would have {most} points that correct its outline, "
-                    f"{MAX_POINTS} at most: draw a closer outline."
-                )
-            return mended
-        if prompt.how == "point" and prompt.points is None:
-            raise ToolError(
-                f"Negative points alone correct an outline that was drawn; {prompt.id} has none. "
-                "Give an outline, a box or points with them."
-            )
-        return prompt
-
-    def threshold(self, how: str) -> float:
-        """The least confidence a mask pointed at in that way is used at."""
-        chosen = self.settings.threshold
-        usual = segmenter_named(self.settings.segmenter).thresholds
-        return usual[how] if chosen is None else chosen
-
-    def candidates(self) -> tuple[Candidate, ...]:
-        """The things in the picture, found when first asked for."""
-        if self.found is None:
-            self.found = find_candidates(self.scene.picture.pixels)
-        return self.found
-
-    def candidate(self, name: str) -> Candidate:
-        """The candidate with an id.
+    def target(self, name: str) -> Target:
+        """The target with an id.
 
         Raises:
-            ToolError: there is none; the text says which there are.
+            ToolError: there is none; the text lists those there are.
         """
-        found = self.candidates()
-        for candidate in found:
-            if candidate.id == name:
-                return candidate
-        known = f"c1 to c{len(found)}" if found else "none: nothing stands out in this picture"
-        raise ToolError(f"There is no candidate {name!r}. Candidates: {known}.")
+        for target in self.targets:
+            if target.id == name:
+                return target
+        known = ", ".join(t.id for t in self.targets) or "none yet: segment something first"
+        raise ToolError(f"There is no target {name!r}. Targets: {known}.")
 
-    def _measured(self, prompt: TargetPrompt) -> tuple[Outline, float, Mapping[str, float]]:
-        """Outline, confidence and its parts."""
-        segmenter, pixels = segmenter_named(self.settings.segmenter), self.scene.picture.pixels
-        if prompt.candidate is None:
-            found = segmenter.run(pixels, prompt)
-            outline = outline_of_mask(found.mask)
-            if prompt.straight and prompt.outline is not None:
-                seen = visible_vertices(prompt.outline, *self.scene.picture.size)
-                outline = within(straightened(outline, seen), *self.scene.picture.size)
-            return outline, found.confidence, found.parts
-        candidate = self.candidate(prompt.candidate)
-        return segment_candidate(lambda p: segmenter.run(pixels, p), candidate)
+    def with_target(self, target: Target) -> "World":
+        """The world with one more target, or with the one of the same id replaced."""
+        others = tuple(t for t in self.targets if t.id != target.id)
+        return self.having(targets=(*others, target))
 
-    def keep_sample(self, points: FloatArray) -> str:
-        """Store sampled positions, (n, 2), and name them."""
+    def with_sample(self, points: Sequence[Point]) -> tuple["World", str]:
+        """The world with sampled positions under the next name, and that name."""
         name = f"s{len(self.samples) + 1}"
-        self.samples[name] = points
-        return name
+        return self.having(samples={**self.samples, name: tuple(points)}), name
 
-    def current_plan(self, plan_id: str | None) -> Plan:
-        """The plan with an id, if the scene is still the one it was certified in.
+    def with_plan(self, node: PlanNode) -> "World":
+        """The world with a plan as the current and latest one."""
+        name = node.plan.id
+        others = {n: p for n, p in self.plans.items() if n != name}
+        return self.having(plans={**others, name: node}, current=name)
+
+    def with_arrival(self, plan_id: str, arrival: Arrival) -> "World":
+        """The world after a deployment."""
+        others = {n: a for n, a in self.arrivals.items() if n != plan_id}
+        return self.having(arrivals={**others, plan_id: arrival})
+
+    def plan(self, plan_id: str | None = None) -> PlanNode:
+        """The plan with an id, if what it was certified in is still so.
 
         Args:
-            plan_id: None for the plan proposed last.
+            plan_id: None for the current plan.
 
         Raises:
-            ToolError: no such plan, or the scene has changed since.
+            ToolError: no such plan, or the world has changed since.
         """
-        if plan_id is None and self.plans:
-            plan_id = list(self.plans)[-1]
+        plan_id = plan_id or self.current
         if plan_id is None or plan_id not in self.plans:
             known = ", ".join(self.plans) or "none yet: propose a formation first"
             named = "" if plan_id is None else f" {plan_id!r}"
             raise ToolError(f"There is no plan{named}. Plans: {known}.")
-        plan = self.plans[plan_id]
-        if plan.formation.scene_version != self.scene.version:
+        node = self.plans[plan_id]
+        if node.plan.formation.scene_version != self.version:
             raise ToolError(
                 f"Plan {plan_id} is void: what it is about was measured again since, or the scale "
                 "is another. Deploy one proposed since, or propose this again as it was."
             )
-        return plan
+        return node
 
-    def fleet_for(self, contract: Contract, site: Site) -> Fleet:
-        """The robots that would move.
+    def site(self, contract: Contract) -> Site:
+        """The outlines a contract refers to and the picture's size.
 
         Raises:
-            ToolError: more robots than are simulated.
-            InputError: starting positions that cannot be.
+            ToolError: it names a target that is not there.
         """
-        if contract.robots > MAX_ROBOTS:
-            raise ToolError(
-                f"{contract.robots} robots can be placed and certified, but motion is simulated "
-                f"only up to {MAX_ROBOTS} so far: the plan stands, nothing was moved."
-            )
-        solid, radius = obstacles(contract, site), contract.robot_radius
-        if self.settings.starts is None:
-            starts = spread_starts(contract.robots, site, solid, radius)
-        else:
-            starts = checked_starts(self.settings.starts, contract.robots, site, solid, radius)
-        return SimulatedFleet(starts, seed=self.settings.seed)
+        outlines = {name: self.target(name).outline for name in contract.target_ids}
+        return Site(outlines, *self.picture.size, self.metres_per_pixel)
+
+    def changes_since(self, before: "World | None") -> dict[str, Any]:
+        """What differs from an earlier world, as JSON that `with_changes` reads.
+
+        Of the parts that go by id (targets, plans, ...) only new and other items are written, with
+        the order of all ids; other parts are written whole.
+        """
+        changed: dict[str, Any] = {}
+        for name in type(self).model_fields:
+            now, then = getattr(self, name), getattr(before, name, None)
+            if now is then:
+                continue
+            if name in BY_ID:
+                old, new = _by_id(then), _by_id(now)
+                items = {key: item for key, item in new.items() if old.get(key) is not item}
+                if items or list(old) != list(new):
+                    changed[name] = {"ids": list(new), "items": to_json_values(items)}
+            elif now != then:
+                changed[name] = to_json_values(now)
+        return changed
+
+    def with_changes(self, changes: Mapping[str, Any]) -> "World":
+        """The world after changes that `changes_since` wrote.
+
+        Raises:
+            ValidationError, KeyError, TypeError: it did not write them.
+        """
+        parts: dict[str, Any] = {}
+        for name, value in changes.items():
+            if name in BY_ID:
+                items = _by_id(getattr(self, name)) | dict(value["items"])
+                value = {key: items[key] for key in value["ids"]}
+                if name not in KEYED:
+                    value = tuple(value.values())
+            parts[name] = value
+        read = type(self).model_validate({"picture": self.picture, **parts})
+        return self.model_copy(update={name: getattr(read, name) for name in parts})
 
 
-ADVICE = {
-    "point": "Draw a box close around the thing, or better a rough outline.",
-    "candidate": "Draw a rough outline of 4 to 12 vertices around the thing.",
-    "box": "Draw a rough outline of 4 to 12 vertices around the thing.",
-    "outline": "Draw the outline closer, or name points that do not belong; if what was found "
-    "looks right, the person may allow a lower threshold.",
-}
+KEYED = frozenset({"plans", "arrivals", "samples"})
+BY_ID = KEYED | {"targets", "keep_out"}
+"""Parts of the world whose items have ids."""
+_ANYTHING: TypeAdapter[Any] = TypeAdapter(Any)
 
 
-def _insufficient(confidence: float, threshold: float, how: str) -> str:
-    shown = math.floor(100 * confidence) / 100  # never rounded up to the threshold
-    return (
-        f"Insufficient segmentation accuracy. The mask's confidence is {shown:.2f}, below the "
-        f"threshold {threshold:.2f}. {ADVICE[how]}"
-    )
+def _by_id(part: Any) -> dict[str, Any]:
+    if part is None:
+        return {}
+    return dict(part) if isinstance(part, dict) else {item.id: item for item in part}
 
 
-def _missed(outline: Outline, prompt: TargetPrompt) -> tuple[Point, ...]:
-    """Vertices drawn that what was measured leaves out by more than a rough outline is off."""
-    drawn = np.asarray(prompt.outline or (), dtype=float).reshape(-1, 2)
-    away = distances(outline.filled, drawn) > MISSED * outline.size
-    return tuple((float(x), float(y)) for x, y in drawn[away])
+def to_json_values(value: Any) -> Any:
+    """Values as JSON, what is as usual left out."""
+    return _ANYTHING.dump_python(value, mode="json", exclude_defaults=True)
+
+
+def _canonical(outline: Outline) -> str:
+    """The region as text that does not depend on where its rings start or how they are ordered."""
+    return shapely.to_wkt(shapely.normalize(outline.polygon), rounding_precision=6)

@@ -1,4 +1,4 @@
-"""The tools a model sees: thin doors to perception, geometry, formation and fleet."""
+"""The tools a model sees: thin, one function a name, over perception, geometry and formation."""
 
 from ..tool import Tool
 from .committing import ask_user, deploy, propose_formation, report_impossible

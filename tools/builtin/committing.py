@@ -15,9 +15,9 @@ from ..formation.plan import Plan, make_plan
 from ..formation.units import contract_in_pixels, with_metres
 from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
-from ..scene import Scene, Target
+from ..world import Target, World
 from ..tool import ToolResult, tool
-from ..world import Settings, Workspace
+from ..context import Context, Settings
 from .seeing import doubtful, framed, measured, overlays, sighting, summary
 
 MAX_FINDINGS = 12
@@ -32,7 +32,7 @@ SHOW_PARTIAL = "To show it to the person, pass its plan_id to report_impossible.
 
 @tool("commit")
 def propose_formation(
-    workspace: Workspace,
+    context: Context,
     contract: Contract,
     targets: tuple[TargetPrompt, ...] = (),
     positions: tuple[Point, ...] | None = None,
@@ -51,38 +51,38 @@ def propose_formation(
     """
     if positions is not None and samples is not None:
         raise ToolError("propose_formation: give positions or samples, not both.")
-    asked = workspace.settings.robots
+    asked = context.settings.robots
     if asked is not None and contract.robots != asked:
         raise ToolError(
             f"The person asked for {asked} robots; the contract's groups add up to "
             f"{contract.robots}."
         )
-    stated = contract_in_pixels(contract, workspace.scene.metres_per_pixel)
-    _check_doubts(workspace, stated)
+    stated = contract_in_pixels(contract, context.world.metres_per_pixel)
+    _check_doubts(context, stated)
     for prompt in targets:
-        measured(workspace, prompt)
-    held = _held_to(stated, workspace.settings)
-    places = positions if samples is None else _sampled(workspace, samples)
-    plan = _planned(workspace, held, places)
-    _keep(workspace, plan)
-    unseen = workspace.unseen[plan.id] = _unseen(workspace, held)
-    data = _proposal(workspace, plan)
+        measured(context, prompt)
+    held = _held_to(stated, context.settings)
+    places = positions if samples is None else _sampled(context, samples)
+    plan = _planned(context, held, places)
+    _keep(context, plan)
+    unseen = context.unseen[plan.id] = _unseen(context, held)
+    data = _proposal(context, plan)
     if places is None and not plan.verdict.certified:
-        found = _partial(workspace, held, None)
-        _keep(workspace, plan)
+        found = _partial(context, held, None)
+        _keep(context, plan)
         data |= {"partial": found.strip()} if found else {}
-    if plan.verdict.certified and (advice := _to_see(workspace, plan)):
+    if plan.verdict.certified and (advice := _to_see(context, plan)):
         data |= {"look_first": advice}
-    return ToolResult(data, overlays(workspace, map(workspace.scene.target, unseen), plan))
+    return ToolResult(data, overlays(context, map(context.world.target, unseen), plan))
 
 
-def _check_doubts(workspace: Workspace, contract: Contract) -> None:
+def _check_doubts(context: Context, contract: Contract) -> None:
     """Hold the contract, in px, against the person's words."""
-    settings = workspace.settings
+    settings = context.settings
     free = settings.clearance is settings.robot_radius is None
-    scale = workspace.scene.metres_per_pixel if free else None  # else lengths are fixed already
+    scale = context.world.metres_per_pixel if free else None  # else lengths are fixed already
     counted = settings.robots is not None
-    found = doubts(workspace.instruction, contract, counted=counted, scale=scale)
+    found = doubts(context.words, contract, counted=counted, scale=scale)
     if found and not contract.reading:
         raise ToolError(
             f"A doubt: {'; '.join(found)}. Propose again with a contract that says what is meant; "
@@ -90,25 +90,25 @@ def _check_doubts(workspace: Workspace, contract: Contract) -> None:
         )
 
 
-def _planned(workspace: Workspace, held: Contract, places: Any) -> Plan:
-    scene = workspace.scene
+def _planned(context: Context, held: Contract, places: Any) -> Plan:
+    scene = context.world
     try:
         return make_plan(held, scene.site(held), scene.version, places)
     except ToolError as error:
-        less = _partial(workspace, held, error) if isinstance(error, REFUSALS) else ""
+        less = _partial(context, held, error) if isinstance(error, REFUSALS) else ""
         raise ToolError(f"{scene.told(str(error))}{less}") from None
 
 
-def _unseen(workspace: Workspace, held: Contract) -> tuple[str, ...]:
+def _unseen(context: Context, held: Contract) -> tuple[str, ...]:
     """Targets whose outlines have to be seen before robots move."""
     measured_from = {n for g in held.groups if g.clearance is not None for n in g.targets}
-    named = map(workspace.scene.target, held.target_ids)
+    named = map(context.world.target, held.target_ids)
     return tuple(t.id for t in named if doubtful(t) or t.id in measured_from)
 
 
 @tool("actuate")
 async def deploy(
-    workspace: Workspace, plan_id: str | None = None, tell: str | None = None
+    context: Context, plan_id: str | None = None, tell: str | None = None
 ) -> ToolResult:
     """Move the robots to a certified plan; says where they were observed to arrive.
 
@@ -117,25 +117,25 @@ async def deploy(
         tell: what to tell the person once all have arrived, which ends the run; left out where
             more is to be done.
     """
-    plan = workspace.current_plan(plan_id)
+    plan = context.current_plan(plan_id)
     if not plan.verdict.certified:
         raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
-    if plan.partial is not None and workspace.settings.approved != plan.id:
+    if plan.partial is not None and context.settings.approved != plan.id:
         raise ToolError(
-            f"Plan {plan.id} is partial ({workspace.scene.told(plan.partial.short)}): nothing of a "
+            f"Plan {plan.id} is partial ({context.world.told(plan.partial.short)}): nothing of a "
             "task is done unasked. A person may have exactly this plan driven, with formup deploy."
         )
-    if not workspace.settings.may_deploy:
+    if not context.settings.may_deploy:
         raise ToolError("The person asked for the plan only: nothing may be moved.")
-    if plan_id is None and (advice := _to_see(workspace, plan)):
+    if plan_id is None and (advice := _to_see(context, plan)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
     plan_id = plan.id
-    site = workspace.scene.site(plan.formation.contract)
-    fleet = workspace.fleet_for(plan.formation.contract, site)
+    site = context.world.site(plan.formation.contract)
+    fleet = context.fleet_for(plan.formation.contract, site)
     arrival = await drive(plan, site, fleet)
-    workspace.arrivals[plan_id] = arrival
+    context.arrivals[plan_id] = arrival
     if isinstance(fleet, SimulatedFleet):
-        workspace.frames[plan_id] = fleet.frames
+        context.frames[plan_id] = fleet.frames
     worst = int(np.argmax(arrival.residual_px))
     data = {
         "plan_id": plan_id,
@@ -148,12 +148,12 @@ async def deploy(
     if arrival.assignment_gap is not None:
         most = f"{arrival.assignment_gap:.2%} of the summed squared ways"
         data["assignment"] = f"approximate: another could have saved {most} at most"
-    told = _told(tell, arrival, workspace.scene) if arrival.arrived else None
-    return ToolResult(with_metres(data, workspace.scene.metres_per_pixel), told=told)
+    told = _told(tell, arrival, context.world) if arrival.arrived else None
+    return ToolResult(with_metres(data, context.world.metres_per_pixel), told=told)
 
 
 @tool("ask")
-def ask_user(workspace: Workspace, question: str, candidates: tuple[str, ...] = ()) -> ToolResult:
+def ask_user(context: Context, question: str, candidates: tuple[str, ...] = ()) -> ToolResult:
     """Ask the person when the instruction does not settle what to do; this ends the turn.
 
     Args:
@@ -161,9 +161,9 @@ def ask_user(workspace: Workspace, question: str, candidates: tuple[str, ...] = 
         candidates: ids of numbered things (c3) or targets (t1) to choose from, if there are any.
     """
     listed = [
-        sighting(workspace.candidate(c))
+        sighting(context.candidate(c))
         if c.startswith("c")
-        else summary(workspace.scene.target(c))
+        else summary(context.world.target(c))
         for c in candidates
     ]
     return ToolResult({"question": question, "candidates": listed})
@@ -171,7 +171,7 @@ def ask_user(workspace: Workspace, question: str, candidates: tuple[str, ...] = 
 
 @tool("end")
 def report_impossible(
-    workspace: Workspace, reason: str, robots_needed: int | None = None, plan_id: str | None = None
+    context: Context, reason: str, robots_needed: int | None = None, plan_id: str | None = None
 ) -> ToolResult:
     """Say that the instruction cannot be carried out, and why; this ends the run.
 
@@ -180,32 +180,32 @@ def report_impossible(
         robots_needed: how many robots would do, where that is the trouble.
         plan_id: the best plan that was found, certified or not.
     """
-    if plan_id is not None and plan_id not in workspace.plans:
+    if plan_id is not None and plan_id not in context.plans:
         raise ToolError(f"There is no plan {plan_id!r}.")
     data = {"reason": reason, "robots_needed": robots_needed, "plan_id": plan_id}
     return ToolResult(data, told=reason)
 
 
-def _keep(workspace: Workspace, plan: Plan) -> None:
-    workspace.plans.pop(plan.id, None)  # proposed again, it is the latest again
-    workspace.plans[plan.id] = plan
+def _keep(context: Context, plan: Plan) -> None:
+    context.plans.pop(plan.id, None)  # proposed again, it is the latest again
+    context.plans[plan.id] = plan
 
 
-def _partial(workspace: Workspace, held: Contract, refusal: Refusal | None) -> str:
+def _partial(context: Context, held: Contract, refusal: Refusal | None) -> str:
     """Keep the best partial plan; what there is to say of it, nothing where there is none."""
-    plan = best_partial(held, workspace.scene.site(held), workspace.scene.version, refusal)
+    plan = best_partial(held, context.world.site(held), context.world.version, refusal)
     if plan is None or plan.partial is None:
         return ""
-    _keep(workspace, plan)
+    _keep(context, plan)
     return f" Plan {plan.id} is certified as partial: {plan.partial.sentence} {SHOW_PARTIAL}"
 
 
-def _to_see(workspace: Workspace, plan: Plan) -> str:
+def _to_see(context: Context, plan: Plan) -> str:
     """What has to be looked at before a plan nobody has seen is carried out, if anything."""
-    unseen = workspace.unseen.get(plan.id, plan.formation.contract.target_ids)
-    for target in map(workspace.scene.target, unseen):
-        if plan.id in workspace.unseen or doubtful(target):
-            return workspace.scene.told(
+    unseen = context.unseen.get(plan.id, plan.formation.contract.target_ids)
+    for target in map(context.world.target, unseen):
+        if plan.id in context.unseen or doubtful(target):
+            return context.world.told(
                 f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
                 f"about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with tell). "
                 f"Where it does not and yours (dashed) does, propose again with {target.id} and "
@@ -260,16 +260,16 @@ def _with_clearance(group: Group, clearance: float | None) -> Group:
     return group.model_copy(update={"clearance": (least, greatest)})
 
 
-def _sampled(workspace: Workspace, samples: tuple[str, ...]) -> Any:
-    unknown = [s for s in samples if s not in workspace.samples]
+def _sampled(context: Context, samples: tuple[str, ...]) -> Any:
+    unknown = [s for s in samples if s not in context.samples]
     if unknown:
-        known = ", ".join(workspace.samples) or "none yet"
+        known = ", ".join(context.samples) or "none yet"
         raise ToolError(f"There is no sample {unknown[0]!r}. Samples: {known}.")
-    return np.concatenate([workspace.samples[s] for s in samples] or [np.empty((0, 2))])
+    return np.concatenate([context.samples[s] for s in samples] or [np.empty((0, 2))])
 
 
-def _proposal(workspace: Workspace, plan: Plan) -> dict[str, Any]:
-    verdict, contract, scene = plan.verdict, plan.formation.contract, workspace.scene
+def _proposal(context: Context, plan: Plan) -> dict[str, Any]:
+    verdict, contract, scene = plan.verdict, plan.formation.contract, context.world
     findings = [f.sentence for f in verdict.findings]
     more = len(findings) - MAX_FINDINGS
     return {

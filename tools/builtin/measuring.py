@@ -1,4 +1,4 @@
-"""Doors that measure: describe_shape, check_point, measure."""
+"""Tools that measure: describe_shape, check_point, measure."""
 
 import math
 from typing import Any
@@ -13,7 +13,7 @@ from ..formation.units import with_metres
 from ..geometry.outline import FloatArray, Outline, distances
 from ..perception.target_prompt import Point
 from ..tool import ToolResult, tool
-from ..world import Descriptor, Workspace
+from ..context import Context, Descriptor
 from .seeing import framed
 
 MATRIX_SIDE = 32
@@ -24,7 +24,7 @@ ON_EDGE = 0.5
 
 @tool("read")
 def describe_shape(
-    workspace: Workspace, target: str, descriptor: Descriptor | None = None
+    context: Context, target: str, descriptor: Descriptor | None = None
 ) -> ToolResult:
     """Describe a target's outline: numbered edges, size, axes, corners, holes.
 
@@ -32,7 +32,7 @@ def describe_shape(
         target: target id, such as t1.
         descriptor: edges (default), edges+vertices, or matrix (a binary raster of the box).
     """
-    outline = workspace.scene.target(target).outline
+    outline = context.world.target(target).outline
     unit, length, width = outline.long_axis
     data: dict[str, Any] = {
         "target": target,
@@ -47,28 +47,28 @@ def describe_shape(
         "centre": _rounded(outline.centre),
         "corners": [_rounded(c) for c in outline.corners],
         "holes": len(outline.polygon.interiors),
-        **framed(workspace.scene),
+        **framed(context.world),
     }
-    data = with_metres(data, workspace.scene.metres_per_pixel)
-    return ToolResult(data | _described(outline, descriptor or workspace.settings.descriptor))
+    data = with_metres(data, context.world.metres_per_pixel)
+    return ToolResult(data | _described(outline, descriptor or context.settings.descriptor))
 
 
 @tool("read")
-def check_point(workspace: Workspace, target: str, points: tuple[Point, ...]) -> ToolResult:
+def check_point(context: Context, target: str, points: tuple[Point, ...]) -> ToolResult:
     """Say of each point whether it is inside, outside or on the edge of a target, and how far.
 
     Args:
         target: target id, such as t1.
         points: points (x, y), image pixels, y down.
     """
-    outline = workspace.scene.target(target).outline
+    outline = context.world.target(target).outline
     places = np.asarray(points, dtype=float).reshape(-1, 2)
     vertices, edges = outline.graph()
     sides = [LineString(vertices[list(edge)]) for edge in edges]
     nearest = np.argmin(np.stack([distances(side, places) for side in sides]), axis=0)
     inside = shapely.intersects_xy(outline.polygon, places)
     depth = distances(outline.polygon.boundary, places)
-    scale = workspace.scene.metres_per_pixel
+    scale = context.world.metres_per_pixel
     rows = [
         with_metres(
             {
@@ -81,31 +81,31 @@ def check_point(workspace: Workspace, target: str, points: tuple[Point, ...]) ->
         )
         for p, i, d, e in zip(places, inside, depth, nearest, strict=True)
     ]
-    return ToolResult({"target": target, "points": rows, **framed(workspace.scene)})
+    return ToolResult({"target": target, "points": rows, **framed(context.world)})
 
 
 @tool("read")
-def measure(workspace: Workspace, a: str | Point, b: str | Point) -> ToolResult:
+def measure(context: Context, a: str | Point, b: str | Point) -> ToolResult:
     """Measure from one thing to another: nearest distance, centre distance and direction.
 
     Args:
         a: target id, or a point (x, y) in image pixels.
         b: target id, or a point (x, y) in image pixels.
     """
-    (shape_a, centre_a), (shape_b, centre_b) = _place(workspace, a), _place(workspace, b)
+    (shape_a, centre_a), (shape_b, centre_b) = _place(context, a), _place(context, b)
     way = centre_b - centre_a
     data = {
         "nearest_px": round(float(shape_a.distance(shape_b)), 2),
         "centres_px": round(float(np.hypot(*way)), 2),
         "direction_degrees": round(math.degrees(math.atan2(way[1], way[0])), 1),
-        **framed(workspace.scene, "; directions clockwise from right"),
+        **framed(context.world, "; directions clockwise from right"),
     }
-    return ToolResult(with_metres(data, workspace.scene.metres_per_pixel))
+    return ToolResult(with_metres(data, context.world.metres_per_pixel))
 
 
-def _place(workspace: Workspace, thing: str | Point) -> tuple[BaseGeometry, FloatArray]:
+def _place(context: Context, thing: str | Point) -> tuple[BaseGeometry, FloatArray]:
     if isinstance(thing, str):
-        outline = workspace.scene.target(thing).outline
+        outline = context.world.target(thing).outline
         return outline.polygon, np.asarray(outline.centre)
     return Place(thing), np.asarray(thing, dtype=float)
 

@@ -1,5 +1,6 @@
-"""Doors that compute positions: sample_along_edges, sample_inside, sample_shape."""
+"""Tools that compute positions: sample_along_edges, sample_inside, sample_shape."""
 
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -27,7 +28,7 @@ from ..geometry.rings import equal_chords, hole_rings, nested_rings
 from ..geometry.sampling import min_spacing
 from ..perception.target_prompt import Box, Point
 from ..tool import ToolResult, tool, violations
-from ..world import Workspace
+from ..context import Context
 from .seeing import framed
 
 Count = Annotated[int, Field(ge=1, le=MAX_ROBOTS)]
@@ -36,7 +37,7 @@ Pixels = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 @tool("read")
 def sample_along_edges(
-    workspace: Workspace,
+    context: Context,
     target: str,
     n: Count,
     offset: Pixels | None = None,
@@ -64,13 +65,13 @@ def sample_along_edges(
         holes: inside the target's holes, along their edges.
         unit: of offset and step, px or m; said if Metres per pixel is told.
     """
-    offset, step = (_px(workspace, length, unit) for length in (offset, step))
+    offset, step = (_px(context, length, unit) for length in (offset, step))
     if side is not None and edges is not None:
         raise ToolError("sample_along_edges: give a side or edges, not both.")
     if holes or rings > 1:
         if side is not None or edges is not None or at == "corners" or chords:
             raise ToolError("sample_along_edges: rings and holes go with n, offset and step alone.")
-        return _rings(workspace, target, n, offset, step, None if holes else rings)
+        return _rings(context, target, n, offset, step, None if holes else rings)
     if chords and at == "corners":
         raise ToolError("sample_along_edges: chords are for at: even, not for corners.")
     relation = "corners" if at == "corners" else "around" if side is edges is None else "along"
@@ -79,13 +80,13 @@ def sample_along_edges(
         group["clearance"] = (offset, offset)
     group |= {"side": side, "edges": edges}
     if chords:
-        return _chords(workspace, group)
-    return _sampled(workspace, "sample_along_edges", group)
+        return _chords(context, group)
+    return _sampled(context, "sample_along_edges", group)
 
 
 @tool("read")
 def sample_inside(
-    workspace: Workspace,
+    context: Context,
     target: str,
     n: Count,
     margin: Pixels | None = None,
@@ -99,17 +100,17 @@ def sample_inside(
         margin: least distance from the target's edge, image pixels; left out: the default.
         unit: of the margin, px or m; said if Metres per pixel is told.
     """
-    margin = _px(workspace, margin, unit)
+    margin = _px(context, margin, unit)
     group: dict[str, Any] = {"relation": "inside", "targets": (target,), "robots": n}
     if margin is not None:
-        deepest = workspace.scene.target(target).outline.size
+        deepest = context.world.target(target).outline.size
         group["clearance"] = (margin, max(margin, deepest))
-    return _sampled(workspace, "sample_inside", group)
+    return _sampled(context, "sample_inside", group)
 
 
 @tool("read")
 def sample_shape(
-    workspace: Workspace,
+    context: Context,
     kind: Literal["line", "between", "centre"] | Kind,
     n: Count,
     targets: tuple[str, ...] = (),
@@ -150,17 +151,17 @@ def sample_shape(
         given = ", ".join(form if plain else ends)
         raise ToolError(f"sample_shape: {given} cannot be used with this {kind}.")
     if plain:
-        return _plain_shape(workspace, kind, n, targets, (start, end), layout)
+        return _plain_shape(context, kind, n, targets, (start, end), layout)
     group = {"relation": "shape", "targets": targets, "robots": n, "shape": {"kind": kind} | form}
-    return _sampled(workspace, "sample_shape", group)
+    return _sampled(context, "sample_shape", group)
 
 
-def _px(workspace: Workspace, length: float | None, unit: Unit | None) -> float | None:
-    return length and in_pixels(length, unit, workspace.scene.metres_per_pixel)
+def _px(context: Context, length: float | None, unit: Unit | None) -> float | None:
+    return length and in_pixels(length, unit, context.world.metres_per_pixel)
 
 
 def _plain_shape(
-    workspace: Workspace,
+    context: Context,
     kind: str,
     n: int,
     targets: tuple[str, ...],
@@ -174,16 +175,16 @@ def _plain_shape(
         if targets:
             raise ToolError("sample_shape: a line from start to end takes no targets.")
         drawn = {"relation": "shape", "robots": n, "line": (*start, *end)}
-        return _sampled(workspace, "sample_shape", drawn)
+        return _sampled(context, "sample_shape", drawn)
     wanted = 2 if kind == "between" else 1
     if len(targets) != wanted:
         raise ToolError(f"sample_shape: {kind} takes {wanted} target(s), got {len(targets)}.")
     group = {"relation": kind, "targets": targets, "robots": n, "layout": layout}
-    return _sampled(workspace, "sample_shape", group)
+    return _sampled(context, "sample_shape", group)
 
 
 def _rings(
-    workspace: Workspace,
+    context: Context,
     name: str,
     n: int,
     offset: float | None,
@@ -191,8 +192,8 @@ def _rings(
     rings: int | None,
 ) -> ToolResult:
     """Robots on several rings, or in the holes where `rings` is None, innermost first."""
-    outline, picture = workspace.scene.target(name).outline, workspace.scene.picture
-    radius = workspace.settings.robot_radius or 0.0
+    outline, picture = context.world.target(name).outline, context.picture
+    radius = context.settings.robot_radius or 0.0
     room = (float(picture.width), float(picture.height))
     away = radius + (default_clearance(outline, room, radius) if offset is None else offset)
     if away <= 0:
@@ -207,40 +208,43 @@ def _rings(
     if len(points) < n or min_spacing(points) < floor:
         where = f"in the holes of {name}" if rings is None else f"on {rings} rings around {name}"
         raise ToolError(f"{n} positions do not fit {where}, {away:.1f} px from its edge.")
-    reply = _reply(workspace, points)
-    return ToolResult(reply.data | {"robots_per_ring": [len(ring) for ring in placed]})
+    reply = _reply(context, points)
+    data = reply.data | {"robots_per_ring": [len(ring) for ring in placed]}
+    return replace(reply, data=data)
 
 
-def _chords(workspace: Workspace, group: dict[str, Any]) -> ToolResult:
-    contract, site = _contract(workspace, "sample_along_edges", group)
+def _chords(context: Context, group: dict[str, Any]) -> ToolResult:
+    contract, site = _contract(context, "sample_along_edges", group)
     curve = reference_curve(contract.groups[0], site, contract.robot_radius)
     points = equal_chords(curve, contract.robots)
     if len(points) < contract.robots or min_spacing(points) < contract.spacing_floor:
         long = f"{curve.length:.0f} px inside the picture"
         raise ToolError(f"{contract.robots} positions do not fit on {long}.")
-    return _reply(workspace, points)
+    return _reply(context, points)
 
 
-def _contract(workspace: Workspace, tool_name: str, group: dict[str, Any]) -> tuple[Contract, Site]:
+def _contract(context: Context, tool_name: str, group: dict[str, Any]) -> tuple[Contract, Site]:
     try:
         checked = Group.model_validate(group)
     except ValidationError as error:
         raise ToolError(f"{tool_name}: {violations(error)}") from None
-    radius = workspace.settings.robot_radius or 0.0
+    radius = context.settings.robot_radius or 0.0
     contract = Contract(groups=(checked,), robot_radius=radius)
-    site = workspace.scene.site(contract)
+    site = context.world.site(contract)
     return with_defaults(contract, site.outlines, site.room), site
 
 
-def _sampled(workspace: Workspace, tool_name: str, group: dict[str, Any]) -> ToolResult:
-    return _reply(workspace, place(*_contract(workspace, tool_name, group)))
+def _sampled(context: Context, tool_name: str, group: dict[str, Any]) -> ToolResult:
+    return _reply(context, place(*_contract(context, tool_name, group)))
 
 
-def _reply(workspace: Workspace, points: FloatArray) -> ToolResult:
+def _reply(context: Context, points: FloatArray) -> ToolResult:
     rounded = np.round(points, 2)
+    places: list[Point] = [(float(x), float(y)) for x, y in rounded]
+    world, name = context.world.with_sample(places)
     data: dict[str, Any] = {
-        "sample": workspace.keep_sample(rounded),
+        "sample": name,
         "positions": rounded.tolist(),
-        **framed(workspace.scene),
+        **framed(context.world),
     }
-    return ToolResult(data)
+    return ToolResult(data, world=world)

@@ -1,4 +1,4 @@
-"""Doors that look at the picture: look, locate_object, segment."""
+"""Tools that look at the picture: look, locate_object, segment."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -13,9 +13,9 @@ from ..perception.detectors.candidates import clear_ones
 from ..perception.referring.attributes import Candidate
 from ..perception.referring.relations import Query, select
 from ..perception.target_prompt import Box, Point, TargetPrompt, box_problems
-from ..scene import Scene, Target
+from ..world import Target, World
 from ..tool import ToolResult, tool, violations
-from ..world import Workspace
+from ..context import Context
 
 FRAME = "image pixels, x right, y down"
 MOST_SHOWN = 40
@@ -28,9 +28,9 @@ LEAST_SHARE = 0.1
 """Colours that fewer of a thing's pixels have are left out of replies."""
 
 
-def framed(scene: Scene, more: str = "") -> dict[str, Any]:
+def framed(world: World, more: str = "") -> dict[str, Any]:
     """What a reply says of its coordinates and lengths: the frame, and the scale if it is known."""
-    scale = scene.metres_per_pixel
+    scale = world.metres_per_pixel
     return {"frame": FRAME + more} | ({} if scale is None else {"metres_per_pixel": scale})
 
 
@@ -73,7 +73,7 @@ def sighting(candidate: Candidate, reasons: tuple[str, ...] = ()) -> dict[str, A
 
 @tool("read")
 def look(
-    workspace: Workspace,
+    context: Context,
     region: Box | None = None,
     plan_id: str | None = None,
     candidates: bool = False,
@@ -85,34 +85,34 @@ def look(
         plan_id: a plan whose robots to draw in.
         candidates: whether to number what stands out; the thing numbered 3 is then c3.
     """
-    scene = workspace.scene
-    plan = None if plan_id is None else workspace.current_plan(plan_id)
-    shown = workspace.candidates()[:MOST_SHOWN] if candidates else ()
+    picture, world = context.picture, context.world
+    plan = None if plan_id is None else world.plan(plan_id).plan
+    shown = context.candidates()[:MOST_SHOWN] if candidates else ()
     if region is not None:
-        problems = box_problems(region, *scene.picture.size)
+        problems = box_problems(region, *picture.size)
         if problems:
             raise ToolError(" ".join(problems))
-    image = draw_view(scene, plan=plan, candidates=shown, region=region)
+    image = draw_view(picture, world, plan=plan, candidates=shown, region=region)
     data: dict[str, Any] = {
-        "width": scene.picture.width,
-        "height": scene.picture.height,
-        **_part_shown(scene, region),
-        **framed(scene),
-        "targets": [summary(t) for t in scene.targets],
+        "width": picture.width,
+        "height": picture.height,
+        **_part_shown(picture, region),
+        **framed(world),
+        "targets": [summary(t) for t in world.targets],
         "candidates": [sighting(c) for c in shown],
-        "notes": list(scene.picture.notes),
+        "notes": list(picture.notes),
     }
     return ToolResult(data, (image,))
 
 
-def _part_shown(scene: Scene, region: Box | None) -> dict[str, Any]:
+def _part_shown(picture: Picture, region: Box | None) -> dict[str, Any]:
     if region is None:
-        return {"shown_at_scale": round(view_scale(scene.picture), 3)}
+        return {"shown_at_scale": round(view_scale(picture), 3)}
     return {"region": [round(v) for v in region], "note": "enlarged: read the rulers"}
 
 
 @tool("read")
-def locate_object(workspace: Workspace, query: Query | None = None) -> ToolResult:
+def locate_object(context: Context, query: Query | None = None) -> ToolResult:
     """Find things in the picture by how they look and where they are; code does the comparing.
 
     Without a query it measures what the person pointed at, or else lists all that stands out.
@@ -123,29 +123,28 @@ def locate_object(workspace: Workspace, query: Query | None = None) -> ToolResul
     Args:
         query: colours, shade, shapes, traits, superlatives and relations that tell it apart.
     """
-    if query is None and workspace.pointed:
-        found = {t.id for t in workspace.scene.targets}
-        for prompt in workspace.pointed:
-            if prompt.id not in found:
-                workspace.segment(prompt)
-        targets = [summary(t) for t in workspace.scene.targets]
-        return ToolResult({"targets": targets, **framed(workspace.scene)})
-    clear = clear_ones(workspace.candidates())
+    if query is None and context.world.pointed:
+        found = {t.id for t in context.world.targets}
+        new = [prompt for prompt in context.world.pointed if prompt.id not in found]
+        world = measured_all(context, new)
+        targets = [summary(t) for t in world.targets]
+        return ToolResult({"targets": targets, **framed(world)}, world=world)
+    clear = clear_ones(context.candidates())
     if query is None:
         shown = [sighting(c) for c in clear[:MOST_SHOWN]]
-        data = {"candidates": shown, **framed(workspace.scene)}
+        data = {"candidates": shown, **framed(context.world)}
         return ToolResult(data | {"things": len(clear)})
-    selection = select(clear, query, *workspace.scene.picture.size)
+    selection = select(clear, query, *context.picture.size)
     matches = selection.matches[:MOST_SHOWN]
     return ToolResult(
         {
-            "candidates": [sighting(workspace.candidate(m.id), m.reasons) for m in matches],
+            "candidates": [sighting(context.candidate(m.id), m.reasons) for m in matches],
             "settled": selection.settled,
             "doubt": selection.doubt,
             "lacking": selection.lacking,
-            "absent": bool(selection.lacking) and not _hinted(query, workspace.candidates()),
+            "absent": bool(selection.lacking) and not _hinted(query, context.candidates()),
             "things": len(clear),
-            **framed(workspace.scene),
+            **framed(context.world),
         }
     )
 
@@ -161,7 +160,7 @@ def _hinted(query: Query, candidates: tuple[Candidate, ...]) -> bool:
 
 @tool("read")
 def segment(
-    workspace: Workspace,
+    context: Context,
     id: str = "t1",
     label: str = "",
     candidate: str | None = None,
@@ -197,32 +196,18 @@ def segment(
             "straight": straight,
         }
     )
-    target = measured(workspace, prompt)
-    data = {**summary(target), "parts": dict(target.parts), **framed(workspace.scene)}
-    return ToolResult(data, overlays(workspace, (target,) if doubtful(target) else ()))
-
-
-def measured(workspace: Workspace, prompt: TargetPrompt) -> Target:
-    """The target that a prompt points at.
-
-    Raises:
-        ToolError: as `Workspace.segment` does, with the doubtful mask as a picture.
-    """
-    before = workspace.doubted
-    try:
-        return workspace.segment(prompt)
-    except ToolError as error:
-        doubted = workspace.doubted
-        if doubted is None or doubted is before:
-            raise
-        raise error.showing(_closer(workspace.scene, doubted)) from None
+    world = measured_all(context, (prompt,))
+    target = world.target(prompt.id)
+    data = {**summary(target), "parts": dict(target.parts), **framed(world)}
+    shown = overlays(context.at(world), (target,) if doubtful(target) else ())
+    return ToolResult(data, shown, world=world)
 
 
 def overlays(
-    workspace: Workspace, targets: Iterable[Target], plan: Plan | None = None
+    context: Context, targets: Iterable[Target], plan: Plan | None = None
 ) -> tuple[bytes, ...]:
     """Pictures of targets whose masks a model should look at before it trusts them."""
-    return tuple(_closer(workspace.scene, target, plan) for target in targets)
+    return tuple(closer_view(context, target, plan) for target in targets)
 
 
 def doubtful(target: Target) -> bool:
@@ -230,13 +215,14 @@ def doubtful(target: Target) -> bool:
     return target.confidence < CLEAR or bool(target.missed)
 
 
-def _closer(scene: Scene, target: Target, plan: Plan | None = None) -> bytes:
+def closer_view(context: Context, target: Target, plan: Plan | None = None) -> bytes:
+    """The target's outline on a part of the picture, as a JPEG file."""
     x0, y0, x1, y1 = target.box
     out = AROUND * max(x1 - x0, y1 - y0) + 2
-    shown = replace(scene, targets=(target,)) if plan is None else scene
+    shown = context.world if plan else context.world.having(targets=(target,))
     region = (x0 - out, y0 - out, x1 + out, y1 + out)
     drawn = () if target.source is None else target.source.outline or ()
-    return draw_view(shown, plan=plan, region=region, drawn=drawn)
+    return draw_view(context.picture, shown, plan=plan, region=region, drawn=drawn)
 
 
 def parse_prompt(values: dict[str, Any]) -> TargetPrompt:

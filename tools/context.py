@@ -1,0 +1,168 @@
+"""Context: what one tool call works with: the world, the person's settings, and the services.
+
+Services hold what is not state: pixels, the networks and rules that find and measure things, the
+fleet, and caches by content hash. Whatever a tool finds out or decides goes into the next world.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from .errors import ToolError
+from .fleet.protocol import Fleet
+from .fleet.registry import FLEETS
+from .formation.units import check_scale
+from .formation.value import Value
+from .perception.detectors.registry import detector_named
+from .perception.image import Picture
+from .perception.referring.attributes import Candidate
+from .perception.segmenters.registry import segmenter_named
+from .perception.target_prompt import Point
+from .world import World
+
+Descriptor = Literal["edges", "edges+vertices", "matrix"]
+SAME_PLACE = 1.0
+"""How far the box of a candidate may be from where it was shown, px."""
+
+
+class Settings(Value):
+    """What the person fixed; code holds the model to it.
+
+    Attributes:
+        robots: how many, or None where the person left it open.
+        robot_radius: px, 0 is a point; None leaves it to the contract.
+        clearance: exact distance wanted from the target, px, or None for the default.
+        detector: name of the detector.
+        segmenter: name of the segmenter.
+        threshold: t, the least confidence a mask is used at; None for the segmenter's own.
+        descriptor: how describe_shape puts shapes into text.
+        fleet: name of the fleet.
+        starts: starting positions (x, y) of simulated robots, px, or None to spread them.
+        seed: of everything random in the simulator.
+        may_deploy: whether robots may be moved at all.
+        approved: id of the one plan that a person has approved.
+        numbered: whether what stands out is numbered in the picture a model gets.
+        metres_per_pixel: of a picture taken straight from above; None where it is not known.
+    """
+
+    robots: int | None = None
+    robot_radius: float | None = None
+    clearance: float | None = None
+    detector: str = "standout"
+    segmenter: str = "grabcut"
+    threshold: float | None = None
+    descriptor: Descriptor = "edges"
+    fleet: str = "simulated"
+    starts: tuple[Point, ...] | None = None
+    seed: int = 0
+    may_deploy: bool = True
+    approved: str | None = None
+    numbered: bool = False
+    metres_per_pixel: float | None = None
+
+
+@dataclass
+class Services:
+    """What tools use beside the world; nothing in here decides what happens.
+
+    Attributes:
+        pictures: those of the conversation, by their hash.
+        fleets: the robots in use, by the name of their fleet.
+    """
+
+    pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
+    fleets: dict[str, Fleet] = field(default_factory=dict[str, Fleet])
+    found: dict[tuple[str, str], tuple[Candidate, ...]] = field(
+        default_factory=dict[tuple[str, str], tuple[Candidate, ...]]
+    )
+
+    @classmethod
+    def of(cls, picture: Picture) -> "Services":
+        """Services for a conversation about one picture."""
+        return cls({picture.sha256: picture})
+
+
+def _ignore(world: World) -> None:
+    """Nobody keeps what a tool observes."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a tool call works with.
+
+    Attributes:
+        words: what the person said last; the contract is held against it.
+        observed: puts a world in place at once, because what it says was observed and holds even
+            if the call fails or is cut off: measured things, poses of robots.
+    """
+
+    world: World
+    services: Services
+    settings: Settings = Settings()
+    words: str = ""
+    observed: Callable[[World], None] = _ignore
+
+    @classmethod
+    def of(
+        cls, picture: Picture, settings: Settings | None = None, world: World | None = None
+    ) -> "Context":
+        """The context of a conversation about one picture.
+
+        Raises:
+            InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
+        """
+        fixed = settings or Settings()
+        made = cls(world or World.of(picture), Services.of(picture), fixed)
+        return made.check()
+
+    def check(self) -> "Context":
+        """The context, with the person's settings checked and their scale in the world.
+
+        Raises:
+            InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
+        """
+        segmenter_named(self.settings.segmenter)
+        detector_named(self.settings.detector)
+        FLEETS.load(self.settings.fleet)
+        scale = self.settings.metres_per_pixel
+        if scale is None or scale == self.world.metres_per_pixel:
+            return self
+        check_scale(scale)
+        return replace(self, world=self.world.having(metres_per_pixel=scale))
+
+    def at(self, world: World) -> "Context":
+        """The same with another world."""
+        return replace(self, world=world)
+
+    @property
+    def picture(self) -> Picture:
+        """The picture with its pixels."""
+        return self.services.pictures[self.world.picture.sha256]
+
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The things the detector finds in the picture; it is searched once."""
+        key = self.settings.detector, self.world.picture.sha256
+        if key not in self.services.found:
+            self.services.found[key] = detector_named(key[0]).detect(self.picture, None)
+        return self.services.found[key]
+
+    def candidate(self, name: str) -> Candidate:
+        """The candidate with an id; one that was shown is the one at the place it was shown.
+
+        Raises:
+            ToolError: there is none; the text says which there are.
+        """
+        found = self.candidates()
+        shown = next((s for s in self.world.shown if s.id == name), None)
+        for candidate in found:
+            if shown is None and candidate.id == name:
+                return candidate
+            if shown is not None and _apart(candidate.outline.bounds, shown.box) <= SAME_PLACE:
+                return candidate
+        known = f"c1 to c{len(found)}" if found else "none: nothing stands out in this picture"
+        raise ToolError(f"There is no candidate {name!r}. Candidates: {known}.")
+
+
+def _apart(box: tuple[float, ...], other: tuple[float, ...]) -> float:
+    """The furthest that two boxes' sides are from each other, px."""
+    return max(abs(a - b) for a, b in zip(box, other, strict=True))
