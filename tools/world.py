@@ -24,7 +24,8 @@ from .perception.contours import outline_of_mask
 from .perception.detectors.candidates import find_candidates, segment_candidate
 from .perception.referring.attributes import Candidate
 from .perception.segmenters.drawn_outline import straightened, within
-from .perception.segmenters.registry import segmenter_named, visible_vertices
+from .perception.segmenters.grabcut_segmenter import visible_vertices
+from .perception.segmenters.registry import segmenter_named
 from .perception.target_prompt import MAX_POINTS, Point, TargetPrompt
 from .scene import Scene, Target
 
@@ -208,14 +209,14 @@ class Workspace:
         """Outline, confidence and its parts."""
         segmenter, pixels = segmenter_named(self.settings.segmenter), self.scene.picture.pixels
         if prompt.candidate is None:
-            found = segmenter.run(pixels, prompt)
+            found = segmenter.segment(pixels, prompt)
             outline = outline_of_mask(found.mask)
             if prompt.straight and prompt.outline is not None:
                 seen = visible_vertices(prompt.outline, *self.scene.picture.size)
                 outline = within(straightened(outline, seen), *self.scene.picture.size)
             return outline, found.confidence, found.parts
         candidate = self.candidate(prompt.candidate)
-        return segment_candidate(lambda p: segmenter.run(pixels, p), candidate)
+        return segment_candidate(lambda p: segmenter.segment(pixels, p), candidate)
 
     def keep_sample(self, points: FloatArray) -> str:
         """Store sampled positions, (n, 2), and name them."""
