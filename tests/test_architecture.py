@@ -19,7 +19,7 @@ MAY_IMPORT = {
 }
 WITHIN_TOOLS = {
     "geometry": {"geometry", "errors"},
-    "perception": {"perception", "geometry", "errors"},
+    "perception": {"perception", "geometry", "registry", "errors"},
     "formation": {"formation", "geometry", "errors"},
     "motion": {"motion", "formation", "geometry", "errors"},
     "fleet": {"fleet", "motion", "formation", "geometry", "errors"},

@@ -13,39 +13,14 @@ from ..perception.detectors.candidates import clear_ones
 from ..perception.referring.attributes import Candidate
 from ..perception.referring.relations import Query, select
 from ..perception.target_prompt import Box, Point, TargetPrompt, box_problems
-from ..world import Target, World
 from ..tool import ToolResult, tool, violations
 from ..context import Context
+from .targets import doubtful, framed, measured_all, overlays, summary
 
-FRAME = "image pixels, x right, y down"
 MOST_SHOWN = 40
 """Candidates that a reply or a picture holds."""
-CLEAR = 0.7
-"""Below this confidence a mask is shown to the model: it may have to correct it."""
-AROUND = 0.3
-"""What is shown of the surroundings of such a thing, as a share of its longer side."""
 LEAST_SHARE = 0.1
 """Colours that fewer of a thing's pixels have are left out of replies."""
-
-
-def framed(world: World, more: str = "") -> dict[str, Any]:
-    """What a reply says of its coordinates and lengths: the frame, and the scale if it is known."""
-    scale = world.metres_per_pixel
-    return {"frame": FRAME + more} | ({} if scale is None else {"metres_per_pixel": scale})
-
-
-def summary(target: Target) -> dict[str, Any]:
-    """What a reply says of a target."""
-    data = {
-        "id": target.id,
-        "label": target.label,
-        "box": [round(v, 1) for v in target.box],
-        "confidence": target.confidence,
-        "area_px": round(target.outline.area),
-        "kind": target.outline.kind,
-        "corners": len(target.outline.corners),
-    }
-    return data | ({"leaves_out_your_vertices": target.missed} if target.missed else {})
 
 
 def sighting(candidate: Candidate, reasons: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -201,28 +176,6 @@ def segment(
     data = {**summary(target), "parts": dict(target.parts), **framed(world)}
     shown = overlays(context.at(world), (target,) if doubtful(target) else ())
     return ToolResult(data, shown, world=world)
-
-
-def overlays(
-    context: Context, targets: Iterable[Target], plan: Plan | None = None
-) -> tuple[bytes, ...]:
-    """Pictures of targets whose masks a model should look at before it trusts them."""
-    return tuple(closer_view(context, target, plan) for target in targets)
-
-
-def doubtful(target: Target) -> bool:
-    """Whether a mask has to be looked at before robots are sent there."""
-    return target.confidence < CLEAR or bool(target.missed)
-
-
-def closer_view(context: Context, target: Target, plan: Plan | None = None) -> bytes:
-    """The target's outline on a part of the picture, as a JPEG file."""
-    x0, y0, x1, y1 = target.box
-    out = AROUND * max(x1 - x0, y1 - y0) + 2
-    shown = context.world if plan else context.world.having(targets=(target,))
-    region = (x0 - out, y0 - out, x1 + out, y1 + out)
-    drawn = () if target.source is None else target.source.outline or ()
-    return draw_view(context.picture, shown, plan=plan, region=region, drawn=drawn)
 
 
 def parse_prompt(values: dict[str, Any]) -> TargetPrompt:

@@ -17,17 +17,15 @@ from shapely.geometry.base import BaseGeometry
 from ...errors import InputError
 from ...geometry.outline import Outline, outline_of
 from ..contours import outline_of_mask
-from ..referring.attributes import Attributes, Candidate
-from ..referring.colours import colour_shares, lab_of
-from ..referring.shape_classes import shape_fits
+from ..image import Picture
+from ..referring.attributes import Candidate
+from ..referring.measuring import SIDE, measure_attributes
 from ..segmenters.grabcut import Bytes, Floats, Mask, Window, open_window, pieces, resampled
-from ..segmenters.segment import Segmentation
+from ..segmenters.protocol import Segmentation
 from ..target_prompt import TargetPrompt
 from .objectness import Region, judged
 from .proposals import CELLS, IN_CELL, proposals
 
-# The picture's longer side while looking for things, px.
-SIDE = 384
 # The score of a thing as clear as can be, and the least that is shown to a person.
 SURE, LEAST = 1.5, 0.4
 # Words are decided among things at least this salient, or this share of the most salient one.
@@ -49,8 +47,6 @@ WITHIN, PART = 0.85, 1.3
 # so much of the whole, and none of them looks much worse than it.
 OWN_GROUND, COVERED, AS_GOOD = 0.6, 0.6, 0.7
 GROUND = 4.0
-# What of an outline is stairs of pixels, in pixels at the working scale.
-SMOOTHING = 0.7
 # A colour is everywhere where it fills so much of a cell in this share of the cells; it is met
 # again within a side's length of a region at this share of its outline.
 EVERYWHERE, ALIKE, AGAIN = 0.4, 9.0, 0.6
@@ -63,6 +59,16 @@ MOST_VERTICES = 31
 FINER = 3
 # Holes count from this share of the thing, when they show the ground: its colours or nearly.
 HOLE, SHOWS_GROUND, SHOWN = 0.1, 16.0, 0.4
+
+
+class StandoutDetector:
+    """What stands out from its surroundings; knows no words."""
+
+    name = "standout"
+
+    def detect(self, picture: Picture, phrase: str | None) -> tuple[Candidate, ...]:
+        """See `Detector.detect`."""
+        return find_candidates(picture.pixels)
 
 
 def find_candidates(pixels: Bytes) -> tuple[Candidate, ...]:
@@ -78,7 +84,15 @@ def find_candidates(pixels: Bytes) -> tuple[Candidate, ...]:
         if outline is not None:
             name = f"c{len(found) + 1}"
             salience = min(thing.score / SURE, 1.0)
-            found.append(Candidate(name, outline, _attributes(thing, outline, small), salience))
+            mask, (x, y) = thing.solid, thing.region.proposal.origin
+            attributes = measure_attributes(
+                outline,
+                small[y : y + mask.shape[0], x : x + mask.shape[1]],
+                mask,
+                area=thing.region.area,
+                touches_border=thing.region.borders > 0,
+            )
+            found.append(Candidate(name, outline, attributes, salience))
     return tuple(found)
 
 
@@ -89,15 +103,17 @@ def clear_ones(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
 
 
 def segment_candidate(
-    segment: Callable[[TargetPrompt], Segmentation], candidate: Candidate
+    segment: Callable[[TargetPrompt], Segmentation], candidate: Candidate, *, by_box: bool = False
 ) -> tuple[Outline, float, dict[str, float]]:
     """The candidate's outline measured again up close, with its confidence and the parts of it.
 
-    The segmenter is pointed at the candidate's outline. Where it finds something else, the
-    candidate stays as it was found; its confidence is half how far the two agree, half how
-    clearly it stands out.
+    The segmenter is pointed at the candidate's outline, or only its box. Where it finds something
+    else, the candidate stays as it was found; its confidence is half how far the two agree, half
+    how clearly it stands out.
     """
-    found = segment(TargetPrompt(outline=_few_vertices(candidate.outline.filled)))
+    outline = candidate.outline
+    rough = {"box": outline.bounds} if by_box else {"outline": _few_vertices(outline.filled)}
+    found = segment(TargetPrompt.model_validate(rough))
     try:
         outline = outline_of_mask(found.mask)
     except InputError:
@@ -306,27 +322,3 @@ def _holes(region: Region, features: Bytes) -> tuple[Mask, ...]:
         if evidence > 0 and not any((hole & other).any() for other in kept):
             kept.append(hole)
     return tuple(kept)
-
-
-def _attributes(thing: Thing, outline: Outline, small: Bytes) -> Attributes:
-    """Measures of a thing on the picture at the working scale (h, w, 3)."""
-    mask, region = thing.solid, thing.region
-    x, y = region.proposal.origin
-    core = np.asarray(cv2.erode(mask.astype(np.uint8), np.ones((3, 3)), borderValue=(0,))) > 0
-    pixels = small[y : y + mask.shape[0], x : x + mask.shape[1]][core if core.any() else mask]
-    axis, long, short = outline.long_axis
-    filled, polygon = outline.filled, outline.polygon
-    smooth = filled.simplify(SMOOTHING * float(np.sqrt(polygon.area / region.area)))
-    low, a, b = (float(v) for v in lab_of(pixels).mean(axis=0))
-    return Attributes(
-        colours=colour_shares(pixels),
-        lab=(low, a, b),
-        area=outline.area,
-        centre=(polygon.centroid.x, polygon.centroid.y),
-        orientation=float(np.degrees(np.arctan2(axis[1], axis[0])) % 180),
-        elongation=long / max(short, 1e-9),
-        roundness=min(4 * np.pi * smooth.area / smooth.length**2, 1.0),
-        shapes=shape_fits(polygon),
-        hole=1 - polygon.area / filled.area,
-        touches_border=region.borders > 0,
-    )

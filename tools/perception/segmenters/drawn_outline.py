@@ -20,7 +20,8 @@ from ...geometry.outline import (
 )
 from . import grabcut as gc
 from .grabcut import Bytes, Mask, Point
-from .segment import Segmentation, segment_outline
+from .protocol import Segmentation
+from .segment import segment_outline
 
 BESIDE = 0.2
 """How far around a point the drawn outline is taken, as a share of the thing's size."""

@@ -6,17 +6,17 @@ real photographs, so formup runs with no download and no GPU.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from ..detectors.whole_object import on_plain_ground, propose_wholes, solidity
 from . import grabcut as gc
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
 from .mask_openings import cut_openings
+from .protocol import Segmentation
 from .region_growing import Region, box_iou, edge_support, pin, propose
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
@@ -53,24 +53,6 @@ ECHOES = 4
 DEPTH = 0.35
 
 Proposer = Callable[[Bytes, Sequence[Point], int], list[Region]]
-
-
-@dataclass(frozen=True)
-class Segmentation:
-    """A mask of the thing pointed at, and how far it can be trusted.
-
-    Attributes:
-        mask: (H, W) of the whole picture.
-        confidence: in [0, 1], self-consistency and never accuracy: whether slightly different
-            pointing, a second algorithm, the colours and the prompt's extent agree on the mask.
-        parts: the cues in [0, 1] that `confidence` is the geometric mean of.
-        box: x0, y0, x1, y1 in pixels, as given or found.
-    """
-
-    mask: npt.NDArray[np.bool_]
-    confidence: float
-    parts: Mapping[str, float]
-    box: Box
 
 
 @dataclass(frozen=True)
