@@ -22,7 +22,7 @@ WITHIN_TOOLS = {
     "perception": {"perception", "geometry", "registry", "errors"},
     "formation": {"formation", "geometry", "errors"},
     "motion": {"motion", "formation", "geometry", "errors"},
-    "fleet": {"fleet", "motion", "formation", "geometry", "errors"},
+    "fleet": {"fleet", "motion", "formation", "geometry", "errors", "registry"},
 }
 GEOMETRY_LIBRARIES = {"numpy", "scipy", "shapely"}
 HEAVY = {

@@ -1,0 +1,198 @@
+"""What a fleet is: robots with ids that can be observed, driven and stopped.
+
+A package adds one by an entry point of the group `formup.fleets` that names a `FleetFactory`;
+`conformance` holds the checks that every fleet has to pass. Frame: image pixels, x right, y down.
+"""
+
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from ..errors import FleetError
+from ..geometry.outline import FloatArray
+
+
+class FleetStoppedError(FleetError):
+    """The stop is in force: nothing is driven until a person releases it."""
+
+
+class FleetBusyError(FleetError):
+    """Another deployment, or another drive, is using the fleet."""
+
+
+class FleetClosedError(FleetError):
+    """The fleet was closed before."""
+
+
+class FleetSizeError(FleetError):
+    """The fleet has fewer robots than are needed, or can drive fewer.
+
+    Attributes:
+        available: how many there are, or can be driven.
+        needed: how many were asked for.
+    """
+
+    def __init__(self, sentence: str, *, available: int, needed: int) -> None:
+        super().__init__(sentence)
+        self.available, self.needed = available, needed
+
+
+class RobotsFailedError(FleetError):
+    """Some robots are not there, or cannot do what they are sent to do.
+
+    Attributes:
+        ids: of these robots.
+    """
+
+    def __init__(self, sentence: str, ids: Sequence[str]) -> None:
+        super().__init__(sentence)
+        self.ids = tuple(ids)
+
+
+class StalePosesError(RobotsFailedError):
+    """Robots were not seen recently enough."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a robot was seen.
+
+    Attributes:
+        id: the fleet's name for the robot; never changes.
+        x, y: image pixels.
+        heading: radians, clockwise from the x axis as seen in the picture; None if not known.
+        seen: when, seconds on the fleet's clock, which never goes back.
+    """
+
+    id: str
+    x: float
+    y: float
+    heading: float | None = None
+    seen: float = 0.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What robots are to drive, all in step: each has covered the same share of its path.
+
+    Attributes:
+        paths: polyline, (k, 2) px with k >= 2, by robot id; it begins where the robot stands.
+            Robots that are not in it stay where they are.
+    """
+
+    paths: Mapping[str, FloatArray]
+
+
+class Fleet(Protocol):
+    """Robots that can be observed, driven and stopped; any failure is a `FleetError`."""
+
+    @property
+    def name(self) -> str:
+        """What the fleet is called in messages and on the command line."""
+        ...
+
+    @property
+    def real(self) -> bool:
+        """Whether a person must approve each plan before anything moves."""
+        ...
+
+    @property
+    def radius(self) -> float | None:
+        """Of a robot, px; None where the fleet does not say."""
+        ...
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the stop is in force."""
+        ...
+
+    async def observe(self, *, max_age: float | None = None) -> tuple[Pose, ...]:
+        """Where all robots were last seen, in an order that does not change.
+
+        Raises:
+            StalePosesError: a pose is older than max_age seconds (see `check_ages`).
+        """
+        ...
+
+    def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Drive, and yield the poses of all robots as they go, as they are really seen.
+
+        Ends when all robots stand: because they have come to the ends of their paths, or because
+        of `stop`. Closing the generator, or cancelling the task that awaits it, stops the robots
+        where they are, without latching.
+
+        Raises:
+            FleetStoppedError: the stop was in force when it began.
+            FleetBusyError: another drive has not ended.
+            RobotsFailedError: robots that do not exist, or that cannot go on.
+        """
+        ...
+
+    async def stop(self) -> None:
+        """Hold all robots where they are within one control period, until `release`."""
+        ...
+
+    async def release(self) -> None:
+        """Lift the stop; only ever at a person's command."""
+        ...
+
+    async def close(self) -> None:
+        """Hold all robots and let go of them; more often than once is no harm."""
+        ...
+
+
+@dataclass(frozen=True)
+class FleetRequest:
+    """What is known when a fleet is opened; a fleet uses what applies to it.
+
+    Attributes:
+        size: width and height of the picture, px.
+        robots: the least number wanted.
+        known: poses as last observed; a simulator starts there.
+        driven: whether the known robots have ever been driven; if not, a simulator may set down
+            anew those that stand on something solid.
+        starts: (n, 2) where a person wants robots to start, px; None to leave it to the fleet.
+        solid: what robots may not be set down on.
+        radius: of a robot, px; 0 where nobody said.
+        seed: of everything random.
+        config: a file that describes the fleet, where one was given.
+    """
+
+    size: tuple[float, float]
+    robots: int
+    known: tuple[Pose, ...] = ()
+    driven: bool = False
+    starts: FloatArray | None = None
+    solid: BaseGeometry = field(default_factory=Polygon)
+    radius: float = 0.0
+    seed: int = 0
+    config: Path | None = None
+
+
+FleetFactory = Callable[[FleetRequest], Fleet]
+
+
+def check_ages(poses: Sequence[Pose], now: float, max_age: float | None) -> None:
+    """Refuse poses that were seen too long ago; for use in `observe`.
+
+    Args:
+        poses: as last seen.
+        now: on the fleet's clock, seconds.
+        max_age: seconds; None allows any age.
+
+    Raises:
+        StalePosesError: naming the robots.
+    """
+    if max_age is None:
+        return
+    old = {pose.id: now - pose.seen for pose in poses if now - pose.seen > max_age}
+    if old:
+        raise StalePosesError(
+            f"Robot {', '.join(old)} not seen for {max(old.values()):.1f} s; poses may be at most "
+            f"{max_age:g} s old. Nothing is driven on them; check the connection or the camera.",
+            tuple(old),
+        )

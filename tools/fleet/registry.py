@@ -1,0 +1,8 @@
+"""Fleets by name: those of formup, and those of installed packages."""
+
+from ..registry import Registry
+from .protocol import FleetFactory
+
+FLEETS = Registry[FleetFactory](
+    "fleet", "formup.fleets", {"simulated": "formup.tools.fleet.simulated:open_fleet"}
+)
