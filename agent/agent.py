@@ -1,35 +1,44 @@
-"""The agent: a model, the tools and the loop put together for one instruction on one picture."""
+"""The agent: a model, the tools and the loop put together for a session about a picture."""
 
 import asyncio
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
-from contextlib import nullcontext
-from dataclasses import asdict
+from contextlib import closing
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..prompts import Prompt, PromptError, PromptLibrary
+from ..prompts import PromptLibrary
 from ..tools.builtin import TOOLS
+from ..tools.context import Context, Settings
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
-from ..tools.scene import Scene, Target
 from ..tools.tool import Tool
-from ..tools.world import Settings, Workspace
+from ..tools.world import Target, World, to_json_values
 from .first_message import first_message
 from .limits import DEFAULT_LIMITS, Limits
-from .loop import ANYTHING, Show, run
-from .messages import Call, History, Reply, Result, User
+from .loop import ANYTHING, Approval
+from .loop import run as run_loop
+from .messages import History, closed
 from .model import Model
-from .outcomes import Outcome, Paused, Stopped
+from .outcomes import Cancelled, Outcome, Paused, Stopped
 from .policy import Policy
 from .providers.registry import model_named
 from .report import Report, make_report
-from .session import Run, check_text, going_on
-from .store.folder import TraceWriter, settings_facts
+from .session import (
+    FORMAT,
+    LogRecorder,
+    Run,
+    Show,
+    answered_by,
+    check_text,
+    picture_facts,
+)
+from .store.folder import PICTURES, FolderArtefacts, FolderLog
 from .wrappers.telemetry import traced_model, traced_run, traced_tool
-from .wrappers.two_stages import TwoStages, offered
+from .wrappers.two_stages import offered, prompt_named, staged
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
@@ -79,11 +88,11 @@ class Agent:
         own = None if system else getattr(self.model, "prompt", None)
         self.library = library or PromptLibrary()
         name = (own if planner is None else "planner") if prompt is None else prompt
-        self.prompt = None if name is None else _prompt(self.library, name)
+        self.prompt = None if name is None else prompt_named(self.library, name)
         self.prompts = () if self.prompt is None else (self.prompt,)
         self._names: tuple[str, str | None] = (self.model.name, None)
         if planner is not None:
-            made = _staged(self.model, planner, base_url, str(name), self.library)
+            made = staged(self.model, planner, base_url, str(name), self.library)
             self.model, self.prompts = made
             self._names = made[0].names
         self.system = self.prompt.render() if self.prompt else system
@@ -132,7 +141,7 @@ class Agent:
         trace: Path | None = None,
         show: Show | None = None,
     ) -> Run:
-        """Carry out one instruction on one picture.
+        """Carry out one instruction on one picture: a session of one turn, that can go on.
 
         Args:
             picture: where.
@@ -140,121 +149,188 @@ class Agent:
             pointed: the things meant, if the person points.
             targets: the things meant, where they are measured already.
             settings: what the person fixed.
-            trace: a file to write the run to as it goes: it can be resumed and replayed from it.
+            trace: a file to write the session to as it goes: it can be resumed and replayed from
+                it, by default in another process.
             show: is given every message as it comes.
 
         Raises:
             InputError: something given cannot be used.
         """
-        fixed = settings or Settings()
-        _check(instruction, fixed.robots)
-        workspace = Workspace(Scene(picture, tuple(targets)), fixed, tuple(pointed), instruction)
-        _check_candidates(workspace)
-        writer = None if trace is None else TraceWriter(trace)
-        if writer is not None:
-            writer.start(self._facts(instruction, fixed), workspace)
-        note = _noting(workspace, writer, show)
-        first = first_message(workspace, seen=getattr(self.model, "sees", False))
-        note(first)
-        return await self._go(workspace, (first,), instruction, note, writer=writer)
+        context = Context.of(picture, settings, World.of(picture, targets=tuple(targets)))
+        _check_turn(context, instruction, pointed)
+        log = None
+        if trace is not None:
+            context.services.artefacts = FolderArtefacts(trace.parent / PICTURES)
+            log = FolderLog(trace, begin=True)
+        with closing(LogRecorder(log, context.services.artefacts, None, show)) as recorder:
+            recorder.event("session", self._facts(picture, context) if log else {})
+            return await self._turn(context, (), instruction, pointed, recorder, trace)
+
+    def say(
+        self,
+        run: Run,
+        words: str,
+        *,
+        pointed: Sequence[TargetPrompt] = (),
+        settings: Settings | None = None,
+        show: Show | None = None,
+    ) -> Run:
+        """The next turn of a session; the synchronous door to `asay`.
+
+        Raises:
+            InputError: something given cannot be used.
+        """
+        return self._sync(self.asay(run, words, pointed=pointed, settings=settings, show=show))
+
+    async def asay(
+        self,
+        run: Run,
+        words: str,
+        *,
+        pointed: Sequence[TargetPrompt] = (),
+        settings: Settings | None = None,
+        show: Show | None = None,
+    ) -> Run:
+        """The next turn of a session: what the person says after a turn has ended.
+
+        Args:
+            run: the session as it is; one that waits for an answer drops its question.
+            words: what the person says.
+            pointed: the things meant, if the person points.
+            settings: what the person fixes from now on; as before if left out, but for the number
+                of robots and approvals, which hold for one turn.
+
+        Raises:
+            InputError: something given cannot be used.
+        """
+        fixed = settings or run.context.settings.model_copy(update={"robots": None})
+        fixed = fixed.model_copy(update={"approved": None})
+        world = run.world.having(doubted=None)
+        context = replace(run.context, world=world, settings=fixed).check()
+        _check_turn(context, words, pointed)
+        messages = closed(run.outcome.messages, "The person said something else instead.")
+        with closing(_reopened(run, show)) as recorder:
+            for message in messages[len(run.outcome.messages) :]:
+                recorder.message(message, run.world)
+            return await self._turn(context, messages, words, pointed, recorder, run.trace)
 
     def resume(
         self,
-        paused: Run,
+        run: Run,
         *,
         answer: str | None = None,
         approve: bool | None = None,
         show: Show | None = None,
     ) -> Run:
-        """Go on where a run was left; the synchronous door to `aresume`.
+        """Go on with a turn where it was left; the synchronous door to `aresume`.
 
         Raises:
-            InputError: the run is over, or waits for something else.
+            InputError: the turn is over, or waits for something else.
         """
-        made = self.aresume(paused, answer=answer, approve=approve, show=show)
-        return self._sync(made)
+        return self._sync(self.aresume(run, answer=answer, approve=approve, show=show))
 
     async def aresume(
         self,
-        paused: Run,
+        run: Run,
         *,
         answer: str | None = None,
         approve: bool | None = None,
         show: Show | None = None,
     ) -> Run:
-        """Go on where a run was left, here or, with `load_run`, in another process.
+        """Go on with a turn where it was left, here or, with `load_run`, in another process.
 
         Args:
-            paused: a run that waits for a person, was stopped, cancelled or killed; its
-                workspace is worked on further, and its trace written on.
+            run: one that waits for a person, was stopped, cancelled or killed; its log is written
+                on.
             answer: to a question; "3" or "c3" is the third candidate. With a no, the reason.
             approve: a person's yes or no to the very call that waits, such as moving robots.
             show: is given every new message as it comes, the person's first.
 
         Raises:
-            InputError: the run is over, or waits for something else.
+            InputError: the turn is over, or waits for something else.
         """
-        said, approved = going_on(paused, answer, approve)
-        workspace, instruction = paused.workspace, paused.report.instruction
-        writer = None if paused.trace is None else TraceWriter(paused.trace, resumed=True)
-        if writer is not None:
-            writer.resume(workspace)
-        note = _noting(workspace, writer, show)
-        history = paused.outcome.messages
-        if said is not None:
-            note(said)
-            history = (*history, said)
-        spent = paused.report.usage.seconds
-        return await self._go(
-            workspace, history, instruction, note, writer=writer, spent=spent, approved=approved
-        )
+        result, approved = answered_by(run, answer, approve)
+        context, messages = replace(run.context, world=run.world), run.outcome.messages
+        with closing(_reopened(run, show)) as recorder:
+            recorder.event("resume", {})
+            if approve is not None and isinstance(run.outcome, Paused):
+                plan_id = run.outcome.plan_id if approved else None
+                recorder.event("approval", {"call": run.outcome.call.id, "plan_id": plan_id})
+                fixed = context.settings.model_copy(update={"approved": plan_id})
+                context = replace(context, settings=fixed)
+            if result is not None:
+                recorder.message(result, context.world)
+                messages = (*messages, result)
+            left, spent = replace(run, context=context), run.report.usage.seconds
+            return await self._go(left, messages, recorder, spent, approved)
+
+    async def _turn(
+        self,
+        context: Context,
+        messages: History,
+        words: str,
+        pointed: Sequence[TargetPrompt],
+        recorder: LogRecorder,
+        trace: Path | None,
+    ) -> Run:
+        """Begin a turn and let the loop work on it."""
+        recorder.event("turn", {"words": words, "settings": to_json_values(context.settings)})
+        world = context.world.having(pointed=tuple(pointed))
+        context = replace(context, world=world, words=words)
+        first = first_message(context, messages, seen=getattr(self.model, "sees", False))
+        recorder.message(first, world)
+        blank = Report(status="stopped", message="", instruction=words, model=self.model.name)
+        left = Cancelled((*messages, first), world)
+        run = Run(blank, left, context, context.world, trace)
+        return await self._go(run, left.messages, recorder)
 
     async def _go(
         self,
-        workspace: Workspace,
+        left: Run,
         messages: History,
-        instruction: str,
-        note: Show,
-        *,
-        writer: TraceWriter | None,
+        recorder: LogRecorder,
         spent: float = 0.0,
-        approved: Call | None = None,
+        approved: Approval | None = None,
     ) -> Run:
-        began = time.perf_counter()
+        began, context = time.perf_counter(), left.context
         traced = traced_run(self._tracer, self.model.name, messages)
-        with writer or nullcontext(), traced as told:
-            outcome = await run(
+        with traced as describe:
+            outcome = await run_loop(
                 self.model,
                 self.tools,
-                workspace,
+                context,
                 messages,
                 system=self.system,
                 offered=self.offered,
                 limits=self.limits,
                 policy=self.policy,
                 approved=approved,
-                show=note,
+                recorder=recorder,
             )
             seconds = round(spent + time.perf_counter() - began, 3)
-            report = make_report(outcome, workspace, instruction, self.model.name, seconds)
+            context = replace(context, world=outcome.world)
+            report = make_report(outcome, context, left.began, self.model.name, seconds)
             report = report.model_copy(update=self._prompts())
-            if writer is not None:
-                writer.end(_end(outcome, report))
-            told(outcome, report)
-        return Run(report, outcome, workspace, writer and writer.path)
+            recorder.world(outcome.world)
+            recorder.event("end", _end(outcome, report))
+            if recorder.problem is not None:
+                text = f"{report.message} The log ends before this: {recorder.problem}"
+                report = report.model_copy(update={"message": text})
+            describe(outcome, report)
+        return Run(report, outcome, context, left.began, left.trace)
 
-    def _facts(self, instruction: str, settings: Settings) -> dict[str, Any]:
-        """What a trace begins with, enough to go on in another process."""
+    def _facts(self, picture: Picture, context: Context) -> dict[str, Any]:
+        """What a log begins with, enough to go on in another process."""
         return {
-            "instruction": instruction,
+            "format": FORMAT,
             "model": self._names[0],
             "planner": self._names[1],
             "base_url": self.base_url,
             "library": self.library.folder and str(self.library.folder.absolute()),
             **self._prompts(),
-            "settings": settings_facts(settings),
             "limits": asdict(self.limits),
             "policy": self.policy.rules,
+            "picture": picture_facts(picture, context.services.artefacts),
         }
 
     def _prompts(self) -> dict[str, Any]:
@@ -286,49 +362,14 @@ class Agent:
         raise InputError("An event loop runs here already: await agent.arun(...) or aresume(...).")
 
 
-def _prompt(library: PromptLibrary, name: str) -> Prompt:
-    """The prompt of a name, which a run gives no values."""
-    try:
-        prompt = library.load(name)
-        prompt.render()
-    except PromptError as error:
-        raise InputError(str(error)) from None
-    return prompt
-
-
-def _staged(
-    looker: Model,
-    planner: str | Model,
-    base_url: str | None,
-    plan: str,
-    library: PromptLibrary,
-) -> tuple[TwoStages, tuple[Prompt, ...]]:
-    """Two models as one, and their prompts."""
-    second = model_named(planner, base_url) if isinstance(planner, str) else planner
-    blind = [m.name for m in (looker, second) if not getattr(m, "prompt", None)]
-    if blind:
-        raise InputError(
-            f"{blind[0]} reads no prompt and cannot share the work: "
-            "--model and --planner both take a language model, such as openai:NAME."
-        )
-    look, made, repair = (_prompt(library, name) for name in ("context", plan, "repair"))
-    return TwoStages(looker, second, look=look, plan=made, repair=repair), (look, made, repair)
-
-
-def _noting(workspace: Workspace, writer: TraceWriter | None, show: Show | None) -> Show:
-    """Writes a message down, then shows it."""
-
-    def note(message: User | Reply | Result) -> None:
-        if writer is not None:
-            writer.message(message, workspace)
-        if show is not None:
-            show(message)
-
-    return note
+def _reopened(run: Run, show: Show | None) -> LogRecorder:
+    """The recorder of a session that goes on."""
+    log = None if run.trace is None else FolderLog(run.trace)
+    return LogRecorder(log, run.context.services.artefacts, run.world, show)
 
 
 def _end(outcome: Outcome, report: Report) -> dict[str, Any]:
-    """The last line of a trace."""
+    """The event that ends a turn."""
     facts = {
         "outcome": type(outcome).__name__.lower(),
         "status": report.status,
@@ -338,22 +379,26 @@ def _end(outcome: Outcome, report: Report) -> dict[str, Any]:
     if isinstance(outcome, Stopped):
         facts |= {"kind": outcome.kind, "reason": outcome.reason}
     if isinstance(outcome, Paused):
-        facts |= {"call": outcome.call.id}
+        facts |= {"call": outcome.call.id, "plan_id": outcome.plan_id}
     return facts
 
 
-def _check(instruction: str, robots: int | None) -> None:
-    example = 'say what to do, such as "Surround the car at the corners"'
-    check_text("instruction", instruction, example)
+def _check_turn(context: Context, words: str, pointed: Sequence[TargetPrompt]) -> None:
+    """Refuse what cannot be carried out before anything is written down.
+
+    Raises:
+        InputError: no words, a number of robots that cannot be, or a thing that is not there.
+    """
+    check_text("instruction", words, 'say what to do, such as "Surround the car at the corners"')
+    robots = context.settings.robots
     if robots is not None and not 1 <= robots <= MAX_ROBOTS:
         raise InputError(f"{robots} robots cannot be placed; 1 to {MAX_ROBOTS:,} can.")
-
-
-def _check_candidates(workspace: Workspace) -> None:
-    """Candidates pointed at must be there; the picture is searched only if there are some."""
+    problems = [p for q in pointed for p in q.problems(*context.world.picture.size)]
+    if problems:
+        raise InputError(" ".join(problems))
     try:
-        for prompt in workspace.pointed:
+        for prompt in pointed:
             if prompt.candidate is not None:
-                workspace.candidate(prompt.candidate)
+                context.candidate(prompt.candidate)
     except ToolError as error:
         raise InputError(str(error)) from None

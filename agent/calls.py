@@ -1,15 +1,15 @@
 """One call answered: what the model got wrong comes back to it as a result it can act on.
 
-A tool works on a copy of the workspace that is kept when it returns or says what it cannot do, so
-that one which hangs, breaks or is interrupted has changed nothing.
+A tool returns the next world, which the loop puts in place: one that hangs, breaks or is
+interrupted has changed nothing but what it had observed by then.
 """
 
 import asyncio
 import traceback
 
-from ..tools.errors import ArgumentsError, FleetError, FormupError, ToolError
+from ..tools.context import Context
+from ..tools.errors import ArgumentsError, FormupError, ToolError
 from ..tools.tool import Tool
-from ..tools.world import Workspace
 from .messages import Call, ErrorKind, Result
 
 
@@ -23,12 +23,17 @@ def tool_named(tools: tuple[Tool, ...], name: str) -> Tool | None:
 
 
 async def answer(
-    tools: tuple[Tool, ...], workspace: Workspace, call: Call, seconds: float | None
+    tools: tuple[Tool, ...],
+    context: Context,
+    call: Call,
+    seconds: float | None,
 ) -> Result:
     """Run one call.
 
     Args:
-        seconds: how long the tool may take; None is as long as it likes.
+        context: its `observed` is given the next world.
+        seconds: how long the tool may take; None is as long as it likes. Robots that drive are
+            not bound by it.
 
     Raises:
         BrokenToolError: the tool has a mistake in it.
@@ -39,25 +44,26 @@ async def answer(
     if tool is None:
         known = ", ".join(t.name for t in tools)
         return failed(call, "unknown_tool", f"Unknown tool {call.name!r}. Available: {known}.")
-    trial, clock = workspace.copy(), asyncio.timeout(seconds)
+    clock = asyncio.timeout(None if tool.kind == "actuate" else seconds)
     try:
         async with clock:
-            result = await tool.call(trial, call.arguments)
+            result = await tool.call(context, call.arguments)
             text = result.text
     except ArgumentsError as error:
         return failed(call, "arguments", str(error))
     except ToolError as error:
-        workspace.adopt(trial)
         return failed(call, "tool", str(error), error.images)
     except FormupError:
         raise
     except Exception as error:
         if isinstance(error, TimeoutError) and clock.expired():
-            return _late(tool, call, seconds)
+            text = f"{tool.name} did not end within {seconds:g} s and was given up."
+            return failed(call, "timeout", text)
         raise BrokenToolError(_where(tool, error)) from error
-    workspace.adopt(trial)
+    if result.world is not None:
+        context.observed(result.world)
     return Result(
-        call_id=call.id, name=call.name, text=text, images=result.images, told=result.told
+        call_id=call.id, name=call.name, text=text, images=result.images, message=result.message
     )
 
 
@@ -71,17 +77,8 @@ def refused(call: Call, why: str) -> Result:
     return failed(call, "refused", why)
 
 
-def _late(tool: Tool, call: Call, seconds: float | None) -> Result:
-    if tool.kind == "actuate":
-        raise FleetError(
-            f"{tool.name} did not end within {seconds:g} s; where the robots are is not known."
-        )
-    text = f"{tool.name} did not end within {seconds:g} s and was given up; nothing was changed."
-    return failed(call, "timeout", text)
-
-
 def _where(tool: Tool, error: Exception) -> str:
     """One sentence for whoever wrote the tool."""
     last = traceback.extract_tb(error.__traceback__)[-1]
-    said = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"The tool {tool.name} broke ({said}) at line {last.lineno} of {last.filename}."
+    raised = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"The tool {tool.name} broke ({raised}) at line {last.lineno} of {last.filename}."

@@ -1,12 +1,12 @@
-"""What the person asks for, as the first message of a conversation: lines a model can read."""
+"""What the person asks for, as the first message of a turn: lines a model can read."""
 
 import json
 from dataclasses import dataclass
 from typing import Any
 
 from ..tools.draw import draw_view, view_scale
-from ..tools.world import Workspace
-from .messages import User
+from ..tools.context import Context
+from .messages import History, User
 
 MOST_NUMBERED = 40
 """Candidates in the first picture."""
@@ -14,12 +14,12 @@ MOST_NUMBERED = 40
 
 @dataclass(frozen=True)
 class Task:
-    """The facts of the first message.
+    """The facts of a turn's first message.
 
     Attributes:
         robots: how many, or None where the person left it to the words.
         pointed: what the person pointed at, as arguments of propose_formation's `targets`.
-        targets: ids of targets that are measured already.
+        targets: ids of targets that were measured before the conversation began.
         deploy: whether robots shall move once the plan is certified.
         metres_per_pixel: of the picture; None where it has no scale.
     """
@@ -32,37 +32,38 @@ class Task:
     metres_per_pixel: float | None = None
 
 
-def first_message(workspace: Workspace, *, seen: bool) -> User:
+def first_message(context: Context, before: History, *, seen: bool) -> User:
     """What is asked, and for a model that sees the picture it is asked about.
 
     Args:
-        workspace: with the person's words and the picture.
+        context: with the person's words and the picture.
+        before: the conversation so far, in which the picture has been shown.
         seen: whether the model sees.
     """
-    if not seen:
-        return User(text=task_text(workspace))
-    numbered = workspace.candidates()[:MOST_NUMBERED] if workspace.settings.numbered else ()
-    image = draw_view(workspace.scene, candidates=numbered)
-    scale = view_scale(workspace.scene.picture)
+    if not seen or before:
+        return User(text=task_text(context, follows=bool(before)))
+    numbered = context.candidates()[:MOST_NUMBERED] if context.settings.numbered else ()
+    image = draw_view(context.picture, context.world, candidates=numbered)
+    scale = view_scale(context.picture)
     how = "" if scale == 1 else f", shown at {scale:.3g} times its size: read the rulers"
     how += ", numbers are candidates: 3 is c3" if numbered else ""
-    return User(text=task_text(workspace, how), images=(image,))
+    return User(text=task_text(context, how), images=(image,))
 
 
-def task_text(workspace: Workspace, how: str = "") -> str:
-    """The first message: one fact a line, the person's words quoted so that they stay one."""
-    settings, scene = workspace.settings, workspace.scene
-    picture, scale = scene.picture, scene.metres_per_pixel
+def task_text(context: Context, how: str = "", *, follows: bool = False) -> str:
+    """A turn's first message: one fact a line, the person's words quoted so that they stay one."""
+    settings, world = context.settings, context.world
+    picture, scale = world.picture, world.metres_per_pixel
     pointed = [
-        p.model_dump(mode="json", exclude_defaults=True) | {"id": p.id} for p in workspace.pointed
+        p.model_dump(mode="json", exclude_defaults=True) | {"id": p.id} for p in world.pointed
     ]
     lines = {
-        "Instruction": workspace.instruction,
+        "Instruction": context.words,
         "Robots": settings.robots,
         "Picture": f"{picture.width} x {picture.height} px{how}",
         **({} if scale is None else {"Metres per pixel": scale}),
         "Pointed at": pointed,
-        "Targets": [t.id for t in scene.targets],
+        "Targets": [] if follows else [t.id for t in world.targets],
         "Deploy": settings.may_deploy,
     }
     return "\n".join(f"{name}: {json.dumps(v, ensure_ascii=False)}" for name, v in lines.items())

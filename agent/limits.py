@@ -1,25 +1,26 @@
-"""Bounds of a run. Reaching one is an outcome like any other: the messages are all there."""
+"""Bounds of a turn. Reaching one is an outcome like any other: the messages are all there."""
 
 from dataclasses import dataclass, fields
 
 from ..tools.errors import InputError
-from .messages import History, Reply
+from .messages import History, Reply, Result, turn_of
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a run may use; None is no limit.
+    """What a turn may use; None is no limit.
 
-    Numbers and cost count the whole history and are checked before each request, so that the last
-    one may go over; seconds count from where the run was begun or resumed.
+    Tokens and cost are checked before each request, so that the last one may go over; seconds
+    count from where the turn was begun or resumed, and stand still while robots drive.
 
     Attributes:
         requests: to the model.
-        tool_calls: all tools together.
+        tool_calls: all tools together, checked before each call.
         tokens: input and output together.
         cost_usd: as far as prices are known.
         seconds: wall time; what runs then is interrupted.
-        tool_seconds: of one tool call.
+        tool_seconds: of one tool call; robots that drive are not bound by it.
+        reply_seconds: of one reply of the model, from the request to its end.
 
     Raises:
         InputError: one that is not above 0.
@@ -31,6 +32,7 @@ class Limits:
     cost_usd: float | None = None
     seconds: float | None = None
     tool_seconds: float | None = 120.0
+    reply_seconds: float | None = 300.0
 
     def __post_init__(self) -> None:
         for name in (field.name for field in fields(self)):
@@ -43,13 +45,12 @@ DEFAULT_LIMITS = Limits()
 
 
 def exhausted(history: History, limits: Limits) -> str | None:
-    """The limit that has been reached, as a sentence."""
-    replies = [m for m in history if isinstance(m, Reply)]
+    """The limit that the last turn has reached, as a sentence."""
+    replies = [m for m in turn_of(history) if isinstance(m, Reply)]
     if limits.requests is not None and len(replies) >= limits.requests:
         return f"The limit of {_counted(limits.requests, 'request')} was reached."
-    calls = sum(len(m.calls) for m in replies)
-    if limits.tool_calls is not None and calls >= limits.tool_calls:
-        return f"The limit of {_counted(limits.tool_calls, 'tool call')} was reached."
+    if reason := calls_exhausted(history, limits):
+        return reason
     if limits.tokens is not None:
         used = sum(m.usage.input_tokens + m.usage.output_tokens for m in replies)
         if used >= limits.tokens:
@@ -59,6 +60,15 @@ def exhausted(history: History, limits: Limits) -> str | None:
         if spent >= limits.cost_usd:
             return f"The limit of {limits.cost_usd:g} USD was reached: {spent:.4f} were spent."
     return None
+
+
+def calls_exhausted(history: History, limits: Limits) -> str | None:
+    """The limit of tool calls, as a sentence, once it has been reached."""
+    if limits.tool_calls is None:
+        return None
+    if sum(isinstance(m, Result) for m in turn_of(history)) < limits.tool_calls:
+        return None
+    return f"The limit of {_counted(limits.tool_calls, 'tool call')} was reached."
 
 
 def _counted(number: int, noun: str) -> str:

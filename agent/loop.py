@@ -1,153 +1,249 @@
 """The loop: answer the calls, check the limits, ask the model, append; nothing else."""
 
 import asyncio
-from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Generator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from typing import Protocol
 
-from ..tools.errors import ArgumentsError, FleetError, ModelError
+from ..tools.context import Context
+from ..tools.errors import ApprovalError, ArgumentsError, FleetError, ModelError
 from ..tools.tool import Tool
-from ..tools.world import Workspace
+from ..tools.world import World
 from .calls import BrokenToolError, answer, failed, refused, tool_named
-from .limits import DEFAULT_LIMITS, Limits, exhausted
+from .limits import DEFAULT_LIMITS, Limits, calls_exhausted, exhausted
 from .messages import (
     Call,
     History,
+    Message,
     Reply,
     Result,
-    User,
     failed_before,
-    times_repeated,
+    is_repeated,
     unanswered,
 )
 from .model import Model, Request
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .policy import Decision, Policy
 
-Show = Callable[[User | Reply | Result], None]
 ANYTHING = Policy()
+
+
+class Recorder(Protocol):
+    """Is given what happens, as it happens."""
+
+    def message(self, message: Message, world: World) -> None:
+        """A new message, and the world after it."""
+        ...
+
+    def moving(self, plan_id: str, world: World) -> None:
+        """Robots are about to move to a plan; raising keeps them where they are."""
+        ...
+
+
+class NoRecorder:
+    """Records nothing."""
+
+    def message(self, message: Message, world: World) -> None:
+        """Nothing."""
+
+    def moving(self, plan_id: str, world: World) -> None:
+        """Nothing."""
+
+
+@dataclass(frozen=True)
+class Approval:
+    """A person's yes to one call and, where it moves robots, to the one plan it is for."""
+
+    call: Call
+    plan_id: str | None = None
 
 
 @dataclass
 class Conversation:
-    """The messages so far, there whatever happens to the loop that adds to them."""
+    """The messages and the world so far, there whatever happens to the loop that adds to them."""
 
     messages: History
-    show: Show
+    world: World
+    recorder: Recorder
 
     def add(self, message: Reply | Result) -> None:
-        """Append, and show it for display and traces."""
+        """Append a message and record it."""
         self.messages = (*self.messages, message)
-        self.show(message)
+        self.recorder.message(message, self.world)
+
+    def keep(self, world: World) -> None:
+        """Put the next world in place."""
+        self.world = world
+
+    def moving(self, plan_id: str) -> None:
+        """Record that robots are about to move."""
+        self.recorder.moving(plan_id, self.world)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What stays the same while the loop works on what a person said."""
+
+    model: Model
+    tools: tuple[Tool, ...]
+    offered: tuple[Tool, ...]
+    context: Context
+    system: str
+    limits: Limits
+    policy: Policy
+    approved: Approval | None
+
+    def permit(self, call: Call, world: World) -> Decision:
+        """What the policy says; a call that cannot be made does not trouble a person."""
+        tool = tool_named(self.tools, call.name)
+        if tool is None or (decision := self.policy.decide(tool)) == "allow":
+            return "allow"
+        if decision == "refuse":
+            return "refuse"
+        if self.approved == Approval(call, self.plan_of(call, world)):
+            return "allow"
+        try:
+            tool.parse(call.arguments)
+        except ArgumentsError:
+            return "allow"
+        return "ask"
+
+    def moves(self, call: Call) -> bool:
+        """Whether a call moves robots."""
+        tool = tool_named(self.tools, call.name)
+        return tool is not None and tool.kind == "actuate"
+
+    def plan_of(self, call: Call, world: World) -> str | None:
+        """The plan that a call which moves robots is for."""
+        named = call.arguments.get("plan_id") or world.current
+        return str(named) if self.moves(call) and named else None
+
+    async def ask(self, messages: History) -> Reply:
+        """The model's next reply, whole and in time."""
+        clock = asyncio.timeout(self.limits.reply_seconds)
+        try:
+            async with clock:
+                return await self.model.reply(Request(self.system, messages, self.offered))
+        except TimeoutError:
+            if not clock.expired():
+                raise
+            raise ModelError(
+                f"{self.model.name} did not finish a reply within {self.limits.reply_seconds:g} s; "
+                "ask again, or allow it more with --limit reply_seconds=NUMBER."
+            ) from None
 
 
 async def run(
     model: Model,
     tools: tuple[Tool, ...],
-    workspace: Workspace,
+    context: Context,
     messages: History,
     *,
     system: str = "",
     offered: tuple[Tool, ...] | None = None,
     limits: Limits = DEFAULT_LIMITS,
     policy: Policy = ANYTHING,
-    approved: Call | None = None,
-    show: Show = lambda message: None,
+    approved: Approval | None = None,
+    recorder: Recorder | None = None,
 ) -> Outcome:
-    """Run a conversation until it is answered, paused, stopped or cancelled.
+    """Run a turn until it is answered, paused, stopped or cancelled.
 
     Args:
-        messages: the history so far; unanswered calls at its end are answered first.
+        context: with the world as it is; each outcome has the world that came of it.
+        messages: the history so far; unanswered calls at its end are answered first. The turn
+            begins with its last message of the person's.
         system: the prompt.
         offered: the tools the model is told of; None for all. It may know of others.
-        limits: bounds; those of numbers and cost hold for the whole history.
+        limits: bounds of the turn.
         policy: which calls go ahead.
-        approved: the one call a person has said yes to, exactly as it stands.
-        show: is given every new message.
+        approved: what a person has said yes to.
+        recorder: is given every new message.
     """
-    talk, clock = Conversation(messages, show), asyncio.timeout(limits.seconds)
-
-    def permit(call: Call) -> Decision:
-        return "allow" if call == approved else _decide(policy, tools, workspace, call)
-
+    talk = Conversation(messages, context.world, recorder or NoRecorder())
+    shown = tools if offered is None else offered
+    turn = Turn(model, tools, shown, context, system, limits, policy, approved)
+    clock = asyncio.timeout(limits.seconds)
     try:
         async with clock:
-            ask = partial(_ask, model, system, tools if offered is None else offered)
-            return await _converse(ask, tools, workspace, talk, limits, permit)
+            return await _converse(turn, talk, clock)
     except asyncio.CancelledError:
-        return Cancelled(talk.messages)
+        return Cancelled(talk.messages, talk.world)
     except TimeoutError:
         if not clock.expired():
             raise
-        return Stopped(talk.messages, "limit", f"The limit of {limits.seconds:g} s was reached.")
+        reason = f"The limit of {limits.seconds:g} s was reached."
+        return Stopped(talk.messages, talk.world, "limit", reason)
     except BrokenToolError as error:
-        return Stopped(talk.messages, "tool", str(error), error.__cause__)
+        return Stopped(talk.messages, talk.world, "tool", str(error), error.__cause__)
     except ModelError as error:
-        return Stopped(talk.messages, "model", str(error))
+        return Stopped(talk.messages, talk.world, "model", str(error))
     except FleetError as error:
-        return Stopped(talk.messages, "fleet", str(error))
+        return Stopped(talk.messages, talk.world, "fleet", str(error))
 
 
-async def _converse(
-    ask: Callable[[History], Awaitable[Reply]],
-    tools: tuple[Tool, ...],
-    workspace: Workspace,
-    talk: Conversation,
-    limits: Limits,
-    permit: Callable[[Call], Decision],
-) -> Outcome:
+async def _converse(turn: Turn, talk: Conversation, clock: asyncio.Timeout) -> Outcome:
     while True:
         for call in unanswered(talk.messages):
-            before = failed_before(talk.messages)
-            decision = "skip" if before and _moves(tools, call) else permit(call)
-            if decision == "ask":
-                return Paused(talk.messages, call)
-            if decision == "skip":
-                talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
-            elif decision == "refuse":
-                talk.add(refused(call, f"{call.name} may not be called here; do without it."))
-            else:
-                talk.add(await answer(tools, workspace, call, limits.tool_seconds))
-            if outcome := _ended(talk.messages):
+            if outcome := await _settle(turn, talk, call, clock):
                 return outcome
-        if reason := exhausted(talk.messages, limits):
-            return Stopped(talk.messages, "limit", reason)
-        reply = await ask(talk.messages)
+        if reason := exhausted(talk.messages, turn.limits):
+            return Stopped(talk.messages, talk.world, "limit", reason)
+        reply = await turn.ask(talk.messages)
         talk.add(reply)
         if not reply.calls:
-            return Answered(talk.messages, reply.text)
+            return Answered(talk.messages, talk.world, reply.text)
 
 
-def _ask(
-    model: Model, system: str, offered: tuple[Tool, ...], messages: History
-) -> Awaitable[Reply]:
-    return model.reply(Request(system, messages, offered))
+async def _settle(
+    turn: Turn, talk: Conversation, call: Call, clock: asyncio.Timeout
+) -> Outcome | None:
+    """Answer one call; how that ends the turn, if it does."""
+    if reason := calls_exhausted(talk.messages, turn.limits):
+        return Stopped(talk.messages, talk.world, "limit", reason)
+    before = failed_before(talk.messages)
+    decision = "skip" if before and turn.moves(call) else turn.permit(call, talk.world)
+    if decision == "ask":
+        return Paused(talk.messages, talk.world, call, turn.plan_of(call, talk.world))
+    if decision == "skip":
+        talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
+        return None
+    if decision == "refuse":
+        talk.add(refused(call, f"{call.name} may not be called here; do without it."))
+        return _ended(talk)
+    context = replace(
+        turn.context, world=talk.world, observed=talk.keep, moving=talk.moving
+    )
+    try:
+        with _stopped(clock) if turn.moves(call) else nullcontext():
+            result = await answer(turn.tools, context, call, turn.limits.tool_seconds)
+    except ApprovalError as needed:
+        return Paused(talk.messages, talk.world, call, needed.plan_id)
+    talk.add(result)
+    return _ended(talk)
 
 
-def _decide(policy: Policy, tools: tuple[Tool, ...], workspace: Workspace, call: Call) -> Decision:
-    """What the policy says; a call that cannot be made does not trouble a person."""
-    tool = tool_named(tools, call.name)
-    decision = policy.decide(tool, workspace) if tool else "allow"
-    if tool and decision == "ask":
-        try:
-            tool.parse(call.arguments)
-        except ArgumentsError:
-            return "allow"
-    return decision
+@contextmanager
+def _stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
+    """The turn's clock stands still while robots drive."""
+    now, ends = asyncio.get_running_loop().time, clock.when()
+    left = None if ends is None else ends - now()
+    clock.reschedule(None)
+    try:
+        yield
+    finally:
+        if not clock.expired():
+            clock.reschedule(None if left is None else now() + left)
 
 
-def _moves(tools: tuple[Tool, ...], call: Call) -> bool:
-    tool = tool_named(tools, call.name)
-    return tool is not None and tool.kind == "actuate"
-
-
-def _ended(messages: History) -> Outcome | None:
-    """How the last result ends the run, if it does: the model goes in circles, or is done."""
-    result = messages[-1]
+def _ended(talk: Conversation) -> Outcome | None:
+    """How the last result ends the turn, if it does: the model goes in circles, or is done."""
+    result = talk.messages[-1]
     assert isinstance(result, Result)
-    most = 1 if result.error else 2
-    if result.error != "skipped" and times_repeated(messages) >= most:
+    if result.message is not None:
+        return Answered(talk.messages, talk.world, result.message)
+    if is_repeated(talk.messages):
         what = "a failing call to" if result.error else "the same call to"
         reason = f"The model repeated {what} {result.name}: {result.text}"
-        return Stopped(messages, "repeat", reason)
-    return None if result.told is None else Answered(messages, result.told)
+        return Stopped(talk.messages, talk.world, "repeat", reason)
+    return None

@@ -87,7 +87,7 @@ class Result(_Value):
 
     Attributes:
         error: what kind of mistake it reports, if any.
-        told: what the person is told, where the call has closed the run.
+        message: what the person is told, where the call has ended the turn.
     """
 
     role: Literal["tool"] = "tool"
@@ -96,16 +96,18 @@ class Result(_Value):
     text: str
     error: ErrorKind | None = None
     images: tuple[bytes, ...] = ()
-    told: str | None = None
+    message: str | None = None
 
 
-Message = Annotated[User | Reply | Result, Field(discriminator="role")]
-History = tuple[User | Reply | Result, ...]
-HISTORY: TypeAdapter[History] = TypeAdapter(tuple[Message, ...])
+Message = User | Reply | Result
+History = tuple[Message, ...]
+HISTORY: TypeAdapter[History] = TypeAdapter(
+    tuple[Annotated[Message, Field(discriminator="role")], ...]
+)
 """Reads and writes a history as JSON: HISTORY.dump_json(history), HISTORY.validate_json(text)."""
 
 
-def unanswered(history: Sequence[User | Reply | Result]) -> tuple[Call, ...]:
+def unanswered(history: Sequence[Message]) -> tuple[Call, ...]:
     """Calls of the last reply that have no result yet, in order."""
     answered: set[str] = set()
     for message in reversed(history):
@@ -118,7 +120,7 @@ def unanswered(history: Sequence[User | Reply | Result]) -> tuple[Call, ...]:
     return ()
 
 
-def failed_before(history: Sequence[User | Reply | Result]) -> str | None:
+def failed_before(history: Sequence[Message]) -> str | None:
     """The name of the last call that failed among those of the last reply answered so far."""
     for message in reversed(history):
         if isinstance(message, Result) and message.error:
@@ -128,32 +130,45 @@ def failed_before(history: Sequence[User | Reply | Result]) -> str | None:
     return None
 
 
-def times_repeated(history: Sequence[User | Reply | Result]) -> int:
-    """In how many earlier replies the last result was had already, since the person spoke.
+def turn_of(history: Sequence[Message]) -> Sequence[Message]:
+    """The messages of the last turn, which the person's last message began."""
+    for place in range(len(history) - 1, -1, -1):
+        if isinstance(history[place], User):
+            return history[place:]
+    return history
 
-    That is: the same call, name and arguments, with the same answer.
+
+MOST_FAILING, MOST_ALIKE = 2, 3
+"""Replies in which a call may fail in the same way, and times a call may have the same answer,
+before the turn is stopped."""
+
+
+def is_repeated(history: Sequence[Message]) -> bool:
+    """Whether the last result shows a model that goes in circles, in this turn.
+
+    That is: the same call, name and arguments, had the same answer so often.
     """
     last = history[-1]
-    if not isinstance(last, Result):
-        return 0
-    turn = _turn(history)
+    if not isinstance(last, Result) or last.error == "skipped":
+        return False
+    turn = turn_of(history)
     alike = {
         m.call_id
         for m in turn
         if isinstance(m, Result) and (m.text, m.name) == (last.text, last.name)
     }
     if len(alike) == 1:
-        return 0
-    asked = [[c for c in m.calls if c.id in alike] for m in turn if isinstance(m, Reply)]
-    now = next(c.arguments for calls in asked for c in calls if c.id == last.call_id)
-    return sum(any(c.arguments == now for c in calls) for calls in asked) - 1
+        return False
+    replies = [[c for c in m.calls if c.id in alike] for m in turn if isinstance(m, Reply)]
+    now = next(c.arguments for calls in replies for c in calls if c.id == last.call_id)
+    same = [n for n in (sum(c.arguments == now for c in calls) for calls in replies) if n]
+    return sum(same) >= MOST_ALIKE or (bool(last.error) and len(same) >= MOST_FAILING)
 
 
-def _turn(history: Sequence[User | Reply | Result]) -> list[User | Reply | Result]:
-    """What came after the person's last message."""
-    turn: list[User | Reply | Result] = []
-    for message in reversed(history):
-        if isinstance(message, User):
-            break
-        turn.append(message)
-    return turn
+def closed(history: History, why: str) -> History:
+    """The history with a result for each call that has none, so that any provider takes it."""
+    open_calls = unanswered(history)
+    return (
+        *history,
+        *(Result(call_id=c.id, name=c.name, text=why, error="refused") for c in open_calls),
+    )

@@ -1,12 +1,13 @@
-"""How a run ends: four types, each with every message there was. A limit is one of them."""
+"""How a turn ends: four types, each with every message and the world. A limit is one of them."""
 
 from dataclasses import dataclass
 from typing import Literal
 
+from ..tools.world import World
 from .messages import Call, History
 
 StopKind = Literal["limit", "repeat", "model", "tool", "fleet"]
-"""limit: a bound of this run; repeat: the same call with the same answer, twice if it failed, three
+"""limit: a bound of this turn; repeat: the same call with the same answer, twice if it failed, three
 times if not; model, tool, fleet: they failed."""
 
 
@@ -15,15 +16,18 @@ class Answered:
     """The model has finished; `text` is its last word."""
 
     messages: History
+    world: World
     text: str
 
 
 @dataclass(frozen=True)
 class Paused:
-    """A person must answer `call`: a question, or leave to move robots. Run again to go on."""
+    """A person must answer `call`: a question, or leave to move robots to the plan `plan_id`."""
 
     messages: History
+    world: World
     call: Call
+    plan_id: str | None = None
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class Stopped:
     """Ended early; `reason` is one sentence, `error` what a broken tool raised."""
 
     messages: History
+    world: World
     kind: StopKind
     reason: str
     error: BaseException | None = None
@@ -41,6 +46,7 @@ class Cancelled:
     """Interrupted from outside."""
 
     messages: History
+    world: World
 
 
 Outcome = Answered | Paused | Stopped | Cancelled

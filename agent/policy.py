@@ -1,6 +1,7 @@
 """Which tool calls may go ahead, which wait for a person, which are refused.
 
-A policy can only be stricter than the tools are: questions always wait, and so do real robots.
+A policy can only be stricter than the tools are: questions always wait, and so do real robots,
+whose plan the tool that moves them wants approved.
 """
 
 from dataclasses import dataclass
@@ -9,7 +10,6 @@ from typing import Literal
 
 from ..tools.errors import InputError
 from ..tools.tool import Tool
-from ..tools.world import Workspace
 
 Decision = Literal["allow", "ask", "refuse"]
 DECISIONS: tuple[Decision, ...] = ("allow", "ask", "refuse")
@@ -33,14 +33,8 @@ class Policy:
                     f"{glob}={decision} is no rule of a policy: say allow, ask or refuse."
                 )
 
-    def decide(self, tool: Tool, workspace: Workspace) -> Decision:
+    def decide(self, tool: Tool) -> Decision:
         """What is to happen with a call of a tool."""
         rules = [decision for glob, decision in self.rules if fnmatchcase(tool.name, glob)]
-        wanted = (rules[0] if rules else DECISIONS[0], _least(tool, workspace))
-        return DECISIONS[max(map(DECISIONS.index, wanted))]
-
-
-def _least(tool: Tool, workspace: Workspace) -> Decision:
-    """What the tool itself wants: a person answers questions, and moves real robots."""
-    real = workspace.settings.fleet != "simulated"
-    return "ask" if tool.kind == "ask" or (tool.kind == "actuate" and real) else "allow"
+        least = "ask" if tool.kind == "ask" else "allow"
+        return DECISIONS[max(map(DECISIONS.index, (*rules[:1], least)))]

@@ -1,6 +1,7 @@
 """What a run came to, as one value: the object `formup run --json` prints."""
 
 import json
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
@@ -11,18 +12,19 @@ from ..tools.formation.contract import Contract
 from ..tools.formation.plan import Plan, Shortfall
 from ..tools.formation.units import in_metres, with_metres
 from ..tools.perception.referring.attributes import Candidate
-from ..tools.scene import Box, Scene, Target
-from ..tools.store import rings
-from ..tools.world import Workspace
-from .messages import History, Reply, Result
-from .outcomes import Cancelled, Outcome, Paused, Stopped
+from ..tools.context import Context
+from ..tools.perception.target_prompt import Box
+from ..tools.world import Target, World, rounded_rings
+from .messages import History, Message, Reply, Result, turn_of
+from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 
 Status = Literal[
-    "deployed", "planned", "needs_approval", "question", "impossible", "stopped", "failed"
+    "deployed", "planned", "answered", "needs_approval", "question", "impossible", "stopped", "failed"
 ]
 EXIT_CODES: dict[Status, int] = {
     "deployed": 0,
     "planned": 0,
+    "answered": 0,
     "question": 3,
     "impossible": 3,
     "needs_approval": 3,
@@ -62,6 +64,8 @@ class Report(BaseModel):
     candidates: tuple[dict[str, Any], ...] | None = None
     contract: Contract | None = None
     plan_id: str | None = None
+    parent: str | None = None
+    robots: tuple[str, ...] | None = None
     positions: tuple[tuple[float, float], ...] | None = None
     verdict: Verdict | None = None
     partial: Shortfall | None = None
@@ -82,12 +86,12 @@ class Report(BaseModel):
 METRIC_FRAME = "metres, x right, y down, 0, 0 is the centre of the picture's top left pixel"
 
 
-def metric_data(scene: Scene, plan: Plan | None, arrival: Arrival | None) -> dict[str, Any] | None:
+def metric_data(world: World, plan: Plan | None, arrival: Arrival | None) -> dict[str, Any] | None:
     """What a report says in metres; None where the scale is not known.
 
     Positions as planned and as observed, how far off each is, and the certificate's measures.
     """
-    scale = scene.metres_per_pixel
+    scale = world.metres_per_pixel
     if scale is None:
         return None
     data: dict[str, Any] = {"metres_per_pixel": scale, "frame": METRIC_FRAME}
@@ -104,13 +108,13 @@ def metric_data(scene: Scene, plan: Plan | None, arrival: Arrival | None) -> dic
 
 def target_data(target: Target) -> dict[str, Any]:
     """A target as the report shows it."""
-    outline, holes = rings(target)
+    outline, holes = rounded_rings(target.outline)
     return {
         "id": target.id,
         "label": target.label,
         "box": _box(target.box),
         "confidence": target.confidence,
-        "parts": dict(target.parts),
+        "parts": target.parts,
         "outline": outline,
         "holes": holes,
     }
@@ -135,48 +139,60 @@ def candidate_choice(candidate: Candidate) -> dict[str, Any]:
 
 
 def make_report(
-    outcome: Outcome, workspace: Workspace, instruction: str, model: str, seconds: float
+    outcome: Outcome, context: Context, began: World, model: str, seconds: float
 ) -> Report:
-    """What a run that ended so has come to, after so many seconds."""
-    picture = workspace.scene.picture
-    plan = _plan(outcome, workspace)
-    arrival = workspace.arrivals.get(plan.id) if plan else None
-    status, message = _status(outcome, workspace, plan)
+    """What a turn that ended so has come to.
+
+    Args:
+        context: with the world as the turn left it.
+        began: the world when the turn began.
+        model: its name.
+        seconds: that the turn has taken.
+    """
+    world = context.world
+    arrivals = {n: a for n, a in world.arrivals.items() if began.arrivals.get(n) is not a}
+    plan = _plan(outcome, world, arrivals)
+    arrival = arrivals.get(plan.id) if plan else None
+    status, message = _status(outcome, plan, arrival)
     return Report(
         status=status,
         message=message,
-        instruction=instruction,
-        image={"sha256": picture.sha256, "width": picture.width, "height": picture.height},
-        targets=tuple(target_data(t) for t in workspace.scene.targets),
-        candidates=_candidates(outcome, workspace),
+        instruction=context.words,
+        image=world.picture.model_dump(),
+        targets=tuple(target_data(t) for t in world.targets),
+        candidates=_candidates(outcome, context),
         contract=plan.formation.contract if plan else None,
         plan_id=plan.id if plan else None,
+        parent=world.plans[plan.id].parent if plan else None,
         positions=plan.formation.positions if plan else None,
+        robots=plan.formation.robots or None if plan else None,
         verdict=plan.verdict if plan else None,
         partial=plan.partial if plan else None,
         arrival=arrival,
-        metric=metric_data(workspace.scene, plan, arrival),
+        metric=metric_data(world, plan, arrival),
         model=model,
-        usage=_totals(outcome.messages, seconds),
+        usage=_totals(turn_of(outcome.messages), seconds),
     )
 
 
-def _plan(outcome: Outcome, workspace: Workspace) -> Plan | None:
+def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Plan | None:
     """The plan deployed last, else the one a report names, else the last proposed; none void.
 
     A partial plan is shown only where it is named.
     """
-    if workspace.arrivals:
-        return workspace.plans[list(workspace.arrivals)[-1]]
-    version, named = workspace.scene.version, _named(outcome.messages)
-    valid = [p for p in workspace.plans.values() if p.formation.scene_version == version]
+    if arrivals:
+        return world.plans[list(arrivals)[-1]].plan
+    version, named = world.version, _named(outcome.messages)
+    plans = [node.plan for node in world.plans.values()]
+    valid = [p for p in plans if p.formation.scene_version == version]
     whole = [p for p in valid if p.partial is None]
-    meant = [p for p in valid if p.id == named] or whole
+    standing = [p for p in whole if p.id == world.current] or whole
+    meant = [p for p in valid if p.id == named] or standing
     return meant[-1] if meant else None
 
 
 def _named(messages: History) -> str | None:
-    """The plan that the report which closed the run names."""
+    """The plan that the report which ended the turn names."""
     last = messages[-1] if messages else None  # none where a run was killed before its first
     if not isinstance(last, Result) or last.name != "report_impossible" or last.error:
         return None
@@ -184,22 +200,29 @@ def _named(messages: History) -> str | None:
     return next(c.arguments.get("plan_id") for c in calls if c.id == last.call_id)
 
 
-def _status(outcome: Outcome, workspace: Workspace, plan: Plan | None) -> tuple[Status, str]:
-    arrival = workspace.arrivals.get(plan.id) if plan else None
-    if arrival is not None:  # robots have moved, whatever was said after that
-        arrived = arrival.arrived and not isinstance(outcome, Stopped)
-        return ("deployed" if arrived else "failed"), _last_words(outcome)
+def _status(outcome: Outcome, plan: Plan | None, arrival: Arrival | None) -> tuple[Status, str]:
+    text = _last_words(outcome)
+    if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
+        # Robots have moved, whatever happened after that.
+        return ("deployed" if arrival.arrived else "failed"), _with_arrival(outcome, arrival, text)
     if isinstance(outcome, Paused):
         asked = outcome.call.name == "ask_user"
-        return ("question" if asked else "needs_approval"), _last_words(outcome)
+        return ("question" if asked else "needs_approval"), text
     if isinstance(outcome, Stopped):
         ours = outcome.kind in ("limit", "repeat")
-        return ("stopped" if ours else "failed"), outcome.reason
+        return ("stopped" if ours else "failed"), text
     if isinstance(outcome, Cancelled):
-        return "stopped", _last_words(outcome)
+        return "stopped", text
     given_up = isinstance(outcome.messages[-1], Result)
     certified = plan is not None and plan.verdict.certified
-    return ("planned" if certified and not given_up else "impossible"), _last_words(outcome)
+    return ("planned" if certified and not given_up else "impossible"), text
+
+
+def _with_arrival(outcome: Outcome, arrival: Arrival, text: str) -> str:
+    """What was observed, before what ended the turn after that."""
+    if isinstance(outcome, Answered) or not arrival.arrived:
+        return text
+    return f"All robots had arrived. {text}"
 
 
 def _last_words(outcome: Outcome) -> str:
@@ -207,7 +230,8 @@ def _last_words(outcome: Outcome) -> str:
         call = outcome.call
         if call.name == "ask_user":
             return str(call.arguments["question"])
-        return f"A person must approve {call.name} of {json.dumps(call.arguments)}."
+        plan = f" It is for plan {outcome.plan_id}." if outcome.plan_id else ""
+        return f"A person must approve {call.name} of {json.dumps(call.arguments)}.{plan}"
     if isinstance(outcome, Stopped):
         return outcome.reason
     if isinstance(outcome, Cancelled):
@@ -215,18 +239,18 @@ def _last_words(outcome: Outcome) -> str:
     return outcome.text
 
 
-def _candidates(outcome: Outcome, workspace: Workspace) -> tuple[dict[str, object], ...] | None:
+def _candidates(outcome: Outcome, context: Context) -> tuple[dict[str, object], ...] | None:
     """What a question offers, in its order; ids that mean nothing are left out."""
     if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
         return None
     named = outcome.call.arguments.get("candidates", ())
-    known = {t.id: target_choice(t) for t in workspace.scene.targets}
+    known = {t.id: target_choice(t) for t in context.world.targets}
     if any(n not in known for n in named):
-        known |= {c.id: candidate_choice(c) for c in workspace.candidates()}
+        known |= {c.id: candidate_choice(c) for c in context.candidates()}
     return tuple(known[n] for n in named if n in known)
 
 
-def _totals(messages: History, seconds: float) -> Totals:
+def _totals(messages: Sequence[Message], seconds: float) -> Totals:
     replies = [m for m in messages if isinstance(m, Reply)]
     return Totals(
         requests=len(replies),

@@ -1,76 +1,285 @@
-"""A run as a value, read back from its trace, and what a person may say for it to go on."""
+"""A session: an event log and what folds out of it, messages, world and settings, turn by turn.
 
-from dataclasses import dataclass
+A turn is what the person says until the loop has answered, paused or stopped. Whatever happens is
+written down before anything follows from it, so that the log opens again after a kill.
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
+from pydantic import ValidationError
 
-from ..tools.errors import InputError
-from ..tools.perception.image import Picture
-from ..tools.store import restore
-from ..tools.world import Settings, Workspace
+from ..tools.context import Artefacts, Context, Services, Settings
+from ..tools.errors import InputError, StorageError
+from ..tools.perception.image import Picture, load_picture, picture_file, picture_from_file
+from ..tools.world import World
 from .calls import refused
-from .messages import Call, History, Reply, Result, unanswered
-from .outcomes import Answered, Cancelled, Outcome, Paused, StopKind, Stopped
+from .loop import Approval, NoRecorder
+from .messages import HISTORY, Call, History, Message, Reply, Result, unanswered
+from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .report import Report, make_report
-from .store.folder import Trace, read_trace
+from .store.folder import PICTURES, FolderArtefacts, FolderLog, log_path, read_events
+from .store.protocol import Event, EventLog
 
+FORMAT = "formup-session-1"
 MAX_TEXT = 4_000
 """Characters of what a person says; longer texts are no instruction, and cost their reader."""
+
+Show = Callable[[Message], None]
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run as far as it came: its report, how it ended, what it worked on, its trace."""
+    """A session as far as its last turn came.
+
+    Attributes:
+        report: what came of that turn.
+        outcome: how it ended, with the messages and the world.
+        context: with the world, the settings and the services to go on with.
+        began: the world when the turn began.
+        trace: the log, if there is one.
+    """
 
     report: Report
     outcome: Outcome
-    workspace: Workspace
+    context: Context
+    began: World
     trace: Path | None = None
+
+    @property
+    def world(self) -> World:
+        """All that is known and decided."""
+        return self.outcome.world
+
+
+@dataclass(frozen=True)
+class State:
+    """What folds out of the events of a log.
+
+    Attributes:
+        facts: what the session began with: model, prompts, limits, policy, picture.
+        words: of the last turn.
+        began: the world when that turn began.
+        seconds: how long that turn has run, pauses aside.
+        end: how it ended; None where it was killed.
+    """
+
+    facts: Mapping[str, Any]
+    settings: Settings
+    words: str
+    world: World
+    began: World
+    messages: History
+    seconds: float
+    end: Mapping[str, Any] | None
+
+
+def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
+    """The state after all events.
+
+    Raises:
+        InputError: they are no session, or a picture of a message is missing.
+        ValidationError, KeyError, TypeError, ValueError: they are damaged.
+    """
+    facts = events[0].data
+    if events[0].kind != "session" or facts["format"] != FORMAT:
+        raise ValueError
+    world = began = World.model_validate({"picture": facts["picture"]["facts"]})
+    settings, words, end = Settings(), "", None
+    lines: list[Mapping[str, Any]] = []
+    seconds = last = 0.0
+    for event in events[1:]:
+        if event.kind in ("turn", "resume"):
+            seconds = 0.0 if event.kind == "turn" else seconds + last
+        last = event.seconds
+        if event.kind == "turn":
+            settings = Settings.model_validate(event.data["settings"])
+            words, began = event.data["words"], world
+        elif event.kind == "approval" and event.data["plan_id"]:
+            settings = settings.model_copy(update={"approved": event.data["plan_id"]})
+        elif event.kind == "world":
+            world = world.with_changes(event.data["changes"])
+        elif event.kind == "message":
+            lines.append(event.data)
+        end = event.data if event.kind == "end" else None
+    if not words:
+        raise InputError("It was broken off before anything began; run again.")
+    messages = read_messages(lines, artefacts)
+    return State(facts, settings, words, world, began, messages, seconds + last, end)
+
+
+def read_messages(lines: Sequence[Mapping[str, Any]], artefacts: Artefacts | None) -> History:
+    """Messages from the data of their events; without artefacts their images are left out.
+
+    Raises:
+        StorageError: an image is missing, or not what it was.
+        ValidationError: they are no messages.
+    """
+    found: list[dict[str, Any]] = []
+    for line in lines:
+        images = [artefacts.get(i["sha256"]) for i in line["images"]] if artefacts else []
+        facts = {k: v for k, v in line.items() if k != "images"}
+        found.append(facts | ({} if line["role"] == "assistant" else {"images": images}))
+    return HISTORY.validate_python(found)
+
+
+def message_facts(message: Message) -> dict[str, Any]:
+    """A message as JSON, images as their hashes."""
+    images = () if isinstance(message, Reply) else message.images
+    facts = message.model_dump(mode="json", exclude={"images"}, exclude_defaults=True)
+    hashes = [{"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)} for data in images]
+    return {"role": message.role, **facts} | {"images": hashes}
+
+
+class LogRecorder(NoRecorder):
+    """Writes down what happens, and shows it.
+
+    Once robots have moved, a log that can no longer be written does not undo that: the turn goes
+    on, and `problem` says what was wrong.
+
+    Args:
+        log: None to write nothing down.
+        world: as the log has it already; None where it has nothing yet.
+    """
+
+    def __init__(
+        self, log: EventLog | None, artefacts: Artefacts, world: World | None, show: Show | None
+    ) -> None:
+        self._log, self._artefacts, self._world, self._show = log, artefacts, world, show
+        self._moved = False
+        self.problem: str | None = None
+
+    def event(self, kind: Any, data: Mapping[str, Any]) -> None:
+        """Write an event that changes no world."""
+        self._try(lambda log: log.append(kind, data))
+
+    def message(self, message: Message, world: World) -> None:
+        """Write a message after what has changed in the world, then show it."""
+        self.world(world)
+        self._try(lambda log: log.append("message", self._facts(message)))
+        if self._show is not None:
+            self._show(message)
+
+    def moving(self, plan_id: str, world: World) -> None:
+        """Write down that robots are about to move; if it cannot be, they do not."""
+        self.world(world)
+        self.event("moving", {"plan_id": plan_id})
+        self._moved = True
+
+    def world(self, world: World) -> None:
+        """Write what has changed in the world, if anything."""
+        changes = {} if world is self._world else world.changes_since(self._world)
+        if changes:
+            self.event("world", {"changes": changes})
+        self._world = world
+
+    def close(self) -> None:
+        """Let go of the log."""
+        if self._log is not None:
+            self._log.close()
+
+    def _facts(self, message: Message) -> dict[str, Any]:
+        for image in () if isinstance(message, Reply) else message.images:
+            self._artefacts.put(image)
+        return message_facts(message)
+
+    def _try(self, write: Callable[[EventLog], object]) -> None:
+        if self._log is None or self.problem is not None:
+            return
+        try:
+            write(self._log)
+        except InputError as error:
+            if not self._moved:
+                raise
+            self.problem = str(error)
 
 
 def load_run(path: str | Path, picture: Picture | None = None) -> Run:
-    """A run from its trace, as far as it had come: paused, stopped, or killed in the middle.
+    """A session from its log, as far as it had come: paused, stopped, or killed in the middle.
 
     Args:
-        path: of the trace, or of the folder with a trace.jsonl.
-        picture: what it works on, where that came from no file or has been moved.
+        path: of the log, or of the folder with a trace.jsonl.
+        picture: what it works on; None for the one stored beside the log, or else where it lay.
 
     Raises:
         InputError: it cannot be read, or the picture is not the same.
     """
-    trace = read_trace(Path(path))
+    path = log_path(Path(path))
+    artefacts = FolderArtefacts(path.parent / PICTURES)
     try:
-        settings, outcome = _settings(trace), _outcome(trace)
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{trace.path} is damaged: its settings or its end.") from None
-    stored, arrivals = trace.state()
-    workspace = restore(stored, picture, settings)
-    workspace.arrivals.update(arrivals)
-    start = trace.start
-    workspace.instruction = start["instruction"]
-    report = make_report(
-        outcome, workspace, start["instruction"], trace.model, round(trace.seconds, 3)
-    )
-    prompts = tuple(start.get("prompts", ()))
-    report = report.model_copy(update={"prompt": start["prompt"], "prompts": prompts})
-    return Run(report, outcome, workspace, trace.path)
+        state = fold(read_events(path), artefacts)
+        outcome = _outcome(state)
+    except StorageError:
+        raise
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except (ValidationError, KeyError, TypeError, ValueError, IndexError, AttributeError):
+        raise InputError(f"{path} is damaged; it is no whole session that formup wrote.") from None
+    services = Services.of(_picture(state.facts["picture"], artefacts, picture))
+    services.artefacts = artefacts
+    context = Context(state.world, services, state.settings, state.words).check()
+    report = make_report(outcome, context, state.began, model_name(state.facts), state.seconds)
+    prompts = {"prompt": state.facts["prompt"], "prompts": tuple(state.facts["prompts"])}
+    return Run(report.model_copy(update=prompts), outcome, context, state.began, path)
 
 
-def going_on(
+def model_name(facts: Mapping[str, Any]) -> str:
+    """The name of the model or, joined by a plus, of the two that shared the work."""
+    return "+".join(filter(None, (str(facts["model"]), facts.get("planner"))))
+
+
+def picture_facts(picture: Picture, artefacts: Artefacts) -> dict[str, Any]:
+    """What a log says of its picture, which is stored beside it."""
+    return {
+        "facts": World.of(picture).picture.model_dump(),
+        "name": picture.name,
+        "path": picture.path and str(picture.path),
+        "file": artefacts.put(picture_file(picture)),
+    }
+
+
+def _picture(facts: Mapping[str, Any], artefacts: Artefacts, given: Picture | None) -> Picture:
+    """The picture of a session, with the very content it began with."""
+    wanted = facts["facts"]["sha256"]
+    if given is None:
+        try:
+            data = artefacts.get(facts["file"])
+            given = picture_from_file(data, facts["name"], wanted)
+        except StorageError:
+            if facts["path"] is None or not Path(facts["path"]).is_file():
+                raise InputError(
+                    f"The picture {facts['name']} is neither beside the log nor where it lay; "
+                    "name it with --image."
+                ) from None
+            given = load_picture(facts["path"])
+    if given.sha256 != wanted:
+        raise InputError(
+            f"{given.path or given.name} is not the picture this was made for, or it has changed "
+            "since, which voids its targets and plans; run again on the new picture."
+        )
+    return given
+
+
+def answered_by(
     run: Run, answer: str | None, approve: bool | None
-) -> tuple[Result | None, Call | None]:
-    """What a person's word adds to the history, and the call it lets through.
+) -> tuple[Result | None, Approval | None]:
+    """What a person's answer adds to the history, and what it lets through.
 
     Raises:
-        InputError: the run is over, or waits for something else.
+        InputError: the turn is over, or waits for something else.
     """
     outcome = run.outcome
     if not isinstance(outcome, Paused):
         if answer is not None or approve is not None:
             raise InputError(f"The run asked nothing: it is {run.report.status}.")
         if isinstance(outcome, Answered):
-            raise InputError(f"The run is over: it is {run.report.status}; begin a new one.")
+            raise InputError(
+                f"The run is over: it is {run.report.status}; say what to do next, as in formup "
+                'resume FOLDER "and now the other one".'
+            )
         return None, None
     call = outcome.call
     if call.name == "ask_user":
@@ -81,7 +290,7 @@ def going_on(
     if approve is None:
         raise InputError(f"{run.report.message} Say yes or no; nothing was done.")
     if approve:
-        return None, call
+        return None, Approval(call, outcome.plan_id)
     why = f": {answer.strip()}" if answer and answer.strip() else "."
     return refused(call, f"A person said no{why}"), None
 
@@ -102,31 +311,17 @@ def check_text(name: str, text: str, advice: str) -> None:
         raise InputError(f"The {name} has {len(text):,} characters; {MAX_TEXT:,} can be read.")
 
 
-def _settings(trace: Trace) -> Settings:
-    facts = dict(trace.start["settings"])
-    starts = facts.pop("starts")
-    return Settings(**facts, starts=None if starts is None else np.asarray(starts, float))
-
-
-def _outcome(trace: Trace) -> Outcome:
-    """How a run ended or was left; one that was killed was cancelled from outside."""
-    messages, end = trace.messages(), trace.end
+def _outcome(state: State) -> Outcome:
+    """How a turn ended or was left; one that was killed was cancelled from outside."""
+    messages, world, end = state.messages, state.world, state.end
     last = messages[-1] if messages else None
     if isinstance(last, Reply) and not last.calls:
-        return Answered(messages, last.text)
+        return Answered(messages, world, last.text)
     if end is None or end["outcome"] == "cancelled":
-        return Cancelled(messages)
+        return Cancelled(messages, world)
     if end["outcome"] == "paused":
-        return Paused(messages, _waiting(messages, trace))
+        return Paused(messages, world, unanswered(messages)[0], end["plan_id"])
     if end["outcome"] == "stopped":
-        kind: StopKind = end["kind"]
-        return Stopped(messages, kind, end["reason"])
+        return Stopped(messages, world, end["kind"], end["reason"])
     assert isinstance(last, Result)
-    return Answered(messages, last.told or last.text)
-
-
-def _waiting(messages: History, trace: Trace) -> Call:
-    calls = unanswered(messages)
-    if not calls:
-        raise InputError(f"{trace.path} is damaged: it waits for a call that is not there.")
-    return calls[0]
+    return Answered(messages, world, last.message or last.text)

@@ -4,11 +4,12 @@ Services hold what is not state: pixels, the networks and rules that find and me
 fleet, and caches by content hash. Whatever a tool finds out or decides goes into the next world.
 """
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, Protocol
 
-from .errors import ToolError
+from .errors import StorageError, ToolError
 from .fleet.protocol import Fleet
 from .fleet.registry import FLEETS
 from .formation.units import check_scale
@@ -61,6 +62,45 @@ class Settings(Value):
     metres_per_pixel: float | None = None
 
 
+class Artefacts(Protocol):
+    """Files by the hash of their content: pictures, and the tracks of robots on their way."""
+
+    def put(self, data: bytes) -> str:
+        """Store a file and return the SHA-256 of its content, hex.
+
+        Raises:
+            StorageError: it cannot be written.
+        """
+        ...
+
+    def get(self, sha256: str) -> bytes:
+        """A file's content.
+
+        Raises:
+            StorageError: it is missing, or not what it was.
+        """
+        ...
+
+
+class MemoryArtefacts:
+    """Files that are gone when the program ends."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, bytes] = {}
+
+    def put(self, data: bytes) -> str:
+        """See `Artefacts.put`."""
+        sha256 = hashlib.sha256(data).hexdigest()
+        self._files[sha256] = data
+        return sha256
+
+    def get(self, sha256: str) -> bytes:
+        """See `Artefacts.get`."""
+        if sha256 not in self._files:
+            raise StorageError(f"There is no file {sha256[:16]} in memory.")
+        return self._files[sha256]
+
+
 @dataclass
 class Services:
     """What tools use beside the world; nothing in here decides what happens.
@@ -68,10 +108,13 @@ class Services:
     Attributes:
         pictures: those of the conversation, by their hash.
         fleets: the robots in use, by the name of their fleet.
+        artefacts: files that events and the world name by their hash.
+        found: what detectors found in pictures, by detector and picture.
     """
 
     pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
     fleets: dict[str, Fleet] = field(default_factory=dict[str, Fleet])
+    artefacts: Artefacts = field(default_factory=MemoryArtefacts)
     found: dict[tuple[str, str], tuple[Candidate, ...]] = field(
         default_factory=dict[tuple[str, str], tuple[Candidate, ...]]
     )
@@ -82,8 +125,8 @@ class Services:
         return cls({picture.sha256: picture})
 
 
-def _ignore(world: World) -> None:
-    """Nobody keeps what a tool observes."""
+def _ignore(*what: object) -> None:
+    """Nobody keeps what a tool observes, or that robots move."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +137,7 @@ class Context:
         words: what the person said last; the contract is held against it.
         observed: puts a world in place at once, because what it says was observed and holds even
             if the call fails or is cut off: measured things, poses of robots.
+        moving: is called with a plan's id before the first motion; raising prevents it.
     """
 
     world: World
@@ -101,6 +145,7 @@ class Context:
     settings: Settings = Settings()
     words: str = ""
     observed: Callable[[World], None] = _ignore
+    moving: Callable[[str], None] = _ignore
 
     @classmethod
     def of(

@@ -2,9 +2,11 @@
 
 FormupError
 ├── InputError     a person gave something that cannot be used; the text says what would do
-│   └── ImageError     the picture file: missing, broken, too large, of a foreign format
+│   ├── ImageError     the picture file: missing, broken, too large, of a foreign format
+│   └── StorageError   a log, state or artefact that cannot be read or written
 ├── ToolError      a model asked a tool for something it cannot do; goes back to the model
 │   └── ArgumentsError the arguments are against the tool's schema
+├── ApprovalError  a person must approve a plan before real robots move
 ├── ModelError     a model or its provider failed, or does not exist
 └── FleetError     robots could not be moved or observed
 """
@@ -20,6 +22,10 @@ class InputError(FormupError):
 
 class ImageError(InputError):
     """A picture that cannot be loaded safely."""
+
+
+class StorageError(InputError):
+    """A log, a state file or an artefact that cannot be read or written."""
 
 
 class ToolError(FormupError):
@@ -39,6 +45,18 @@ class ToolError(FormupError):
 
 class ArgumentsError(ToolError):
     """Arguments against the tool's schema; the text names every violation."""
+
+
+class ApprovalError(FormupError):
+    """Real robots wait for a person's approval of exactly this plan.
+
+    Attributes:
+        plan_id: of the plan.
+    """
+
+    def __init__(self, plan_id: str) -> None:
+        super().__init__(f"Plan {plan_id} moves real robots and waits for a person's approval.")
+        self.plan_id = plan_id
 
 
 class ModelError(FormupError):

@@ -1,6 +1,6 @@
-"""A workspace as JSON and back: the state file of single tool calls, and plan.json.
+"""A world as a file and back: the state file of single tool calls, and plan.json.
 
-Pictures are not stored but named, with their hash; reading refuses one that has changed.
+Pictures are not in it but named, with their hash; reading refuses one that has changed.
 """
 
 import hashlib
@@ -9,185 +9,138 @@ import secrets
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 from pydantic_core import to_json
 
-from .errors import ImageError, InputError
-from .formation.plan import Plan
+from .errors import ImageError, InputError, StorageError
 from .formation.value import Value
-from .geometry.outline import make_outline
 from .perception.image import Picture, load_picture
-from .perception.target_prompt import Box, Point, TargetPrompt
-from .scene import Scene, Target
 from .tool import violations
-from .world import Settings, Workspace
+from .world import World, to_json_values
 
-FORMAT = "formup/1"
+FORMAT = "formup/2"
 MAX_BYTES = 64 << 20
 
 
-class StoredTarget(Value):
-    """A target with its outline as rings of points."""
+class StoredWorld(Value):
+    """A world as a file holds it.
 
-    later = frozenset({"source"})
-    id: str
-    label: str
-    box: Box
-    confidence: float
-    prompt: str
-    parts: dict[str, float]
-    missed: tuple[Point, ...] = ()
-    outline: tuple[Point, ...]
-    holes: tuple[tuple[Point, ...], ...]
-    source: TargetPrompt | None = None
+    Attributes:
+        digest: of the content, by which an alteration shows.
+        plan_id: the plan that a plan.json is for.
+        instruction: that the plan is for.
+        picture: where the picture lay; beside the file, in `pictures`, it is looked for first.
+    """
 
-
-class StoredImage(Value):
-    """Where the picture lies and what it must be, and its scale if that is known."""
-
-    later = frozenset({"metres_per_pixel"})
-    path: str | None
-    sha256: str
-    width: int
-    height: int
-    metres_per_pixel: float | None = None
-
-
-class Stored(Value):
-    """All of a workspace but its settings; `plan_id` names the plan a plan.json is for."""
-
-    later = frozenset({"unseen"})
     format: str = FORMAT
     digest: str = ""
     plan_id: str | None = None
     instruction: str | None = None
-    image: StoredImage
-    targets: tuple[StoredTarget, ...] = ()
-    pointed: tuple[TargetPrompt, ...] = ()
-    samples: dict[str, tuple[Point, ...]] = Field(default_factory=dict)
-    plans: dict[str, Plan] = Field(default_factory=dict)
-    unseen: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    picture: str | None = None
+    world: World
 
-    def sealed(self) -> "Stored":
-        """The same with the digest of its content, by which an alteration shows."""
-        blank = self.model_copy(update={"digest": ""})
-        digest = hashlib.sha256(to_json(blank)).hexdigest()
-        return self.model_copy(update={"digest": digest})
+    def to_bytes(self) -> bytes:
+        """The file's content."""
+        content = to_json_values(self)
+        content["format"] = self.format
+        content["digest"] = _digest(content)
+        return json.dumps(content, indent=1, ensure_ascii=False).encode()
 
 
-def store(
-    workspace: Workspace, *, plan_id: str | None = None, instruction: str | None = None
-) -> Stored:
-    """The workspace as a value; with a plan id only that plan is kept."""
-    picture = workspace.scene.picture
-    plans = workspace.plans if plan_id is None else {plan_id: workspace.plans[plan_id]}
-    return Stored(
-        plan_id=plan_id,
-        instruction=instruction,
-        image=StoredImage(
-            path=None if picture.path is None else str(picture.path),
-            sha256=picture.sha256,
-            width=picture.width,
-            height=picture.height,
-            metres_per_pixel=workspace.scene.metres_per_pixel,
-        ),
-        targets=tuple(_stored_target(t) for t in workspace.scene.targets),
-        pointed=workspace.pointed,
-        samples={name: tuple(map(tuple, p.tolist())) for name, p in workspace.samples.items()}
-        if plan_id is None
-        else {},
-        plans=plans,
-        unseen={name: who for name, who in workspace.unseen.items() if name in plans},
-    ).sealed()
+def plan_file(world: World, plan_id: str, instruction: str, picture: Picture) -> bytes:
+    """A plan.json: one plan with all it depends on, to be approved and deployed as it is."""
+    one = world.having(
+        plans={plan_id: world.plans[plan_id]},
+        current=plan_id,
+        samples={},
+        shown=(),
+        doubted=None,
+        arrivals={n: a for n, a in world.arrivals.items() if n == plan_id},
+    )
+    lay = picture.path and str(picture.path)
+    stored = StoredWorld(plan_id=plan_id, instruction=instruction, picture=lay, world=one)
+    return stored.to_bytes()
 
 
-def read_stored(path: Path) -> Stored:
+def read_world(path: Path) -> StoredWorld:
     """Read a state file or a plan.json.
 
     Raises:
-        InputError: missing, no JSON, of another format, or altered.
+        StorageError: missing, no JSON, of another format, damaged or altered.
     """
     try:
         data: Any = json.loads(read_text(path))
     except (ValueError, RecursionError):
-        raise InputError(f"{path} is not JSON; a file written by formup is needed.") from None
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError(f"{path} is no formup file of format {FORMAT!r}.")
-    return checked(cast(object, data), path)
-
-
-def checked(data: object, path: Path) -> Stored:
-    """What was stored, if it is as it was written.
-
-    Args:
-        path: of the file it comes from, for messages.
-
-    Raises:
-        InputError: damaged or altered.
-    """
+        raise StorageError(f"{path} is not JSON; a file written by formup is needed.") from None
+    if not isinstance(data, dict) or cast(Any, data).get("format") != FORMAT:
+        raise StorageError(f"{path} is no formup file of format {FORMAT!r}.")
+    content = cast(dict[str, Any], data)
     try:
-        stored = Stored.model_validate(data)
-        sealed = stored.sealed()
+        stored = StoredWorld.model_validate(content)
+        digest = _digest(content)
     except ValidationError as error:
-        raise InputError(f"{path} is damaged: {violations(error)}") from None
+        raise StorageError(f"{path} is damaged: {violations(error)}") from None
     except ValueError:
-        raise InputError(f"{path} is damaged: it holds text that is not Unicode.") from None
-    ids = [target.id for target in stored.targets]
-    altered = [name for name, plan in stored.plans.items() if plan.id != name]
-    if stored.digest != sealed.digest or altered or len(set(ids)) < len(ids):
-        raise InputError(
+        raise StorageError(f"{path} is damaged: it holds text that is not Unicode.") from None
+    world = stored.world
+    altered = [name for name, node in world.plans.items() if node.plan.id != name]
+    ids = [target.id for target in world.targets]
+    if stored.digest != digest or altered or len(set(ids)) < len(ids):
+        raise StorageError(
             f"{path} was altered after formup wrote it, so its plans are not certified; "
             "make the plan again."
         )
     return stored
 
 
+def picture_of(stored: StoredWorld, path: Path, given: Picture | None = None) -> Picture:
+    """The picture that a stored world is about.
+
+    Args:
+        path: of the file it was read from.
+        given: the picture a person names; None to look beside the file and where it lay.
+
+    Raises:
+        ImageError: there is none, or it cannot be loaded.
+        InputError: it has changed since.
+    """
+    wanted = stored.world.picture.sha256
+    if given is None:
+        beside = next(path.parent.glob(f"pictures/{wanted[:16]}.*"), None)
+        lay = Path(stored.picture) if stored.picture is not None else None
+        if beside is None and (lay is None or not lay.is_file()):
+            where = f": it is no longer at {lay}" if lay else ""
+            raise ImageError(f"The picture of {path} is not beside it{where}; name it with --image.")
+        given = load_picture(beside or cast(Path, lay))
+    if given.sha256 != wanted:
+        raise InputError(
+            f"{given.path or given.name} is not the picture this was made for, or it has changed "
+            "since, which voids its targets and plans; run again on the new picture."
+        )
+    return given
+
+
+def _digest(content: dict[str, Any]) -> str:
+    """SHA-256 of a file's content as it is written, but for the digest in it."""
+    return hashlib.sha256(to_json(content | {"digest": ""})).hexdigest()
+
+
 def read_text(path: Path) -> str:
     """The text of a file a person named.
 
     Raises:
-        InputError: missing, no regular file, too large, not readable or not UTF-8.
+        StorageError: missing, no regular file, too large, not readable or not UTF-8.
     """
     try:
         if path.exists() and not path.is_file():
-            raise InputError(f"{path} is no file that can be read.")
+            raise StorageError(f"{path} is no file that can be read.")
         if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path} has more than {MAX_BYTES >> 20} MiB.")
+            raise StorageError(f"{path} has more than {MAX_BYTES >> 20} MiB.")
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}.") from None
+        raise StorageError(f"{path}: {error.strerror or error}.") from None
     except UnicodeDecodeError:
-        raise InputError(f"{path} is not JSON or text in UTF-8.") from None
-
-
-def restore(stored: Stored, picture: Picture | None, settings: Settings) -> Workspace:
-    """The workspace again, on `picture` or on what lies where its own lay.
-
-    Raises:
-        ImageError: the picture cannot be loaded.
-        InputError: the picture has changed since.
-    """
-    if picture is None:
-        if stored.image.path is None:
-            raise ImageError("The stored scene names no picture file; give one.")
-        picture = load_picture(stored.image.path)
-    if picture.sha256 != stored.image.sha256:
-        shown = picture.path or picture.name
-        raise InputError(
-            f"{shown} is not the picture this was made for, or it has changed since, which voids "
-            "its targets and plans; run again on the new picture."
-        )
-    return Workspace(
-        scene=Scene(
-            picture, tuple(_target(t) for t in stored.targets), stored.image.metres_per_pixel
-        ),
-        settings=settings,
-        pointed=stored.pointed,
-        plans=dict(stored.plans),
-        unseen=dict(stored.unseen),
-        samples={name: np.asarray(p, dtype=float) for name, p in stored.samples.items()},
-    )
+        raise StorageError(f"{path} is not JSON or text in UTF-8.") from None
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -196,7 +149,7 @@ def write_whole(path: Path, data: bytes) -> None:
     What is no file, such as /dev/stdout, is written to and stays what it is; a link is followed.
 
     Raises:
-        InputError: it cannot be written there.
+        StorageError: it cannot be written there.
     """
     try:
         if path.exists() and not path.is_file() and not path.is_dir():
@@ -212,44 +165,4 @@ def write_whole(path: Path, data: bytes) -> None:
             part.unlink(missing_ok=True)
             raise
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
-
-
-def rings(target: Target) -> tuple[list[list[float]], list[list[list[float]]]]:
-    """A target's exterior and holes as JSON, rounded to what they are known to."""
-    polygon = target.outline.polygon
-    shapes: list[Any] = [polygon.exterior, *polygon.interiors]
-    points = [[[round(x, 3), round(y, 3)] for x, y in ring.coords[:-1]] for ring in shapes]
-    return points[0], points[1:]
-
-
-def _stored_target(target: Target) -> StoredTarget:
-    polygon = target.outline.polygon
-    return StoredTarget(
-        id=target.id,
-        label=target.label,
-        box=target.box,
-        confidence=target.confidence,
-        prompt=target.prompt,
-        parts=dict(target.parts),
-        missed=target.missed,
-        source=target.source,
-        outline=tuple((float(x), float(y)) for x, y in polygon.exterior.coords[:-1]),
-        holes=tuple(
-            tuple((float(x), float(y)) for x, y in ring.coords[:-1]) for ring in polygon.interiors
-        ),
-    )
-
-
-def _target(stored: StoredTarget) -> Target:
-    return Target(
-        id=stored.id,
-        label=stored.label,
-        box=stored.box,
-        confidence=stored.confidence,
-        outline=make_outline(stored.outline, stored.holes),
-        prompt=stored.prompt,
-        parts=tuple(stored.parts.items()),
-        missed=stored.missed,
-        source=stored.source,
-    )
+        raise StorageError(f"{path} cannot be written: {error.strerror or error}.") from None

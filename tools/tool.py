@@ -98,11 +98,11 @@ class Tool:
         if inspect.iscoroutinefunction(self.function):
             answer = await self.function(context, **values)
         else:
-            answer = await _in_thread(lambda: self.function(context, **values))
+            answer = await in_thread(lambda: self.function(context, **values))
         return answer if isinstance(answer, ToolResult) else ToolResult(dict(answer))
 
 
-async def _in_thread(work: Callable[[], Any]) -> Any:
+async def in_thread(work: Callable[[], Any]) -> Any:
     """Run without blocking the event loop, so that time limits and Ctrl-C work.
 
     A daemon thread of its own: no pool waits at the end of the program for one that hangs.

@@ -33,6 +33,16 @@ def outline_rings(outline: Outline) -> dict[str, Any]:
     return {"outline": rings[0]} | ({"holes": rings[1:]} if rings[1:] else {})
 
 
+def rounded_rings(outline: Outline) -> tuple[list[Any], list[Any]]:
+    """The ring around an outline and those around its holes, rounded to what they are known to."""
+    rings = outline_rings(outline)
+    rounded = [
+        [[round(x, 3), round(y, 3)] for x, y in ring]
+        for ring in (rings["outline"], *rings.get("holes", ()))
+    ]
+    return rounded[0], rounded[1:]
+
+
 def _read_outline(value: Any) -> Outline:
     if isinstance(value, Outline):
         return value

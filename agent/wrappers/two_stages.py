@@ -7,11 +7,13 @@ the history alone, so that a run can be resumed and replayed like any other.
 
 import json
 
-from ...prompts import Prompt
+from ...prompts import Prompt, PromptError, PromptLibrary
 from ...tools.builtin import TOOLS
+from ...tools.errors import InputError
 from ...tools.tool import Tool
 from ..messages import History, Reply, Result, User
 from ..model import Model, Request
+from ..providers.registry import model_named
 
 STANDARD = frozenset(tool.name for tool in TOOLS)
 
@@ -65,6 +67,43 @@ class TwoStages:
             close = getattr(model, "aclose", None)
             if close is not None:
                 await close()
+
+
+def prompt_named(library: PromptLibrary, name: str) -> Prompt:
+    """The prompt of a name, which a run gives no values.
+
+    Raises:
+        InputError: there is none, or it wants values.
+    """
+    try:
+        prompt = library.load(name)
+        prompt.render()
+    except PromptError as error:
+        raise InputError(str(error)) from None
+    return prompt
+
+
+def staged(
+    looker: Model,
+    planner: str | Model,
+    base_url: str | None,
+    plan: str,
+    library: PromptLibrary,
+) -> tuple[TwoStages, tuple[Prompt, ...]]:
+    """Two models as one, and their prompts.
+
+    Raises:
+        InputError: an unknown model or prompt, or a model that reads no prompt.
+    """
+    second = model_named(planner, base_url) if isinstance(planner, str) else planner
+    blind = [m.name for m in (looker, second) if not getattr(m, "prompt", None)]
+    if blind:
+        raise InputError(
+            f"{blind[0]} reads no prompt and cannot share the work: "
+            "--model and --planner both take a language model, such as openai:NAME."
+        )
+    look, made, repair = (prompt_named(library, name) for name in ("context", plan, "repair"))
+    return TwoStages(looker, second, look=look, plan=made, repair=repair), (look, made, repair)
 
 
 def measuring(messages: History) -> int | None:

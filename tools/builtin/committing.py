@@ -1,24 +1,24 @@
-"""Doors that commit: propose_formation, deploy, ask_user, report_impossible."""
+"""Tools that commit: propose_formation, deploy, ask_user, report_impossible."""
 
 from typing import Any
 
 import numpy as np
 
+from ..context import Context, Settings
 from ..errors import ToolError
 from ..fleet.deploy import Arrival
-from ..fleet.deploy import deploy as drive
-from ..fleet.simulated import SimulatedFleet
 from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
-from ..formation.placement.partial import REFUSALS, Refusal, best_partial
+from ..formation.placement.partial import REFUSALS, best_partial
 from ..formation.plan import Plan, make_plan
 from ..formation.units import contract_in_pixels, with_metres
 from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
-from ..world import Target, World
-from ..tool import ToolResult, tool
-from ..context import Context, Settings
-from .seeing import doubtful, framed, measured, overlays, sighting, summary
+from ..tool import ToolResult, in_thread, tool
+from ..world import PlanNode, ShownCandidate, Target, World
+from .robots import drive_to, with_robots
+from .seeing import sighting
+from .targets import doubtful, framed, measured_all, overlays, summary
 
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
@@ -31,7 +31,7 @@ SHOW_PARTIAL = "To show it to the person, pass its plan_id to report_impossible.
 
 
 @tool("commit")
-def propose_formation(
+async def propose_formation(
     context: Context,
     contract: Contract,
     targets: tuple[TargetPrompt, ...] = (),
@@ -59,21 +59,24 @@ def propose_formation(
         )
     stated = contract_in_pixels(contract, context.world.metres_per_pixel)
     _check_doubts(context, stated)
-    for prompt in targets:
-        measured(context, prompt)
     held = _held_to(stated, context.settings)
-    places = positions if samples is None else _sampled(context, samples)
-    plan = _planned(context, held, places)
-    _keep(context, plan)
-    unseen = context.unseen[plan.id] = _unseen(context, held)
-    data = _proposal(context, plan)
-    if places is None and not plan.verdict.certified:
-        found = _partial(context, held, None)
-        _keep(context, plan)
-        data |= {"partial": found.strip()} if found else {}
-    if plan.verdict.certified and (advice := _to_see(context, plan)):
+
+    def work() -> tuple[World, PlanNode, Plan | None]:
+        world = measured_all(context, targets)
+        places = positions if samples is None else _sampled(world, samples)
+        return world, *_planned(context.at(world), held, places)
+
+    world, node, partial = await in_thread(work)
+    if partial is not None:
+        world = await with_robots(context.at(world), PlanNode(plan=partial, unseen=node.unseen))
+        data = {"partial": _offer(next(reversed(world.plans.values())).plan)}
+    world = await with_robots(context.at(world), node)
+    node = world.plan()
+    data = _proposal(world, node.plan) | ({} if partial is None else data)
+    if node.plan.verdict.certified and (advice := _to_see(world, node)):
         data |= {"look_first": advice}
-    return ToolResult(data, overlays(context, map(context.world.target, unseen), plan))
+    shown = overlays(context.at(world), map(world.target, node.unseen), node.plan)
+    return ToolResult(data, shown, world=world)
 
 
 def _check_doubts(context: Context, contract: Contract) -> None:
@@ -90,19 +93,28 @@ def _check_doubts(context: Context, contract: Contract) -> None:
         )
 
 
-def _planned(context: Context, held: Contract, places: Any) -> Plan:
-    scene = context.world
+def _planned(context: Context, held: Contract, places: Any) -> tuple[PlanNode, Plan | None]:
+    """The plan of a contract and, where it is not certified, the best partial one."""
+    world = context.world
+    site = world.site(held)
     try:
-        return make_plan(held, scene.site(held), scene.version, places)
+        plan = make_plan(held, site, world.version, places)
     except ToolError as error:
-        less = _partial(context, held, error) if isinstance(error, REFUSALS) else ""
-        raise ToolError(f"{scene.told(str(error))}{less}") from None
+        text = world.with_metres(str(error))
+        if isinstance(error, REFUSALS) and (partial := best_partial(held, site, world.version, error)):
+            context.observed(world.with_plan(PlanNode(plan=partial)))
+            text += f" {_offer(partial)}"
+        raise ToolError(text) from None
+    partial = None
+    if places is None and not plan.verdict.certified:
+        partial = best_partial(held, site, world.version, None)
+    return PlanNode(plan=plan, unseen=_unseen(world, held)), partial
 
 
-def _unseen(context: Context, held: Contract) -> tuple[str, ...]:
+def _unseen(world: World, held: Contract) -> tuple[str, ...]:
     """Targets whose outlines have to be seen before robots move."""
     measured_from = {n for g in held.groups if g.clearance is not None for n in g.targets}
-    named = map(context.world.target, held.target_ids)
+    named = map(world.target, held.target_ids)
     return tuple(t.id for t in named if doubtful(t) or t.id in measured_from)
 
 
@@ -117,39 +129,41 @@ async def deploy(
         tell: what to tell the person once all have arrived, which ends the run; left out where
             more is to be done.
     """
-    plan = context.current_plan(plan_id)
-    if not plan.verdict.certified:
-        raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
-    if plan.partial is not None and context.settings.approved != plan.id:
-        raise ToolError(
-            f"Plan {plan.id} is partial ({context.world.told(plan.partial.short)}): nothing of a "
-            "task is done unasked. A person may have exactly this plan driven, with formup deploy."
-        )
-    if not context.settings.may_deploy:
-        raise ToolError("The person asked for the plan only: nothing may be moved.")
-    if plan_id is None and (advice := _to_see(context, plan)):
+    node = context.world.plan(plan_id)
+    _check_may_move(context, node.plan)
+    if plan_id is None and (advice := _to_see(context.world, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
-    plan_id = plan.id
-    site = context.world.site(plan.formation.contract)
-    fleet = context.fleet_for(plan.formation.contract, site)
-    arrival = await drive(plan, site, fleet)
-    context.arrivals[plan_id] = arrival
-    if isinstance(fleet, SimulatedFleet):
-        context.frames[plan_id] = fleet.frames
+    plan, arrival, world = await drive_to(context, node)
     worst = int(np.argmax(arrival.residual_px))
     data = {
-        "plan_id": plan_id,
+        "plan_id": plan.id,
         "arrived": arrival.arrived,
         "corrections": arrival.corrections,
         "worst_residual_px": arrival.residual_px[worst],
-        "worst_robot": worst + 1,
+        "worst_robot": arrival.robots[worst],
         "tolerance_px": arrival.tolerance_px,
     }
-    if arrival.assignment_gap is not None:
-        most = f"{arrival.assignment_gap:.2%} of the summed squared ways"
-        data["assignment"] = f"approximate: another could have saved {most} at most"
-    told = _told(tell, arrival, context.world) if arrival.arrived else None
-    return ToolResult(with_metres(data, context.world.metres_per_pixel), told=told)
+    message = _with_observed(tell, arrival, world) if arrival.arrived else None
+    data = with_metres(data, world.metres_per_pixel)
+    return ToolResult(data, world=world, message=message)
+
+
+def _check_may_move(context: Context, plan: Plan) -> None:
+    """Refuse to move robots to what is not certified, or not approved as it is.
+
+    Raises:
+        ToolError: saying why.
+    """
+    if not plan.verdict.certified:
+        raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
+    if plan.partial is not None and context.settings.approved != plan.id:
+        short = context.world.with_metres(plan.partial.short)
+        raise ToolError(
+            f"Plan {plan.id} is partial ({short}): nothing of a task is done unasked. A person "
+            "may have exactly this plan driven, with formup deploy."
+        )
+    if not context.settings.may_deploy:
+        raise ToolError("The person asked for the plan only: nothing may be moved.")
 
 
 @tool("ask")
@@ -160,13 +174,16 @@ def ask_user(context: Context, question: str, candidates: tuple[str, ...] = ()) 
         question: one clear question.
         candidates: ids of numbered things (c3) or targets (t1) to choose from, if there are any.
     """
+    found = {c: context.candidate(c) for c in candidates if c.startswith("c")}
     listed = [
-        sighting(context.candidate(c))
-        if c.startswith("c")
-        else summary(context.world.target(c))
-        for c in candidates
+        sighting(found[c]) if c in found else summary(context.world.target(c)) for c in candidates
     ]
-    return ToolResult({"question": question, "candidates": listed})
+    shown = tuple(
+        ShownCandidate(id=c, label=thing.label, box=thing.outline.bounds)
+        for c, thing in found.items()
+    )
+    world = context.world.having(shown=shown)
+    return ToolResult({"question": question, "candidates": listed}, world=world)
 
 
 @tool("end")
@@ -180,38 +197,29 @@ def report_impossible(
         robots_needed: how many robots would do, where that is the trouble.
         plan_id: the best plan that was found, certified or not.
     """
-    if plan_id is not None and plan_id not in context.plans:
+    if plan_id is not None and plan_id not in context.world.plans:
         raise ToolError(f"There is no plan {plan_id!r}.")
     data = {"reason": reason, "robots_needed": robots_needed, "plan_id": plan_id}
-    return ToolResult(data, told=reason)
+    return ToolResult(data, message=reason)
 
 
-def _keep(context: Context, plan: Plan) -> None:
-    context.plans.pop(plan.id, None)  # proposed again, it is the latest again
-    context.plans[plan.id] = plan
+def _offer(partial: Plan) -> str:
+    """What there is to say of a partial plan."""
+    assert partial.partial is not None
+    return f"Plan {partial.id} is certified as partial: {partial.partial.sentence} {SHOW_PARTIAL}"
 
 
-def _partial(context: Context, held: Contract, refusal: Refusal | None) -> str:
-    """Keep the best partial plan; what there is to say of it, nothing where there is none."""
-    plan = best_partial(held, context.world.site(held), context.world.version, refusal)
-    if plan is None or plan.partial is None:
-        return ""
-    _keep(context, plan)
-    return f" Plan {plan.id} is certified as partial: {plan.partial.sentence} {SHOW_PARTIAL}"
-
-
-def _to_see(context: Context, plan: Plan) -> str:
+def _to_see(world: World, node: PlanNode) -> str:
     """What has to be looked at before a plan nobody has seen is carried out, if anything."""
-    unseen = context.unseen.get(plan.id, plan.formation.contract.target_ids)
-    for target in map(context.world.target, unseen):
-        if plan.id in context.unseen or doubtful(target):
-            return context.world.told(
-                f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
-                f"about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with tell). "
-                f"Where it does not and yours (dashed) does, propose again with {target.id} and "
-                "`points` on the thing there or `negative` ones off it; else with a closer outline."
-            )
-    return ""
+    if not node.unseen:
+        return ""
+    target = world.target(node.unseen[0])
+    return world.with_metres(
+        f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
+        f"about {_slack(node.plan, target.id):.0f} px, deploy plan_id {node.plan.id} (with tell). "
+        f"Where it does not and yours (dashed) does, propose again with {target.id} and "
+        "`points` on the thing there or `negative` ones off it; else with a closer outline."
+    )
 
 
 def _doubt(target: Target) -> str:
@@ -233,13 +241,13 @@ def _slack(plan: Plan, name: str) -> float:
     return max(SLACK_SHARE * min(kept, default=MIN_CLEARANCE), SLACK_PX)
 
 
-def _told(tell: str | None, arrival: Arrival, scene: Scene) -> str | None:
+def _with_observed(tell: str | None, arrival: Arrival, world: World) -> str | None:
     """The model's words and, after them, what was observed."""
     if not tell:
         return None
     count, worst = len(arrival.observed), max(arrival.residual_px)
     robots = "The robot was" if count == 1 else f"All {count} robots were"
-    observed = scene.told(f"{robots} observed within {max(worst, 0.1):.1f} px of the plan.")
+    observed = world.with_metres(f"{robots} observed within {max(worst, 0.1):.1f} px of the plan.")
     return f"{tell.strip()} {observed}"
 
 
@@ -260,16 +268,16 @@ def _with_clearance(group: Group, clearance: float | None) -> Group:
     return group.model_copy(update={"clearance": (least, greatest)})
 
 
-def _sampled(context: Context, samples: tuple[str, ...]) -> Any:
-    unknown = [s for s in samples if s not in context.samples]
+def _sampled(world: World, samples: tuple[str, ...]) -> Any:
+    unknown = [s for s in samples if s not in world.samples]
     if unknown:
-        known = ", ".join(context.samples) or "none yet"
+        known = ", ".join(world.samples) or "none yet"
         raise ToolError(f"There is no sample {unknown[0]!r}. Samples: {known}.")
-    return np.concatenate([context.samples[s] for s in samples] or [np.empty((0, 2))])
+    return np.concatenate([np.asarray(world.samples[s]) for s in samples] or [np.empty((0, 2))])
 
 
-def _proposal(context: Context, plan: Plan) -> dict[str, Any]:
-    verdict, contract, scene = plan.verdict, plan.formation.contract, context.world
+def _proposal(world: World, plan: Plan) -> dict[str, Any]:
+    verdict, contract = plan.verdict, plan.formation.contract
     findings = [f.sentence for f in verdict.findings]
     more = len(findings) - MAX_FINDINGS
     return {
@@ -277,8 +285,8 @@ def _proposal(context: Context, plan: Plan) -> dict[str, Any]:
         "certified": verdict.certified,
         "findings": findings[:MAX_FINDINGS] + ([f"and {more} more findings"] if more > 0 else []),
         "notes": list(verdict.notes),
-        "measures": with_metres(verdict.measures, scene.metres_per_pixel),
-        "targets": [summary(scene.target(t)) for t in contract.target_ids],
+        "measures": with_metres(verdict.measures, world.metres_per_pixel),
+        "targets": [summary(world.target(t)) for t in contract.target_ids],
         "robots": contract.robots,
-        **framed(scene),
+        **framed(world),
     }

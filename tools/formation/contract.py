@@ -126,7 +126,6 @@ _FIELD_OF: dict[str, tuple[Kind, ...]] = {
 class Group(Value):
     """One arrangement."""
 
-    later = frozenset({"facing", "shape", "walls"})
     relation: Relation = Field(
         description="around: even ring (surround, guard); cage: closed ring, nothing gets out; "
         "corners: one at each corner; along: beside one side or chosen edges; inside: spread "
@@ -253,7 +252,6 @@ _ONLY_IN = {
 class Contract(Value):
     """All groups of a formation; robots are numbered through them in order, from 1."""
 
-    later = frozenset({"unit"})
     groups: tuple[Group, ...] = Field(min_length=1, max_length=50)
     robot_radius: Length = Field(default=0.0, description="Radius of a robot, px; 0 is a point.")
     unit: Unit | None = Field(

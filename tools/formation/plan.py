@@ -6,7 +6,7 @@ scene version. Whoever approves an id approves exactly that; a changed scene voi
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,14 +27,22 @@ DECIMALS = 3
 Point = tuple[float, float]
 
 
-class Formation(BaseModel):
-    """N positions in robot order with the contract they are meant to satisfy."""
+class Formation(Value):
+    """N positions in robot order with the contract they are meant to satisfy.
 
-    model_config = ConfigDict(frozen=True)
+    Attributes:
+        positions: (x, y) px; positions[i] is where robots[i] is to stand.
+        robots: ids of the robots in the fleet's order; none until it is decided who goes where,
+            and positions are then in the order of the contract's groups.
+        members: for each group of the contract the indices of its robots, in the order of its
+            places; none as long as there are no robots.
+    """
 
     positions: tuple[Point, ...]
     contract: Contract
     scene_version: str
+    robots: tuple[str, ...] = ()
+    members: tuple[tuple[int, ...], ...] = ()
 
     @property
     def id(self) -> str:
@@ -43,8 +51,17 @@ class Formation(BaseModel):
 
     @property
     def points(self) -> FloatArray:
-        """Positions, (N, 2), image pixels."""
-        return np.asarray(self.positions, dtype=float).reshape(-1, 2)
+        """The places in the order of the contract's groups, (N, 2), px."""
+        points = np.asarray(self.positions, dtype=float).reshape(-1, 2)
+        order = [i for group in self.members for i in group]
+        return points[order] if order else points
+
+    @property
+    def robot_of_place(self) -> tuple[str, ...]:
+        """Ids of the robots in the order of `points`; numbers from 1 where none were chosen."""
+        if not self.robots:
+            return tuple(str(i + 1) for i in range(len(self.positions)))
+        return tuple(self.robots[i] for group in self.members for i in group)
 
 
 class Shortfall(BaseModel):
@@ -80,9 +97,6 @@ class Plan(Value):
     One that is partial is certified for less than was asked, and names what is missing.
     """
 
-    model_config = ConfigDict(extra="ignore")
-    later = frozenset({"partial"})
-
     formation: Formation
     verdict: Verdict
     partial: Shortfall | None = None
@@ -95,6 +109,31 @@ class Plan(Value):
         content = [self.formation.model_dump(mode="json"), self.partial.model_dump(mode="json")]
         return "p-" + _digest(content)
 
+    def for_robots(self, taking: Sequence[str], fleet: Sequence[str]) -> "Plan":
+        """The plan with robots named: positions in the fleet's order, findings by robot id.
+
+        Args:
+            taking: the id of the robot that takes each place, in the order of the groups.
+            fleet: the ids of all robots, in the fleet's order.
+        """
+        robots = tuple(name for name in fleet if name in set(taking))
+        index = {name: i for i, name in enumerate(robots)}
+        places = dict(zip(taking, self.formation.points.tolist(), strict=True))
+        members: list[tuple[int, ...]] = []
+        first = 0
+        for group in self.formation.contract.groups:
+            mine = taking[first : first + group.robots]
+            members.append(tuple(index[name] for name in mine))
+            first += group.robots
+        formation = self.formation.model_copy(
+            update={
+                "positions": tuple((x, y) for x, y in map(places.__getitem__, robots)),
+                "robots": robots,
+                "members": tuple(members),
+            }
+        )
+        return self.model_copy(update={"formation": formation})
+
 
 def make_plan(
     contract: Contract, site: Site, scene_version: str, positions: ArrayLike | None = None
@@ -105,7 +144,7 @@ def make_plan(
         contract: as stated.
         site: outlines of every target it names, and the picture's size.
         scene_version: of the scene the outlines were measured in.
-        positions: (N, 2) image pixels, robots in order over all groups; None to place them here.
+        positions: (N, 2) image pixels, in order over all groups; None to place them here.
 
     Raises:
         ToolError: the positions are no pairs, or none were given and the contract cannot be met.

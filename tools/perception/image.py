@@ -12,7 +12,7 @@ import re
 import stat
 import warnings
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
@@ -142,6 +142,27 @@ def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Pictur
     digest = hashlib.sha256(repr(copy.shape).encode())
     digest.update(copy.tobytes())
     return Picture(copy, digest.hexdigest(), name, ())
+
+def picture_file(picture: Picture) -> bytes:
+    """A file that holds the picture: the one it came from while that is the same, else a PNG."""
+    if picture.path is not None:
+        with suppress(ImageError, OSError, ValueError):
+            data = _read(picture.path, picture.name)
+            if hashlib.sha256(data).hexdigest() == picture.sha256:
+                return data
+    file = BytesIO()
+    Image.fromarray(picture.pixels).save(file, "PNG")
+    return file.getvalue()
+
+
+def picture_from_file(data: bytes, name: str, sha256: str) -> Picture:
+    """The picture with a hash that `picture_file` made a file of, be it one of a file or an array.
+
+    Raises:
+        ImageError: as `picture_from_bytes` does.
+    """
+    picture = picture_from_bytes(data, name)
+    return picture if picture.sha256 == sha256 else picture_from_array(picture.pixels, name)
 
 
 def _fault(name: str, problem: str, remedy: str) -> ImageError:
