@@ -1,98 +1,330 @@
 """Drives a fleet to a certified formation and says what was observed, not what was commanded."""
 
-from typing import Protocol
+import asyncio
+from collections.abc import Callable, Sequence
+from contextlib import aclosing, suppress
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from ..errors import FleetError, ToolError
 from ..formation.checking.check import certify
-from ..formation.contract import with_defaults
+from ..formation.contract import Contract, with_defaults
 from ..formation.placement.place import Site
 from ..formation.plan import Plan, Point
 from ..geometry.assignment import assign
-from ..geometry.outline import FloatArray, distances
+from ..geometry.outline import FloatArray
 from ..motion.motion import obstacles, routes
+from .protocol import (
+    Fleet,
+    FleetBusyError,
+    FleetSizeError,
+    FleetStoppedError,
+    Motion,
+    PlaceTakenError,
+    Pose,
+    RobotsFailedError,
+)
 
 CORRECTIONS = 5
 ARRIVED_SHARE, ARRIVED_PX = 0.001, 0.5
 """A robot has arrived within this share of the picture's diagonal, at least half a pixel."""
+MAX_AGE = 1.0
+"""Robots are driven only on poses seen within so many seconds."""
+TRACK_FRAMES = 120
+"""Most moments of a deployment that are recorded for its film."""
 
+Ended = Literal["arrived", "short", "stopped", "failed"]
+Watch = Callable[[tuple[Pose, ...]], None]
 
-class Fleet(Protocol):
-    """Robots that can be observed and driven; poses are (n, 2) positions in image pixels."""
-
-    async def observe(self) -> FloatArray:
-        """Where the robots are seen to be now, robot order."""
-        ...
-
-    async def move(self, paths: list[FloatArray]) -> None:
-        """Drive robot i along polyline i, all in step, and return when they stand still."""
-        ...
+_in_deployment: set[int] = set()
+"""`id` of the fleets that are being deployed; a deployment holds its fleet, so none is reused."""
 
 
 class Arrival(BaseModel):
     """Requested against observed, per place of the formation.
 
     Attributes:
-        robots: which robot of the fleet (from 1) took each place.
+        ended: arrived; short: some are off their places after all corrections; stopped: by the
+            fleet's stop; failed: robots or the fleet failed on the way.
+        reason: one sentence where it was stopped or failed.
+        robots: ids of the robots that take the places.
+        failed: ids of those that the fleet named as having failed.
+        observed: where they were seen last, px.
         residual_px: distance of observed to requested.
-        corrections: how many times robots were sent again after the first move.
-        assignment_gap: share of the summed squared ways another assignment could have saved at
-            most; None where there was none better.
+        corrections: how many times robots were sent again after the first drive.
     """
 
     model_config = ConfigDict(frozen=True)
 
     arrived: bool
-    robots: tuple[int, ...]
+    ended: Ended
+    reason: str | None = None
+    robots: tuple[str, ...]
+    failed: tuple[str, ...] = ()
     observed: tuple[Point, ...]
     residual_px: tuple[float, ...]
     tolerance_px: float
     corrections: int
-    assignment_gap: float | None = None
 
 
-async def deploy(plan: Plan, site: Site, fleet: Fleet) -> Arrival:
-    """Move a fleet onto a plan that is certified here and now, observe, correct, and report.
+@dataclass(frozen=True)
+class Track:
+    """Where robots were over a deployment, for its film.
+
+    Attributes:
+        ids: of the robots, in the order of their places.
+        points: (f, n, 2) px at f moments, evenly thinned; the last is the last observation.
+    """
+
+    ids: tuple[str, ...]
+    points: FloatArray
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """What came of a deployment, and where all robots of the fleet, idle ones too, were last."""
+
+    arrival: Arrival
+    poses: tuple[Pose, ...]
+    track: Track
+
+
+@dataclass(frozen=True)
+class Assigned:
+    """Who takes which place.
+
+    Attributes:
+        robots: ids; robot i takes place i.
+        gap: share of the summed squared ways another assignment could have saved at most; None
+            where there was none better.
+    """
+
+    robots: tuple[str, ...]
+    gap: float | None
+
+
+def assign_robots(poses: Sequence[Pose], places: FloatArray) -> Assigned:
+    """The robots for all places with the least sum of squared ways; others stay idle.
+
+    Args:
+        poses: of all robots of the fleet.
+        places: (n, 2) px.
 
     Raises:
-        ToolError: the plan does not certify.
-        FleetError: the fleet has another number of robots, or one starts on a target.
+        FleetSizeError: the fleet has fewer robots than there are places.
+    """
+    if len(poses) < len(places):
+        raise FleetSizeError(
+            f"The fleet has {len(poses)} robots; the plan needs {len(places)}.",
+            available=len(poses),
+            needed=len(places),
+        )
+    points = _positions(poses)
+    chosen = np.arange(len(poses))
+    if len(poses) > len(places):
+        chosen = _least_squares_choice(points, places)
+    found = assign(points[chosen], places)
+    robots = tuple(poses[int(i)].id for i in chosen[found.robots])
+    return Assigned(robots, found.gap if found.method == "approximate" else None)
+
+
+def _least_squares_choice(points: FloatArray, places: FloatArray) -> np.ndarray:
+    """Indices of the robots that take part in the least sum of squares, ascending."""
+    from scipy.optimize import linear_sum_assignment
+    from scipy.spatial.distance import cdist
+
+    return np.sort(linear_sum_assignment(cdist(places, points, "sqeuclidean"))[1])
+
+
+async def deploy(
+    plan: Plan,
+    site: Site,
+    fleet: Fleet,
+    robots: Sequence[str],
+    *,
+    watch: Watch = lambda poses: None,
+) -> Deployment:
+    """Move robots onto a plan that is certified here and now, observe, correct, and report.
+
+    It has no time limit: it ends when the robots have arrived, or cannot, or when the fleet is
+    stopped, or when its task is cancelled, which stops the robots where they are. Robots of the
+    fleet that are not named stay where they are and are driven around.
+
+    Args:
+        plan: its places.
+        site: the outlines of its targets, and the picture.
+        fleet: that has the robots.
+        robots: ids; robot i takes place i.
+        watch: is called with the poses of the whole fleet whenever they have been observed; last,
+            also after a failure or before CancelledError goes on, with where they ended.
+
+    Raises:
+        ToolError: the plan does not certify. Here and below nothing was moved.
+        FleetSizeError: another number of robots is named than there are places.
+        FleetStoppedError: the fleet's stop is in force.
+        FleetBusyError: another deployment is using the fleet.
+        RobotsFailedError: robots are not there.
+        PlaceTakenError: an idle robot stands on a place.
+        FleetError: the fleet cannot be observed, or there is no way to a place.
     """
     contract = with_defaults(plan.formation.contract, site.outlines, site.room)
-    goals = plan.formation.points
-    verdict = certify(goals, contract, site)  # a plan's own word is not taken for it
+    verdict = certify(plan.formation.points, contract, site)  # a plan's own word is not enough
     if not verdict.certified:
         why = verdict.findings[0].sentence
         raise ToolError(f"Plan {plan.id} is not certified: {why} Nothing was moved.")
-    poses = await fleet.observe()
-    if len(poses) != len(goals):
-        raise FleetError(f"The fleet has {len(poses)} robots; the plan needs {len(goals)}.")
-    solid, frame = obstacles(contract, site), site.frame(contract.robot_radius)
-    if not solid.is_empty and distances(solid, poses).min() <= contract.robot_radius:
-        robot = int(np.argmin(distances(solid, poses))) + 1
-        raise FleetError(f"Robot {robot} stands on the target; move it off before deploying.")
-    assignment = assign(poses, goals)
-    takes = assignment.robots
-    tolerance = max(ARRIVED_PX, ARRIVED_SHARE * float(np.hypot(*site.room)))
-    corrections = -1
-    residual = np.full(len(goals), np.inf)
-    while residual.max() > tolerance and corrections < CORRECTIONS:
-        paths: list[FloatArray] = [np.stack([p, p]) for p in poses]
-        planned = routes(poses[takes], goals, solid, contract.robot_radius, frame)
-        for robot, path in zip(takes, planned, strict=True):
-            paths[robot] = path
-        await fleet.move(paths)
-        poses = await fleet.observe()
-        residual = np.linalg.norm(poses[takes] - goals, axis=1)
-        corrections += 1
-    return Arrival(
-        arrived=bool(residual.max() <= tolerance),
-        robots=tuple(int(r) + 1 for r in takes),
-        observed=tuple((round(float(x), 3), round(float(y), 3)) for x, y in poses[takes]),
-        residual_px=tuple(round(float(r), 3) for r in residual),
-        tolerance_px=round(tolerance, 3),
-        corrections=corrections,
-        assignment_gap=assignment.gap if assignment.method == "approximate" else None,
-    )
+    if id(fleet) in _in_deployment:
+        raise FleetBusyError(
+            f"The fleet {fleet.name} is being deployed already; wait for it to end, or stop it."
+        )
+    _in_deployment.add(id(fleet))
+    try:
+        return await _Drive(plan.formation.points, contract, site, fleet, robots, watch).run()
+    finally:
+        _in_deployment.discard(id(fleet))
+
+
+class _Drive:
+    """One deployment as it goes: what was seen, and what is still to be driven."""
+
+    def __init__(
+        self,
+        goals: FloatArray,
+        contract: Contract,
+        site: Site,
+        fleet: Fleet,
+        robots: Sequence[str],
+        watch: Watch,
+    ) -> None:
+        self._goals, self._contract, self._site = goals, contract, site
+        self._fleet, self._robots, self._watch = fleet, tuple(robots), watch
+        self._tolerance = max(ARRIVED_PX, ARRIVED_SHARE * float(np.hypot(*site.room)))
+        self._poses: dict[str, Pose] = {}
+        self._frames: list[FloatArray] = []
+        self._stride, self._seen = 1, 0
+
+    async def run(self) -> Deployment:
+        if len(set(self._robots)) != len(self._goals):
+            raise FleetSizeError(
+                f"{len(set(self._robots))} robots are named; the plan has {len(self._goals)} "
+                "places, and each takes one robot.",
+                available=len(set(self._robots)),
+                needed=len(self._goals),
+            )
+        if self._fleet.stopped:
+            raise FleetStoppedError(
+                f"The fleet {self._fleet.name} is stopped; release it before anything moves."
+            )
+        await self._observe()
+        self._check_idle()
+        corrections, motion = 0, self._motion()
+        try:
+            await self._drive(motion)
+            while not self._arrived() and not self._fleet.stopped and corrections < CORRECTIONS:
+                corrections += 1
+                await self._drive(self._motion())
+        except asyncio.CancelledError:
+            await self._observe_after_failure()
+            raise
+        except FleetError as error:
+            await self._observe_after_failure()
+            return self._report(corrections, error)
+        return self._report(corrections)
+
+    async def _drive(self, motion: Motion) -> None:
+        async with aclosing(self._fleet.drive(motion)) as moving:
+            async for poses in moving:
+                self._saw(poses)
+        await self._observe()
+
+    async def _observe(self) -> None:
+        poses = await self._fleet.observe(max_age=MAX_AGE)
+        there = {pose.id for pose in poses}
+        missing = [robot for robot in self._robots if robot not in there]
+        if missing:
+            raise RobotsFailedError(
+                f"Robot {', '.join(missing)} of the plan is not in the fleet {self._fleet.name} "
+                "now; propose the formation again with the robots there are.",
+                missing,
+            )
+        self._saw(poses)
+
+    async def _observe_after_failure(self) -> None:
+        with suppress(FleetError):
+            self._saw(await self._fleet.observe())
+
+    def _saw(self, poses: tuple[Pose, ...]) -> None:
+        """Keep poses, and thin the frames to every second one whenever there are too many."""
+        self._poses |= {pose.id: pose for pose in poses}
+        if self._seen % self._stride == 0:
+            self._frames.append(self._points())
+        if len(self._frames) > TRACK_FRAMES:
+            self._frames, self._stride = self._frames[::2], 2 * self._stride
+        self._seen += 1
+        self._watch(tuple(self._poses.values()))
+
+    def _points(self) -> FloatArray:
+        return _positions([self._poses[robot] for robot in self._robots])
+
+    def _idle(self) -> list[Pose]:
+        taking_part = set(self._robots)
+        return [pose for pose in self._poses.values() if pose.id not in taking_part]
+
+    def _check_idle(self) -> None:
+        """Refuse a plan with a place that a robot stands on which is not to be driven."""
+        for pose in self._idle():
+            away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
+            if away.min() < self._contract.spacing_floor:
+                raise PlaceTakenError(
+                    f"Robot {pose.id}, which has no place in the plan, stands {away.min():.1f} px "
+                    f"from place {int(away.argmin()) + 1}; propose the formation again.",
+                    (pose.id,),
+                )
+
+    def _motion(self) -> Motion:
+        paths = routes(
+            self._points(),
+            self._goals,
+            obstacles(self._contract, self._site),
+            self._contract.robot_radius,
+            self._site.frame(self._contract.robot_radius),
+            idle=_positions(self._idle()),
+        )
+        return Motion(dict(zip(self._robots, paths, strict=True)))
+
+    def _residual(self) -> FloatArray:
+        return np.linalg.norm(self._points() - self._goals, axis=1)
+
+    def _arrived(self) -> bool:
+        return bool(self._residual().max() <= self._tolerance)
+
+    def _report(self, corrections: int, error: FleetError | None = None) -> Deployment:
+        reason = str(error) if error else None
+        if self._fleet.stopped:
+            ended: Ended = "stopped"
+            reason = reason or f"The fleet {self._fleet.name} was stopped."
+        elif error:
+            ended = "failed"
+        else:
+            ended = "arrived" if self._arrived() else "short"
+        points = self._points()
+        arrival = Arrival(
+            arrived=ended == "arrived",
+            ended=ended,
+            reason=reason,
+            robots=self._robots,
+            failed=error.ids if isinstance(error, RobotsFailedError) else (),
+            observed=tuple((round(float(x), 3), round(float(y), 3)) for x, y in points),
+            residual_px=tuple(round(float(r), 3) for r in self._residual()),
+            tolerance_px=round(self._tolerance, 3),
+            corrections=corrections,
+        )
+        track = Track(self._robots, np.stack([*self._frames, points]))
+        return Deployment(arrival, tuple(self._poses.values()), track)
+
+
+def _positions(poses: Sequence[Pose]) -> FloatArray:
+    """Positions, (n, 2) px."""
+    return np.array([(pose.x, pose.y) for pose in poses], dtype=float).reshape(-1, 2)

@@ -57,6 +57,10 @@ class StalePosesError(RobotsFailedError):
     """Robots were not seen recently enough."""
 
 
+class PlaceTakenError(RobotsFailedError):
+    """Robots that have no place in a plan stand where another one is to stand."""
+
+
 @dataclass(frozen=True)
 class Pose:
     """Where a robot was seen.

@@ -1,6 +1,8 @@
 """A kinematic simulator: robots that follow their paths but slip, so that arrival is earned."""
 
+import asyncio
 import math
+from collections.abc import AsyncGenerator, Sequence
 
 import numpy as np
 import shapely
@@ -8,58 +10,191 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import InputError
 from ..formation.contract import MIN_SPACING
-from ..formation.placement.place import Site
 from ..geometry.curves import Curve, Frame
 from ..geometry.interior import inside
 from ..geometry.outline import FloatArray, distances, largest_part, outline_of
 from ..geometry.sampling import along_curve
 from ..motion.motion import along
+from .protocol import (
+    FleetBusyError,
+    FleetClosedError,
+    FleetRequest,
+    FleetSizeError,
+    FleetStoppedError,
+    Motion,
+    Pose,
+    RobotsFailedError,
+    check_ages,
+)
 
 MAX_ROBOTS = 1_000
 """Above this, motion and its animation are not simulated yet."""
+PERIOD = 0.05
+"""Seconds of simulated time a step takes."""
+SPEED_SHARE = 0.2
+"""Share of the picture's diagonal a robot drives in a second of simulated time."""
 SLIP = 0.02
 """A robot covers between 1 - SLIP and all of a commanded path: wheels slip, odometry drifts."""
-TICKS = 36
 START_MARGIN = 0.03
+START_GAP = 2.0
+"""Least gap between a robot that is set down and what it is set down beside, px."""
 
 
 class SimulatedFleet:
-    """Robots on the picture's plane; `frames` keeps every pose for the animation."""
+    """Robots on the picture's plane, which are observed exactly.
 
-    def __init__(self, starts: FloatArray, *, seed: int = 0) -> None:
-        self._poses = np.array(starts, dtype=float)
+    Args:
+        poses: where they stand.
+        speed: px per second of simulated time.
+        radius: of a robot, px; None for points.
+        seed: of the slip.
+    """
+
+    name = "simulated"
+    real = False
+
+    def __init__(
+        self, poses: Sequence[Pose], *, speed: float, radius: float | None = None, seed: int = 0
+    ) -> None:
+        self.radius, self.stopped = radius, False
+        self._ids = tuple(pose.id for pose in poses)
+        self._points = np.array([(p.x, p.y) for p in poses], dtype=float).reshape(-1, 2)
+        self._headings = tuple(pose.heading for pose in poses)
+        self._now = max((pose.seen for pose in poses), default=0.0)
+        self._step = speed * PERIOD
         self._random = np.random.default_rng(seed)
-        self.frames: list[FloatArray] = [self._poses.copy()]
+        self._driving = self._closed = False
 
-    async def observe(self) -> FloatArray:
-        """Exact poses, (n, 2)."""
-        return self._poses.copy()
+    async def observe(self, *, max_age: float | None = None) -> tuple[Pose, ...]:
+        """Exact poses now."""
+        self._check_open()
+        poses = self._seen()
+        check_ages(poses, self._now, max_age)
+        return poses
 
-    async def move(self, paths: list[FloatArray]) -> None:
-        """Follow the paths in step, each robot stopping a little short."""
+    async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Follow the paths in step, each robot stopping a little short; poses at every step."""
+        self._check_drive(motion)
+        if not motion.paths:
+            return
+        moving = [i for i, robot in enumerate(self._ids) if robot in motion.paths]
+        paths = [motion.paths[self._ids[i]] for i in moving]
         covered = 1 - SLIP * self._random.random(len(paths))
         longest = max(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in paths)
-        ticks = TICKS if longest > 20 else 3  # a correction is a twitch, not a journey
-        for tick in range(1, ticks + 1):
-            self.frames.append(along(paths, tick / ticks * covered))
-        self._poses = self.frames[-1].copy()
+        steps = max(math.ceil(longest / self._step), 1)
+        self._driving = True
+        try:
+            for step in range(1, steps + 1):
+                if self.stopped or self._closed:
+                    return
+                self._points[moving] = along(paths, step / steps * covered)
+                self._now += PERIOD
+                yield self._seen()
+                await asyncio.sleep(0)  # unpaced, but whoever wants to stop it gets a turn
+        finally:
+            self._driving = False
+
+    async def stop(self) -> None:
+        """Hold all robots where they are, until `release`."""
+        self.stopped = True
+
+    async def release(self) -> None:
+        """Lift the stop."""
+        self.stopped = False
+
+    async def close(self) -> None:
+        """Hold all robots, for good."""
+        self._closed = True
+
+    def _seen(self) -> tuple[Pose, ...]:
+        robots = zip(self._ids, self._points.tolist(), self._headings, strict=True)
+        return tuple(Pose(robot, x, y, heading, self._now) for robot, (x, y), heading in robots)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise FleetClosedError("The simulated fleet is closed; open it again.")
+
+    def _check_drive(self, motion: Motion) -> None:
+        self._check_open()
+        if self.stopped:
+            raise FleetStoppedError("The simulated fleet is stopped; release it to drive.")
+        if self._driving:
+            raise FleetBusyError("The simulated fleet is driving already; wait, or stop it.")
+        unknown = sorted(set(motion.paths) - set(self._ids))
+        if unknown:
+            raise RobotsFailedError(
+                f"Robot {', '.join(unknown)} is not in the simulated fleet of "
+                f"{len(self._ids)} robots.",
+                unknown,
+            )
 
 
-def spread_starts(n: int, site: Site, solid: BaseGeometry, radius: float) -> FloatArray:
-    """Starting poses along the picture's border, off the targets, evenly apart, (n, 2).
+def open_fleet(request: FleetRequest) -> SimulatedFleet:
+    """Robots where they were last, at the starts a person gave, or spread along the border.
+
+    Raises:
+        FleetSizeError: more robots than are simulated.
+        InputError: starts where no robot can stand, or no room for all.
+    """
+    if request.robots > MAX_ROBOTS:
+        raise FleetSizeError(
+            f"{request.robots} robots can be placed and certified, but motion is simulated only "
+            f"up to {MAX_ROBOTS} so far: the plan stands, nothing was moved.",
+            available=MAX_ROBOTS,
+            needed=request.robots,
+        )
+    speed = SPEED_SHARE * math.hypot(*request.size)
+    radius = request.radius or None
+    return SimulatedFleet(_set_down(request), speed=speed, radius=radius, seed=request.seed)
+
+
+def _set_down(request: FleetRequest) -> list[Pose]:
+    """Poses of at least as many robots as are wanted."""
+    frame, solid, radius = Frame(*request.size), request.solid, request.radius
+    if not request.known and request.starts is not None:
+        starts = checked_starts(request.starts, request.robots, frame, solid, radius)
+        return [Pose(str(i), float(x), float(y)) for i, (x, y) in enumerate(starts, start=1)]
+    standing = {pose.id: pose for pose in request.known}
+    points = np.array([(p.x, p.y) for p in request.known], dtype=float).reshape(-1, 2)
+    order = list(standing)
+    if standing and not request.driven:
+        if request.starts is not None:
+            checked_starts(points, len(points), frame, solid, radius)
+        elif not solid.is_empty:
+            off = distances(solid, points) > radius
+            standing = {p.id: p for p, free in zip(request.known, off, strict=True) if free}
+    number = 1
+    while len(order) < request.robots:
+        if str(number) not in order:
+            order.append(str(number))
+        number += 1
+    missing = [robot for robot in order if robot not in standing]
+    if missing:
+        bodies = [shapely.Point(p.x, p.y).buffer(radius + START_GAP) for p in standing.values()]
+        taken = shapely.union_all([solid, *bodies]) if bodies else solid
+        now = max((p.seen for p in request.known), default=0.0)
+        for robot, (x, y) in zip(
+            missing, spread_starts(len(missing), frame, taken, radius), strict=True
+        ):
+            standing[robot] = Pose(robot, float(x), float(y), None, now)
+    return [standing[robot] for robot in order]
+
+
+def spread_starts(n: int, frame: Frame, solid: BaseGeometry, radius: float) -> FloatArray:
+    """Starting positions along the picture's border, off what is solid, evenly apart, (n, 2).
 
     Args:
         n: how many.
-        site: the picture.
+        frame: the picture.
         solid: what robots may not stand on.
         radius: of a robot, px.
 
     Raises:
-        InputError: there is no room for n robots outside the targets.
+        InputError: there is no room for n robots.
     """
-    margin = radius + START_MARGIN * min(site.room)
-    room = Frame(site.width, site.height, margin).box
-    blocked = solid.buffer(radius + 2.0)
+    margin = radius + START_MARGIN * min(frame.width, frame.height)
+    room = Frame(frame.width, frame.height, margin).box
+    blocked = solid.buffer(radius + START_GAP)
     spacing = max(2 * radius * 1.05, MIN_SPACING)
     loop = shapely.get_parts(shapely.line_merge(room.exterior.difference(blocked)))
     lines = tuple(shapely.get_coordinates(line) for line in loop if line.length > 1)
@@ -83,9 +218,9 @@ def spread_starts(n: int, site: Site, solid: BaseGeometry, radius: float) -> Flo
 
 
 def checked_starts(
-    starts: FloatArray, n: int, site: Site, solid: BaseGeometry, radius: float
+    starts: FloatArray, n: int, frame: Frame, solid: BaseGeometry, radius: float
 ) -> FloatArray:
-    """A user's starting poses, refused where a robot could not stand.
+    """A user's starting positions, refused where a robot could not stand.
 
     Raises:
         InputError: another number than n, not finite, outside the picture, or on a target.
@@ -94,13 +229,13 @@ def checked_starts(
         raise InputError(f"The starts give {len(starts)} positions for {n} robots.")
     if not np.isfinite(starts).all():
         raise InputError("A starting position is not a finite number.")
-    away = distances(site.frame(0).box, starts)
+    away = distances(frame.box, starts)
     if away.max() > 0:
         i = int(np.argmax(away))
         x, y = starts[i]
         raise InputError(
             f"Robot {i + 1} starts at ({x:g}, {y:g}), outside the picture of "
-            f"{site.width:g} x {site.height:g} px."
+            f"{frame.width:g} x {frame.height:g} px."
         )
     off = distances(solid, starts)
     if not solid.is_empty and off.min() <= radius:

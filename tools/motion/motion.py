@@ -9,11 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import FleetError
-from ..formation.contract import Contract
+from ..formation.contract import MIN_SPACING, Contract
 from ..formation.placement.place import Site
 from ..geometry.curves import Frame
 from ..geometry.outline import FloatArray, distances
@@ -25,6 +26,17 @@ BEND_SEGMENTS = 2
 ROOM_SHARES = (0.7, 0.3, 0.03)
 """How much of the smallest clearance at starts and goals paths keep: well away where there is
 room, squeezing past where not."""
+LEAST_EXIT = 1.0
+"""Robots that stand on an obstacle go at least so far off it, px."""
+EXIT_SEGMENTS = 16
+"""Segments of a quarter circle of the line on which they leave it."""
+NOBODY = np.empty((0, 2))
+
+Bodies = NDArray[np.object_]
+
+
+class NoRouteError(FleetError):
+    """A place that no path leads to."""
 
 
 def obstacles(contract: Contract, site: Site) -> BaseGeometry:
@@ -34,58 +46,146 @@ def obstacles(contract: Contract, site: Site) -> BaseGeometry:
 
 
 def routes(
-    starts: FloatArray, goals: FloatArray, solid: BaseGeometry, radius: float, frame: Frame
+    starts: FloatArray,
+    goals: FloatArray,
+    solid: BaseGeometry,
+    radius: float,
+    frame: Frame,
+    *,
+    idle: FloatArray = NOBODY,
 ) -> list[FloatArray]:
-    """Shortest paths that keep robots of a radius off the obstacles, start i to goal i.
+    """Shortest paths that keep robots of a radius off obstacles and idle robots, start i to goal i.
 
-    Paths stay in the frame where they can, and leave it only where there is no other way.
+    Paths stay in the frame where they can, and leave it only where there is no other way. A robot
+    that stands on an obstacle first leaves it by the shortest way.
 
     Args:
-        starts, goals: (n, 2), off the obstacles.
+        starts: (n, 2).
+        goals: (n, 2), off the obstacles.
         solid: the obstacles' union.
         radius: of a robot, px.
         frame: the picture.
+        idle: (m, 2) where robots stand that do not move.
 
     Returns:
         n polylines, (k, 2) each.
 
     Raises:
-        FleetError: a goal is walled off.
+        NoRouteError: a goal is walled off.
     """
+    ends = np.concatenate([starts, goals])
+    exits = _exits(starts, goals, solid, radius, frame, _bodies(idle, ends, radius))
+    bodies = _bodies(idle, np.concatenate([ends, exits]), radius)
+    paths = _past(exits, goals, solid, radius, frame, bodies)
+    leaving = np.flatnonzero((exits != starts).any(axis=1))
+    ways_out = _past(starts[leaving], exits[leaving], Polygon(), radius, frame, bodies)
+    for i, way_out in zip(leaving, ways_out, strict=True):
+        paths[i] = np.concatenate([way_out[:-1], paths[i]])
+    return paths
+
+
+def _exits(
+    starts: FloatArray,
+    goals: FloatArray,
+    solid: BaseGeometry,
+    radius: float,
+    frame: Frame,
+    bodies: Bodies,
+) -> FloatArray:
+    """Starts, (n, 2), those on the obstacles moved off them as far as the goals are."""
+    if solid.is_empty or not (on := distances(solid, starts) <= radius).any():
+        return starts
+    away = max(float(distances(solid, goals).min()), LEAST_EXIT)
+    rim = solid.buffer(away / math.cos(math.pi / 4 / EXIT_SEGMENTS), quad_segs=EXIT_SEGMENTS)
+    free = shapely.difference(rim.boundary, shapely.union_all(bodies))
+    inside = shapely.intersection(free, frame.box)
+    line = next(part for part in (inside, free, rim.boundary) if not part.is_empty)
+    exits = starts.copy()
+    shortest = shapely.shortest_line(shapely.points(starts[on]), line)
+    exits[on] = shapely.get_coordinates(shortest)[1::2]
+    return exits
+
+
+def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
+    """Discs, (m,), that the centres of others keep out of; smaller where a path ends near."""
+    if not len(idle):
+        return np.empty(0, dtype=object)
+    nearest = np.linalg.norm(idle[:, None] - ends, axis=2).min(axis=1)
+    reach = np.minimum(max(2 * radius, MIN_SPACING), 0.99 * nearest)
+    return np.asarray(shapely.buffer(shapely.points(idle), reach), dtype=object)
+
+
+def _past(
+    starts: FloatArray,
+    goals: FloatArray,
+    solid: BaseGeometry,
+    radius: float,
+    frame: Frame,
+    bodies: Bodies,
+) -> list[FloatArray]:
+    """Shortest paths past the obstacles and those bodies that would be in the way."""
+    paths = _around(starts, goals, solid, radius, frame, bodies[:0])
+    tree, known = shapely.STRtree(bodies), np.empty(0, dtype=np.intp)
+    while len(bodies) and len(paths):
+        lines = np.asarray([LineString(path) for path in paths], dtype=object)
+        blocked, hit = tree.query(lines, predicate="intersects")
+        if not len(hit):
+            break
+        again, known = np.unique(blocked), np.union1d(known, hit)
+        found = _around(starts[again], goals[again], solid, radius, frame, bodies[known])
+        for i, path in zip(again, found, strict=True):
+            paths[i] = path
+    return paths
+
+
+def _around(
+    starts: FloatArray,
+    goals: FloatArray,
+    solid: BaseGeometry,
+    radius: float,
+    frame: Frame,
+    bodies: Bodies,
+) -> list[FloatArray]:
+    """Shortest paths around the obstacles and around all of some bodies."""
     paths = list(np.stack([starts, goals], axis=1))
-    if solid.is_empty:
+    if solid.is_empty and not len(bodies):
         return paths
-    near = float(min(distances(solid, starts).min(), distances(solid, goals).min()))
-    widest = _barrier(solid, radius, near, ROOM_SHARES[0])
+    near = 0.0
+    if not solid.is_empty:
+        near = float(min(distances(solid, starts).min(), distances(solid, goals).min()))
+    keeps = [_keep(radius, near, share) for share in ROOM_SHARES]
+    widest = _barrier(solid, keeps[0], bodies)
     straight = shapely.linestrings(np.stack([starts, goals], axis=1))
     open_ends = [int(i) for i in np.flatnonzero(shapely.intersects(straight, widest))]
     if not open_ends:
         return paths
-    for share in ROOM_SHARES:
-        barrier = _barrier(solid, radius, near, share)
-        nodes = _nodes(solid, _keep(radius, near, share))
-        within = nodes[shapely.intersects_xy(frame.box, nodes)]
-        graph = _Visibility(within, barrier)
+    for keep in keeps:
+        barrier, nodes = _barrier(solid, keep, bodies), _nodes(solid, keep, bodies)
+        graph = _Visibility(nodes[shapely.intersects_xy(frame.box, nodes)], barrier)
         open_ends = [i for i in open_ends if not _settled(paths, i, graph, barrier)]
         if not open_ends:
             return paths
-    barrier = _barrier(solid, radius, near, ROOM_SHARES[-1])
-    anywhere = _Visibility(_nodes(solid, _keep(radius, near, ROOM_SHARES[-1])), barrier)
+    barrier = _barrier(solid, keeps[-1], bodies)
+    anywhere = _Visibility(_nodes(solid, keeps[-1], bodies), barrier)
     for i in open_ends:
         if not _settled(paths, i, anywhere, barrier):
+            what = "the target and the robots that stay" if len(bodies) else "the target"
             x, y = goals[i]
-            raise FleetError(f"There is no way around the target to place ({x:.0f}, {y:.0f}).")
+            raise NoRouteError(f"There is no way around {what} to place ({x:.0f}, {y:.0f}).")
     return paths
 
 
-def _barrier(solid: BaseGeometry, radius: float, near: float, share: float) -> BaseGeometry:
-    """What paths must not touch: the obstacles grown by a share of the room there is."""
-    barrier = solid.buffer(_keep(radius, near, share) * 0.999)
+def _barrier(solid: BaseGeometry, keep: float, bodies: Bodies) -> BaseGeometry:
+    """What paths must not touch: the obstacles grown by nearly what is kept, and the bodies."""
+    barrier = solid.buffer(keep * 0.999)
+    if len(bodies):
+        barrier = shapely.union_all([barrier, *bodies])
     shapely.prepare(barrier)
     return barrier
 
 
 def _keep(radius: float, near: float, share: float) -> float:
+    """Distance kept from the obstacles, px, where starts and goals have `near` of room."""
     return radius + share * (near - radius) if near > radius else 0.99 * near
 
 
@@ -102,17 +202,11 @@ def _settled(paths: list[FloatArray], i: int, graph: "_Visibility", barrier: Bas
 
 def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
     """Where robots are when each has covered its share of its path, (n, 2)."""
-    places = [_interpolated(path, float(share)) for path, share in zip(paths, shares, strict=True)]
-    return np.stack(places)
+    lines = np.asarray([LineString(path) for path in paths], dtype=object)
+    return shapely.get_coordinates(shapely.line_interpolate_point(lines, shares, normalized=True))
 
 
-def _interpolated(path: FloatArray, share: float) -> FloatArray:
-    if not np.ptp(path, axis=0).any():
-        return path[-1]
-    return shapely.get_coordinates(LineString(path).interpolate(share, normalized=True))[0]
-
-
-def _nodes(solid: BaseGeometry, keep: float) -> FloatArray:
+def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies) -> FloatArray:
     """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
     dip = math.cos(math.pi / (4 * BEND_SEGMENTS))
     grown = solid.buffer((1.01 * keep + 0.05) / dip, quad_segs=BEND_SEGMENTS)
@@ -121,8 +215,17 @@ def _nodes(solid: BaseGeometry, keep: float) -> FloatArray:
         coarse = grown.simplify(tolerance).buffer(1.05 * tolerance, join_style="mitre")
         coordinates = shapely.get_coordinates(coarse)
         if len(coordinates) <= MAX_NODES:
-            return np.unique(coordinates, axis=0)
+            break
         tolerance = max(1.5 * tolerance, 0.25)
+    return np.unique(np.concatenate([coordinates, *map(_bends, bodies)]), axis=0)
+
+
+def _bends(body: Polygon) -> FloatArray:
+    """Corners, (8, 2), to bend around a disc."""
+    centre, (x0, _, x1, _) = np.array(body.centroid.coords[0]), body.bounds
+    angle = np.arange(4 * BEND_SEGMENTS) * math.pi / (2 * BEND_SEGMENTS)
+    reach = (1.01 * (x1 - x0) / 2 + 0.05) / math.cos(math.pi / (4 * BEND_SEGMENTS))
+    return centre + reach * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 class _Visibility:
