@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .agent.session import Run, load_run
     from .agent.wrappers.doubles import FunctionModel, ScriptedModel
     from .tools.builtin import TOOLS
+    from .tools.context import Context, Settings
     from .tools.errors import (
         FleetError,
         FormupError,
@@ -29,9 +30,8 @@ if TYPE_CHECKING:
     from .tools.geometry.outline import Outline, make_outline
     from .tools.perception.image import Picture, load_picture
     from .tools.perception.target_prompt import TargetPrompt
-    from .tools.scene import Scene, Target
     from .tools.tool import Tool, ToolResult, tool
-    from .tools.world import Settings, Workspace
+    from .tools.world import Target, World
 
 _HOMES = {
     "agent.agent": ("Agent",),
@@ -43,6 +43,7 @@ _HOMES = {
     "agent.report": ("Report",),
     "agent.session": ("Run", "load_run"),
     "tools.builtin": ("TOOLS",),
+    "tools.context": ("Context", "Settings"),
     "tools.errors": (
         "FleetError",
         "FormupError",
@@ -59,9 +60,8 @@ _HOMES = {
     "tools.geometry.outline": ("Outline", "make_outline"),
     "tools.perception.image": ("Picture", "load_picture"),
     "tools.perception.target_prompt": ("TargetPrompt",),
-    "tools.scene": ("Scene", "Target"),
     "tools.tool": ("Tool", "ToolResult", "tool"),
-    "tools.world": ("Settings", "Workspace"),
+    "tools.world": ("Target", "World"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -71,6 +71,7 @@ __all__ = [
     "Arrival",
     "Call",
     "Cancelled",
+    "Context",
     "Contract",
     "Finding",
     "FleetError",
@@ -91,7 +92,6 @@ __all__ = [
     "Report",
     "Result",
     "Run",
-    "Scene",
     "ScriptedModel",
     "Settings",
     "Stopped",
@@ -103,7 +103,7 @@ __all__ = [
     "ToolResult",
     "User",
     "Verdict",
-    "Workspace",
+    "World",
     "certify",
     "load_picture",
     "load_run",

@@ -4,8 +4,8 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from ..tools.draw import draw_view, view_scale
 from ..tools.context import Context
+from ..tools.draw import draw_view, view_scale
 from .messages import History, User
 
 MOST_NUMBERED = 40

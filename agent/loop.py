@@ -211,9 +211,7 @@ async def _settle(
     if decision == "refuse":
         talk.add(refused(call, f"{call.name} may not be called here; do without it."))
         return _ended(talk)
-    context = replace(
-        turn.context, world=talk.world, observed=talk.keep, moving=talk.moving
-    )
+    context = replace(turn.context, world=talk.world, observed=talk.keep, moving=talk.moving)
     try:
         with _stopped(clock) if turn.moves(call) else nullcontext():
             result = await answer(turn.tools, context, call, turn.limits.tool_seconds)

@@ -7,8 +7,8 @@ from ..tools.world import World
 from .messages import Call, History
 
 StopKind = Literal["limit", "repeat", "model", "tool", "fleet"]
-"""limit: a bound of this turn; repeat: the same call with the same answer, twice if it failed, three
-times if not; model, tool, fleet: they failed."""
+"""limit: a bound of this turn; repeat: the same call with the same answer, over and over; model,
+tool, fleet: they failed."""
 
 
 @dataclass(frozen=True)

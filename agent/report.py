@@ -6,20 +6,27 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from ..tools.context import Context
 from ..tools.fleet.deploy import Arrival
 from ..tools.formation.checking.verdict import Verdict
 from ..tools.formation.contract import Contract
 from ..tools.formation.plan import Plan, Shortfall
 from ..tools.formation.units import in_metres, with_metres
 from ..tools.perception.referring.attributes import Candidate
-from ..tools.context import Context
 from ..tools.perception.target_prompt import Box
 from ..tools.world import Target, World, rounded_rings
 from .messages import History, Message, Reply, Result, turn_of
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 
 Status = Literal[
-    "deployed", "planned", "answered", "needs_approval", "question", "impossible", "stopped", "failed"
+    "deployed",
+    "planned",
+    "answered",
+    "needs_approval",
+    "question",
+    "impossible",
+    "stopped",
+    "failed",
 ]
 EXIT_CODES: dict[Status, int] = {
     "deployed": 0,

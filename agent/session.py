@@ -6,7 +6,7 @@ written down before anything follows from it, so that the log opens again after 
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,10 @@ from ..tools.perception.image import Picture, load_picture, picture_file, pictur
 from ..tools.world import World
 from .calls import refused
 from .loop import Approval, NoRecorder
-from .messages import HISTORY, Call, History, Message, Reply, Result, unanswered
+from .messages import HISTORY, History, Message, Reply, Result, unanswered
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .report import Report, make_report
-from .store.folder import PICTURES, FolderArtefacts, FolderLog, log_path, read_events
+from .store.folder import PICTURES, FolderArtefacts, log_path, read_events
 from .store.protocol import Event, EventLog
 
 FORMAT = "formup-session-1"
@@ -224,6 +224,14 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
     report = make_report(outcome, context, state.began, model_name(state.facts), state.seconds)
     prompts = {"prompt": state.facts["prompt"], "prompts": tuple(state.facts["prompts"])}
     return Run(report.model_copy(update=prompts), outcome, context, state.began, path)
+
+
+def prompt_name(facts: Mapping[str, Any] | None) -> str | None:
+    """`id@vNNN`, or `id@draft-NAME`, of a prompt as logs and reports have it."""
+    if facts is None:
+        return None
+    version = facts["version"]
+    return f"{facts['id']}@{version if isinstance(version, str) else f'v{version:03d}'}"
 
 
 def model_name(facts: Mapping[str, Any]) -> str:

@@ -19,11 +19,11 @@ from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_LENGTH, MAX_ROBOTS
 from ..tools.formation.named_lengths import named_lengths
 from ..tools.formation.units import COARSEST, FINEST, check_scale
-from ..tools.geometry.outline import FARTHEST, FloatArray
-from ..tools.perception.target_prompt import TargetPrompt
+from ..tools.geometry.outline import FARTHEST
+from ..tools.perception.target_prompt import Point, TargetPrompt
 from ..tools.store import read_text
 from ..tools.tool import violations
-from ..tools.world import Descriptor
+from ..tools.context import Descriptor
 
 MAX_SPAN = 10_000
 """Seeds in one run."""
@@ -256,8 +256,8 @@ def pointed(
         raise InputError(violations(error)) from None
 
 
-def starts(path: Path | None) -> FloatArray | None:
-    """Starting positions from a JSON file [[x, y], ...] or lines of x,y; (n, 2), px.
+def starts(path: Path | None) -> tuple[Point, ...] | None:
+    """Starting positions (x, y), px, from a JSON file [[x, y], ...] or lines of x,y.
 
     Raises:
         InputError: it cannot be read, or holds anything but finite pairs.
@@ -279,7 +279,7 @@ def starts(path: Path | None) -> FloatArray | None:
         raise InputError(
             f"--starts {path} must hold one x,y a line, or JSON [[x, y], ...], in pixels."
         )
-    return values
+    return tuple((float(x), float(y)) for x, y in values.tolist())
 
 
 def limits(given: list[str] | None, before: Mapping[str, Any] | None = None) -> Limits:

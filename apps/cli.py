@@ -10,32 +10,19 @@ import typer
 
 from ..agent.agent import Agent
 from ..agent.limits import Limits
-from ..agent.outcomes import Paused
+from ..agent.outcomes import Answered, Paused
 from ..agent.policy import Policy
-from ..agent.session import load_run
-from ..agent.store.folder import prompt_name, read_trace
+from ..agent.session import load_run, prompt_name
+from ..agent.store.folder import log_path, read_events
 from ..agent.wrappers.telemetry import environment_tracer
 from ..prompts import PromptLibrary
+from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
-from ..tools.world import Settings
-from . import (
-    arguments as inputs,
-)
-from . import (
-    deploy as plans,
-)
-from . import (
-    eval_run,
-    prompts,
-    tools,
-)
+from . import arguments, deploy, eval_run, prompts, tools, trace
 from . import options as o
-from . import (
-    trace as traces,
-)
-from .run_files import Folder
-from .terminal_session import Desk
+from .run_files import Folder, write_files
+from .terminal_session import TerminalSession
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
@@ -74,6 +61,7 @@ def run(
     numbered: o.Numbered = False,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
+    detector: o.DetectorName = "standout",
     segmenter: o.SegmenterName = "grabcut",
     threshold: o.Threshold = None,
     descriptor: o.DescriptorName = "edges",
@@ -86,60 +74,72 @@ def run(
 ) -> None:
     """Carry out an instruction on a picture."""
     fixed = Settings(
-        robots=inputs.robots(robots),
-        **inputs.lengths(metres_per_pixel, robot_radius, clearance),
+        robots=arguments.robots(robots),
+        **arguments.lengths(metres_per_pixel, robot_radius, clearance),
+        detector=detector,
         segmenter=segmenter,
-        threshold=inputs.share("--threshold", threshold),
-        descriptor=inputs.descriptor(descriptor),
+        threshold=arguments.share("--threshold", threshold),
+        descriptor=arguments.descriptor(descriptor),
         fleet=fleet,
-        starts=inputs.starts(starts),
-        seed=inputs.whole("--seed", seed, least=0),
+        starts=arguments.starts(starts),
+        seed=arguments.whole("--seed", seed, least=0),
         may_deploy=not plan_only,
         numbered=numbered,
     )
-    things = inputs.pointed(point or [], box or [], outline or [], target or [])
+    things = arguments.pointed(point or [], box or [], outline or [], target or [])
     chosen = (model, base_url, planner, prompt, PromptLibrary(prompts))
-    with _agent(*chosen, inputs.limits(limit), inputs.policy(policy)) as agent:
-        picture, keep = load_picture(image), inputs.recording(record)
+    with _agent(*chosen, arguments.limits(limit), arguments.policy(policy)) as agent:
+        picture, keep = load_picture(image), arguments.recording(record)
         with Folder(out) as home:
             made = agent.run(picture, instruction, pointed=things, settings=fixed, trace=home.trace)
-            raise typer.Exit(Desk(agent, home, as_json, keep).serve(made))
+            raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
 
 
 @app.command()
 def resume(
     folder: o.RunFolder,
+    words: o.NextWords = None,
     answer: o.Answer = None,
     approve: o.Approve = None,
+    image: o.PictureFile = None,
     as_json: o.Json = False,
     model: o.ResumeModel = None,
     base_url: o.BaseUrl = None,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
 ) -> None:
-    """Go on with a run that waits for a person, was stopped, interrupted or killed."""
-    trace, left = read_trace(folder), load_run(folder)
-    start = trace.start
-    with _tracer() as tracer, Folder(trace.path.parent, resumed=True) as home:
+    """Go on with a run that waits for a person, was stopped or killed; or say what comes next."""
+    if words is not None and (answer is not None or approve is not None):
+        raise InputError("Give what to do next, or an answer with --answer, not both.")
+    path = log_path(folder)
+    left = load_run(path, None if image is None else load_picture(image))
+    start = read_events(path)[0].data
+    with _tracer() as tracer, Folder(path.parent, resumed=True) as home:
         agent = Agent(
             model or start["model"],
             base_url=base_url or (None if model else start["base_url"]),
             planner=None if model else start.get("planner"),
             prompt=prompt_name(start["prompt"]),
             library=PromptLibrary(start.get("library") and Path(start["library"])),
-            limits=inputs.limits(limit, start["limits"]),
-            policy=inputs.policy(policy, start["policy"]),
+            limits=arguments.limits(limit, start["limits"]),
+            policy=arguments.policy(policy, start["policy"]),
             tracer=tracer,
         )
         _unchanged(agent, start)
-        desk = Desk(agent, home, as_json)
-        if not (desk.can_ask and isinstance(left.outcome, Paused) and answer is approve is None):
+        session = TerminalSession(agent, home, as_json)
+        if words is not None:
+            left = agent.say(left, words)
+        elif answer is approve is None and isinstance(left.outcome, Answered | Paused):
+            if isinstance(left.outcome, Paused) and not session.can_ask:
+                write_files(home, left)  # it may have been killed before it had written them
+                agent.resume(left)  # which says what it waits for
+        else:
             left = agent.resume(left, answer=answer, approve=approve)
-        raise typer.Exit(desk.serve(left))
+        raise typer.Exit(session.serve(left))
 
 
-app.command(name="deploy")(plans.deploy)
-app.command(name="trace")(traces.show_trace)
+app.command(name="deploy")(deploy.deploy)
+app.command(name="trace")(trace.show_trace)
 
 
 def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:

@@ -102,6 +102,9 @@ PolicyList = Annotated[
     list[str] | None,
     typer.Option("--policy", help="GLOB=allow, ask or refuse, for tools' names; repeatable."),
 ]
+NextWords = Annotated[
+    str | None, typer.Argument(help="What to do next, as in the words of an instruction.")
+]
 RunFolder = Annotated[Path, typer.Argument(help="A run's folder, or its trace.")]
 Answer = Annotated[
     str | None, typer.Option("--answer", help="To the question; with --refuse, why.")
@@ -114,6 +117,7 @@ ResumeModel = Annotated[
     str | None, typer.Option("--model", help="Another than before, as in formup run.")
 ]
 TraceFile = Annotated[Path, typer.Argument(help="A run's trace, or its folder.")]
+DetectorName = Annotated[str, typer.Option("--detector", help="How things are found.")]
 SegmenterName = Annotated[str, typer.Option("--segmenter", help="How outlines are measured.")]
 Threshold = Annotated[
     str | None, typer.Option("--threshold", help="Least confidence a mask is used at, 0 to 1.")

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 from rich.console import Console
@@ -36,6 +37,7 @@ GOING_ON = {
 STATUS_STYLE = {
     "deployed": "bold green",
     "planned": "bold green",
+    "answered": "bold green",
     "question": "bold yellow",
     "needs_approval": "bold yellow",
     "impossible": "bold red",
@@ -169,15 +171,12 @@ def _arrival(console: Console, report: Report) -> None:
     arrival, positions = report.arrival, report.positions
     assert arrival is not None and positions is not None
     table = Table(box=None, padding=(0, 2), pad_edge=False, header_style="cyan")
-    for title in ("place", "robot", "requested", "observed", "off by"):
+    for title in ("robot", "requested", "observed", "off by"):
         table.add_column(title, justify="right")
     rows = zip(arrival.robots, positions, arrival.observed, arrival.residual_px, strict=True)
-    for place, (robot, wanted, seen, off) in enumerate(rows, start=1):
-        if place > MAX_ROWS:
-            break
+    for robot, wanted, seen, off in islice(rows, MAX_ROWS):
         table.add_row(
-            str(place),
-            str(robot),
+            robot,
             f"{wanted[0]:.1f}, {wanted[1]:.1f}",
             f"{seen[0]:.1f}, {seen[1]:.1f}",
             f"{off:.2f} px",

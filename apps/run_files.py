@@ -7,20 +7,16 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..agent.session import Run
 from ..agent.store.folder import NAME
+from ..tools.builtin.robots import read_track
+from ..tools.context import Context
 from ..tools.draw import draw_deployment, draw_look, draw_plan, save_gif
 from ..tools.errors import InputError
 from ..tools.formation.plan import Plan
-from ..tools.scene import Scene
-from ..tools.store import store, write_whole
-from ..tools.world import Workspace
+from ..tools.store import plan_file, write_whole
 
 PICTURES = ("plan.png", "question.png", "found.png")
-MAX_ANIMATED = 1_000
-"""More robots than this are drawn but not animated."""
 
 
 class Folder:
@@ -73,52 +69,57 @@ class Folder:
 
 
 def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
-    """Write what there is; names relative to the folder, None for what there is not."""
+    """Write what there is; names relative to the folder, None for what there is not.
+
+    Raises:
+        StorageError: something cannot be written.
+    """
     files: dict[str, str | None] = {
         "plan": None,
         "picture": None,
         "animation": None,
         "trace": NAME,
     }
-    workspace, report = run.workspace, run.report
-    plan = workspace.plans.get(report.plan_id or "")
+    picture, world, report = run.context.picture, run.world, run.report
+    node = world.plans.get(report.plan_id or "")
     title = report.instruction
-    if plan is not None:
-        stored = store(workspace, plan_id=plan.id, instruction=title)
-        write_whole(folder.path / "plan.json", stored.model_dump_json(indent=1).encode())
+    if node is not None:
+        data = plan_file(world, node.plan.id, title, picture)
+        write_whole(folder.path / "plan.json", data)
         files["plan"] = "plan.json"
-        if animate(folder.path / "deploy.gif", workspace, plan, title):
+        if animate(folder.path / "deploy.gif", run.context, node.plan, title):
             files["animation"] = "deploy.gif"
     if report.candidates:
         files["picture"] = folder.draw("question.png", _choices(run))
-    elif plan is not None:
-        files["picture"] = folder.draw("plan.png", draw_plan(workspace.scene, plan, title))
-    elif workspace.scene.targets or workspace.doubted:
-        scene = workspace.scene
-        shown = scene.with_target(workspace.doubted) if workspace.doubted else scene
-        files["picture"] = folder.draw("found.png", draw_look(shown))
+    elif node is not None:
+        files["picture"] = folder.draw("plan.png", draw_plan(picture, world, node.plan, title))
+    elif world.targets or world.doubted:
+        shown = world.with_target(world.doubted) if world.doubted else world
+        files["picture"] = folder.draw("found.png", draw_look(picture, shown))
     folder.drop_pictures_but(files["picture"])
     return files
 
 
 def _choices(run: Run) -> Any:
     """The picture with what a question offers and nothing else."""
-    workspace = run.workspace
     asked = [choice["id"] for choice in run.report.candidates or ()]
-    targets = tuple(t for t in workspace.scene.targets if t.id in asked)
+    targets = tuple(t for t in run.world.targets if t.id in asked)
     named = {t.id for t in targets}
-    candidates = [workspace.candidate(name) for name in asked if name not in named]
-    return draw_look(Scene(workspace.scene.picture, targets), candidates=candidates)
+    candidates = [run.context.candidate(name) for name in asked if name not in named]
+    shown = run.world.having(targets=targets)
+    return draw_look(run.context.picture, shown, candidates=candidates)
 
 
-def animate(path: Path, workspace: Workspace, plan: Plan, title: str) -> bool:
-    """Write the deployment of a plan as a GIF; False when it was not deployed."""
-    frames = workspace.frames.get(plan.id)
-    if not frames or len(frames[0]) > MAX_ANIMATED:
+def animate(path: Path, context: Context, plan: Plan, title: str) -> bool:
+    """Write the last deployment of a plan as a GIF; False when it was not deployed."""
+    arrival = context.world.arrivals.get(plan.id)
+    if arrival is None or arrival.track is None:
         return False
-    takes = np.asarray(workspace.arrivals[plan.id].robots) - 1
-    by_place = [poses[takes] for poses in frames]  # numbered as in the plan
-    save_gif(draw_deployment(workspace.scene, plan, by_place, title), path)
+    track = read_track(context.services.artefacts.get(arrival.track))
+    place_of = {robot: place for place, robot in enumerate(track.ids)}
+    order = [place_of[robot] for robot in plan.formation.robot_of_place]
+    frames = [points[order] for points in track.points]
+    save_gif(draw_deployment(context.picture, context.world, plan, frames, title), path)
     return True
 
 

@@ -1,4 +1,4 @@
-"""What happens with a run at the command line: told, its files written, questions answered."""
+"""A run at the command line: shown, its files written, the person's answers given to it."""
 
 import sys
 from pathlib import Path
@@ -9,6 +9,7 @@ from ..agent.agent import Agent
 from ..agent.outcomes import Cancelled
 from ..agent.report import Report
 from ..agent.session import Run
+from ..tools.errors import InputError
 from ..tools.store import write_whole
 from .main import INTERRUPTED
 from .run_display import ask, at_terminal, show_report
@@ -18,7 +19,7 @@ MOST_ANSWERS = 5
 """Questions answered in one run at a terminal."""
 
 
-class Desk:
+class TerminalSession:
     """Where a person meets a run.
 
     Args:
@@ -39,12 +40,12 @@ class Desk:
         return not self._as_json and at_terminal()
 
     def serve(self, run: Run) -> int:
-        """Tell what came of a run, and go on as long as a person answers.
+        """Show what came of a run, and go on as long as a person answers.
 
         Returns:
             What to exit with.
         """
-        report = self._told(run)
+        report = self._show(run)
         for _ in range(MOST_ANSWERS if self.can_ask else 0):
             if report.status not in ("question", "needs_approval"):
                 break
@@ -54,17 +55,24 @@ class Desk:
                 break
             approve = None if asked else text.lower() in ("y", "yes")
             run = self._agent.resume(run, answer=text, approve=approve)
-            report = self._told(run)
+            report = self._show(run)
         return INTERRUPTED if isinstance(run.outcome, Cancelled) else report.exit_code
 
-    def _told(self, run: Run) -> Report:
-        files = write_files(self._folder, run)
-        report = run.report.model_copy(update={"files": files})
+    def _show(self, run: Run) -> Report:
+        report = run.report
+        try:
+            report = report.model_copy(update={"files": write_files(self._folder, run)})
+            if self._record is not None and run.trace:
+                write_whole(self._record, run.trace.read_bytes())
+        except InputError as error:
+            if report.arrival is None:
+                raise
+            # Robots have moved: that is what has to be reported, whatever the disk says.
+            text = f"{report.message} Files are missing: {error}"
+            report = report.model_copy(update={"message": text})
         if self._as_json:
             print(report.model_dump_json(indent=2))  # noqa: T201
             print(f"formup: files in {self._folder.path}", file=sys.stderr)  # noqa: T201
         else:
             show_report(Console(highlight=False), report, str(self._folder.path))
-        if self._record is not None and run.trace:
-            write_whole(self._record, run.trace.read_bytes())
         return report

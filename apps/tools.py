@@ -2,19 +2,20 @@
 
 import asyncio
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import typer
 
 from ..tools.builtin import TOOLS
+from ..tools.context import Context, Settings
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import Contract
 from ..tools.perception.image import load_picture
-from ..tools.scene import Scene
 from ..tools.schema import compact_schema
-from ..tools.store import read_stored, restore, store, write_whole
-from ..tools.world import Settings, Workspace
+from ..tools.store import StoredWorld, picture_of, read_world, write_whole
+from ..tools.world import World
 from . import arguments as inputs
 from . import options as o
 
@@ -57,12 +58,14 @@ def call_tool(
     if tool is None:
         raise InputError(f"Unknown tool {name!r}. There are: {', '.join(t.name for t in TOOLS)}.")
     arguments = _arguments(args)
-    workspace = _workspace(image, state, Settings(metres_per_pixel=inputs.scale(metres_per_pixel)))
+    context = _context(image, state, Settings(metres_per_pixel=inputs.scale(metres_per_pixel)))
+    observed: list[World] = []
     try:
-        result = asyncio.run(tool.call(workspace, arguments))
+        called = tool.call(replace(context, observed=observed.append), arguments)
+        result = asyncio.run(called)
     except ToolError as error:
-        if metres_per_pixel is None:  # another scale is not kept by what was refused
-            _save(workspace, state)  # such as a partial plan that the error names
+        if metres_per_pixel is None and observed:  # another scale is not kept if it was refused
+            _save(observed[-1], context, state)  # such as a partial plan that the error names
         raise InputError(str(error)) from None
     data = dict(result.data)
     folder = state.parent if state else Path()
@@ -70,13 +73,14 @@ def call_tool(
         written = folder / f"{name}-{number}.png"
         write_whole(written, png)
         data.setdefault("pictures", []).append(str(written))
-    _save(workspace, state)
+    _save(result.world or context.world, context, state)
     print(json.dumps(data, indent=2, ensure_ascii=False))  # noqa: T201
 
 
-def _save(workspace: Workspace, state: Path | None) -> None:
+def _save(world: World, context: Context, state: Path | None) -> None:
     if state is not None:
-        write_whole(state, store(workspace).model_dump_json(indent=1).encode())
+        lay = context.picture.path and str(context.picture.path)
+        write_whole(state, StoredWorld(picture=lay, world=world).to_bytes())
 
 
 def _arguments(text: str) -> dict[str, Any]:
@@ -89,12 +93,13 @@ def _arguments(text: str) -> dict[str, Any]:
     return cast(dict[str, Any], arguments)
 
 
-def _workspace(image: Path | None, state: Path | None, settings: Settings) -> Workspace:
+def _context(image: Path | None, state: Path | None, settings: Settings) -> Context:
+    given = None if image is None else load_picture(image)
     if state is not None and state.exists():
-        picture = None if image is None else load_picture(image)
-        return restore(read_stored(state), picture, settings)
-    if image is None:
+        stored = read_world(state)
+        return Context.of(picture_of(stored, state, given), settings, stored.world)
+    if given is None:
         raise InputError(
             "Name the picture with --image, or a state file that has one with --state."
         )
-    return Workspace(Scene(load_picture(image)), settings)
+    return Context.of(given, settings)

@@ -1,13 +1,17 @@
 """`formup trace FILE`: a run as it went, for reading."""
 
 import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..agent.store.folder import Trace, prompt_name, read_trace
+from ..agent.session import model_name, prompt_name
+from ..agent.store.folder import PICTURES, FolderArtefacts, log_path, read_events
+from ..agent.store.protocol import Event
 from . import options as o
 from .run_display import STATUS_STYLE
 
@@ -16,75 +20,79 @@ LONGEST = 300
 
 
 def show_trace(file: o.TraceFile) -> None:
-    """Show a run step by step: what was said and called, times, tokens, cost, pictures."""
-    trace, console = read_trace(file), Console(highlight=False)
-    start = trace.start
-    console.print(Text(start["instruction"], style="bold"))
-    prompt = prompt_name(start["prompt"])
+    """Show a session step by step: what was said and called, times, tokens, cost, pictures."""
+    start, *events = read_events(file)
+    console = Console(highlight=False)
+    prompt = prompt_name(start.data["prompt"])
     with_prompt = f", prompt {prompt}" if prompt else ""
-    image = trace.state()[0].image
-    size = f"{image.width} x {image.height} px"
-    console.print(Text(f"{start['model']}{with_prompt}, on {image.path or 'a picture'}, {size}"))
-    console.print(_steps(trace))
-    console.print(_end(trace))
+    picture = start.data["picture"]
+    size = f"{picture['facts']['width']} x {picture['facts']['height']} px"
+    where = picture["path"] or "a picture"
+    console.print(Text(f"{model_name(start.data)}{with_prompt}, on {where}, {size}"))
+    pictures = FolderArtefacts(log_path(file).parent / PICTURES)
+    turns = [i for i, event in enumerate(events) if event.kind == "turn"]
+    for first, after in zip(turns, [*turns[1:], len(events)], strict=True):
+        console.print(Text(events[first].data["words"], style="bold"))
+        console.print(_steps(events[first:after], pictures))
+        console.print(_end(events[after - 1], file))
 
 
-def _steps(trace: Trace) -> Table:
+def _steps(events: Sequence[Event], pictures: FolderArtefacts) -> Table:
     """A row for each message, with the time since the one before and what it cost, if anything."""
-    counts = any(any(_spent(line)) for line in trace.lines)
+    counts = any(any(_spent(event.data)) for event in events)
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="cyan")
     for title in ("at", "took", "tokens", "USD") if counts else ("at", "took"):
         table.add_column(title, justify="right", no_wrap=True)
     table.add_column("step", overflow="fold")
     before = 0.0
-    for line in trace.lines:
-        now = float(line["seconds"])
-        if line["type"] == "resume":
+    for event in events:
+        now = event.seconds
+        if event.kind == "resume":
             table.add_row(*[""] * (len(table.columns) - 1), Text("resumed", style="yellow"))
             before = 0.0
-        if line["type"] == "message":
-            spent = _spent(line) if counts else ()
-            shown = Text("\n").join(_step(trace, line))
+        if event.kind == "message":
+            spent = _spent(event.data) if counts else ()
+            shown = Text("\n").join(_step(event.data, pictures))
             table.add_row(f"{now:.2f} s", f"{now - before:.2f} s", *spent, shown)
             before = now
     return table
 
 
-def _spent(line: dict[str, Any]) -> tuple[str, str]:
-    usage: dict[str, Any] = line.get("usage") or {}
+def _spent(message: Mapping[str, Any]) -> tuple[str, str]:
+    usage: dict[str, Any] = message.get("usage") or {}
     used = usage.get("input_tokens", 0), usage.get("output_tokens", 0)
     cost = usage.get("cost_usd", 0.0)
     return f"{used[0]:,}+{used[1]:,}" if any(used) else "", f"{cost:.4f}" if cost else ""
 
 
-def _step(trace: Trace, line: dict[str, Any]) -> list[Text]:
+def _step(message: Mapping[str, Any], pictures: FolderArtefacts) -> list[Text]:
     """A message as lines: who, what it says, calls, pictures."""
-    said: list[Text] = []
-    if line["role"] == "user":
-        said.append(Text.assemble(("person  ", "bold"), _short(line["text"])))
-    elif line["role"] == "assistant":
-        if line["text"]:
-            said.append(Text.assemble(("model   ", "bold"), _short(line["text"])))
-        for call in line["calls"]:
+    lines: list[Text] = []
+    text = _short(message.get("text", ""))
+    if message["role"] == "user":
+        lines.append(Text.assemble(("person  ", "bold"), text))
+    elif message["role"] == "assistant":
+        if text:
+            lines.append(Text.assemble(("model   ", "bold"), text))
+        for call in message.get("calls", ()):
             arguments = json.dumps(call["arguments"], ensure_ascii=False)
             named = (f"{call['name']} ", "cyan")
-            said.append(Text.assemble(("call    ", "bold"), named, _short(arguments)))
+            lines.append(Text.assemble(("call    ", "bold"), named, _short(arguments)))
     else:
-        error = (f"{line['error']}: ", "red") if line["error"] else ""
-        named = (f"{line['name']} ", "cyan")
-        said.append(Text.assemble(("result  ", "bold"), named, error, _short(line["text"])))
-    said += [
-        Text.assemble(("picture ", "bold"), str(trace.path.parent / image["path"]))
-        for image in line["images"]
-    ]
-    return said
+        error = (f"{message['error']}: ", "red") if message.get("error") else ""
+        named = (f"{message['name']} ", "cyan")
+        lines.append(Text.assemble(("result  ", "bold"), named, error, text))
+    names = [pictures.name(image["sha256"]) or "missing" for image in message["images"]]
+    root = pictures.folder.parent
+    lines += [Text.assemble(("picture ", "bold"), str(root / name)) for name in names]
+    return lines
 
 
-def _end(trace: Trace) -> Text:
-    end = trace.end
-    if end is None:
-        text = f"broken off; formup resume {trace.path} goes on"
+def _end(last: Event, file: Path) -> Text:
+    if last.kind != "end":
+        text = f"broken off; formup resume {file} goes on"
         return Text.assemble(("killed: ", "bold red"), text)
+    end = last.data
     usage, style = end["usage"], STATUS_STYLE.get(end["status"], "bold")
     counts = (
         f"{usage['requests']} requests, {usage['tool_calls']} tool calls, "

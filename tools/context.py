@@ -101,6 +101,9 @@ class MemoryArtefacts:
         return self._files[sha256]
 
 
+USUAL = Settings()
+
+
 @dataclass
 class Services:
     """What tools use beside the world; nothing in here decides what happens.
@@ -142,7 +145,7 @@ class Context:
 
     world: World
     services: Services
-    settings: Settings = Settings()
+    settings: Settings = USUAL
     words: str = ""
     observed: Callable[[World], None] = _ignore
     moving: Callable[[str], None] = _ignore
@@ -156,8 +159,7 @@ class Context:
         Raises:
             InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
         """
-        fixed = settings or Settings()
-        made = cls(world or World.of(picture), Services.of(picture), fixed)
+        made = cls(world or World.of(picture), Services.of(picture), settings or USUAL)
         return made.check()
 
     def check(self) -> "Context":

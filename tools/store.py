@@ -110,7 +110,9 @@ def picture_of(stored: StoredWorld, path: Path, given: Picture | None = None) ->
         lay = Path(stored.picture) if stored.picture is not None else None
         if beside is None and (lay is None or not lay.is_file()):
             where = f": it is no longer at {lay}" if lay else ""
-            raise ImageError(f"The picture of {path} is not beside it{where}; name it with --image.")
+            raise ImageError(
+                f"The picture of {path} is not beside it{where}; name it with --image."
+            )
         given = load_picture(beside or cast(Path, lay))
     if given.sha256 != wanted:
         raise InputError(

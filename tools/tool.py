@@ -17,9 +17,9 @@ from typing import Any, Literal, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from .context import Context
 from .errors import ArgumentsError
 from .schema import compact_schema, without_bounds
-from .context import Context
 from .world import World
 
 Kind = Literal["read", "commit", "actuate", "ask", "end"]

@@ -6,7 +6,7 @@ down, pixel centres at whole numbers.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import shapely
 from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, field_validator
@@ -14,9 +14,9 @@ from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, field_
 from .errors import ToolError
 from .fleet.deploy import Arrival
 from .fleet.protocol import Pose
+from .formation.contract import Contract
 from .formation.placement.place import Site
 from .formation.plan import Plan, scene_version
-from .formation.contract import Contract
 from .formation.units import also_metres, check_scale
 from .formation.value import Value
 from .geometry.outline import Outline, make_outline
@@ -300,9 +300,9 @@ _ANYTHING: TypeAdapter[Any] = TypeAdapter(Any)
 
 
 def _by_id(part: Any) -> dict[str, Any]:
-    if part is None:
-        return {}
-    return dict(part) if isinstance(part, dict) else {item.id: item for item in part}
+    if isinstance(part, dict):
+        return dict(cast(dict[str, Any], part))
+    return {item.id: item for item in cast(tuple[Any, ...], part or ())}
 
 
 def to_json_values(value: Any) -> Any:

@@ -43,7 +43,7 @@ class FolderLog:
         if not lock(self._file.fileno()):
             self._file.close()
             raise StorageError(
-                f"{path} is being written by another process; wait until that has ended, or stop it."
+                f"{path} is being written by another process; wait for it to end, or stop it."
             )
         if begin:
             self._file.truncate()

@@ -8,9 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-EventKind = Literal[
-    "session", "turn", "resume", "world", "message", "approval", "moving", "end"
-]
+EventKind = Literal["session", "turn", "resume", "world", "message", "approval", "moving", "end"]
 """session: who decides, by which prompts, within which limits, and the picture; turn: what the
 person says, with the settings; resume: the turn goes on, perhaps in another process; world: what
 has changed in it; message: of the conversation; approval: a person's yes or no to a call; moving:

@@ -1,12 +1,14 @@
 """A recorded run in a model's place: the same replies, as long as everything else is the same."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ...tools.errors import ModelError
 from ..messages import Reply
 from ..model import Request
-from ..store.folder import message_facts, prompt_name, read_trace
+from ..session import message_facts, model_name, prompt_name
+from ..store.folder import read_events
 
 LONGEST = 120
 """Characters of a message that an error repeats."""
@@ -25,11 +27,11 @@ class ReplayModel:
     """
 
     def __init__(self, path: Path) -> None:
-        trace = read_trace(path)
+        start, *events = read_events(path)
         self._path = path
-        self._lines = trace.of_type("message")
-        self.name = trace.model
-        self.prompt = prompt_name(trace.start["prompt"])
+        self._lines = [event.data for event in events if event.kind == "message"]
+        self.name = model_name(start.data)
+        self.prompt = prompt_name(start.data["prompt"])
         self.sees = bool(self._lines and self._lines[0]["images"])
 
     async def reply(self, request: Request) -> Reply:
@@ -42,31 +44,31 @@ class ReplayModel:
         for number, message in enumerate(request.messages):
             then, now = self._at(number), message_facts(message)
             if _facts(then) != _facts(now):
-                raise ModelError(self._parted(number + 1, then["text"], repr(_short(now["text"]))))
+                raise ModelError(self._parted(number + 1, then, repr(_short(now.get("text", "")))))
         line = self._at(count)
         facts = {k: v for k, v in _facts(line).items() if k not in ("role", "images")}
         if line["role"] != "assistant":
-            raise ModelError(self._parted(count + 1, line["text"], "the model's turn"))
+            raise ModelError(self._parted(count + 1, line, "the model's turn"))
         return Reply.model_validate(facts)
 
-    def _at(self, number: int) -> dict[str, Any]:
+    def _at(self, number: int) -> Mapping[str, Any]:
         if number >= len(self._lines):
             text = f"The recording {self._path} ends after message {len(self._lines)}."
             raise ModelError(text)
         return self._lines[number]
 
-    def _parted(self, number: int, then: str, now: str) -> str:
+    def _parted(self, number: int, then: Mapping[str, Any], now: str) -> str:
+        text = _short(then.get("text", ""))
         return (
-            f"The recording {self._path} parts from this run at message {number}: it was "
-            f"{_short(then)!r} and is {now} now; replay it with the same picture, instruction and "
-            "options."
+            f"The recording {self._path} parts from this run at message {number}: it was {text!r} "
+            f"and is {now} now; replay it with the same picture, instruction and options."
         )
 
 
-def _facts(line: dict[str, Any]) -> dict[str, Any]:
+def _facts(line: Mapping[str, Any]) -> dict[str, Any]:
     """What two messages must share: of images the number alone, for libraries that draw and
     compress write other bytes in other versions."""
-    facts = {k: v for k, v in line.items() if k not in ("type", "seconds") and v is not None}
+    facts = {k: v for k, v in line.items() if v is not None}
     return facts | {"images": len(line["images"])}
 
 

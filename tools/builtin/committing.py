@@ -67,12 +67,13 @@ async def propose_formation(
         return world, *_planned(context.at(world), held, places)
 
     world, node, partial = await in_thread(work)
+    offered: dict[str, Any] = {}
     if partial is not None:
         world = await with_robots(context.at(world), PlanNode(plan=partial, unseen=node.unseen))
-        data = {"partial": _offer(next(reversed(world.plans.values())).plan)}
+        offered = {"partial": _offer(world.plan().plan)}
     world = await with_robots(context.at(world), node)
     node = world.plan()
-    data = _proposal(world, node.plan) | ({} if partial is None else data)
+    data = _proposal(world, node.plan) | offered
     if node.plan.verdict.certified and (advice := _to_see(world, node)):
         data |= {"look_first": advice}
     shown = overlays(context.at(world), map(world.target, node.unseen), node.plan)
@@ -101,7 +102,9 @@ def _planned(context: Context, held: Contract, places: Any) -> tuple[PlanNode, P
         plan = make_plan(held, site, world.version, places)
     except ToolError as error:
         text = world.with_metres(str(error))
-        if isinstance(error, REFUSALS) and (partial := best_partial(held, site, world.version, error)):
+        if isinstance(error, REFUSALS) and (
+            partial := best_partial(held, site, world.version, error)
+        ):
             context.observed(world.with_plan(PlanNode(plan=partial)))
             text += f" {_offer(partial)}"
         raise ToolError(text) from None
@@ -133,16 +136,18 @@ async def deploy(
     _check_may_move(context, node.plan)
     if plan_id is None and (advice := _to_see(context.world, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
-    plan, arrival, world = await drive_to(context, node)
+    arrival, world = await drive_to(context, node)
     worst = int(np.argmax(arrival.residual_px))
     data = {
-        "plan_id": plan.id,
+        "plan_id": node.plan.id,
         "arrived": arrival.arrived,
         "corrections": arrival.corrections,
         "worst_residual_px": arrival.residual_px[worst],
         "worst_robot": arrival.robots[worst],
         "tolerance_px": arrival.tolerance_px,
     }
+    if world is context.world:
+        data["already_there"] = True
     message = _with_observed(tell, arrival, world) if arrival.arrived else None
     data = with_metres(data, world.metres_per_pixel)
     return ToolResult(data, world=world, message=message)

@@ -9,11 +9,11 @@ from shapely.geometry import LineString
 from shapely.geometry import Point as Place
 from shapely.geometry.base import BaseGeometry
 
+from ..context import Context, Descriptor
 from ..formation.units import with_metres
 from ..geometry.outline import FloatArray, Outline, distances
 from ..perception.target_prompt import Point
 from ..tool import ToolResult, tool
-from ..context import Context, Descriptor
 from .seeing import framed
 
 MATRIX_SIDE = 32

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
+from ..context import Context
 from ..errors import ToolError
 from ..formation.contract import (
     MAX_ROBOTS,
@@ -28,7 +29,6 @@ from ..geometry.rings import equal_chords, hole_rings, nested_rings
 from ..geometry.sampling import min_spacing
 from ..perception.target_prompt import Box, Point
 from ..tool import ToolResult, tool, violations
-from ..context import Context
 from .seeing import framed
 
 Count = Annotated[int, Field(ge=1, le=MAX_ROBOTS)]

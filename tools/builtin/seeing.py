@@ -1,20 +1,18 @@
 """Tools that look at the picture: look, locate_object, segment."""
 
-from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
 
+from ..context import Context
 from ..draw import draw_view, view_scale
 from ..errors import ToolError
-from ..formation.plan import Plan
 from ..perception.detectors.candidates import clear_ones
+from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
 from ..perception.referring.relations import Query, select
 from ..perception.target_prompt import Box, Point, TargetPrompt, box_problems
 from ..tool import ToolResult, tool, violations
-from ..context import Context
 from .targets import doubtful, framed, measured_all, overlays, summary
 
 MOST_SHOWN = 40

@@ -148,5 +148,3 @@ def closer_view(context: Context, target: Target, plan: Plan | None = None) -> b
     region = (x0 - out, y0 - out, x1 + out, y1 + out)
     drawn = () if target.source is None else target.source.outline or ()
     return draw_view(context.picture, shown, plan=plan, region=region, drawn=drawn)
-
-

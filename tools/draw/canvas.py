@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..geometry.outline import FloatArray
 from ..perception.image import Picture
-from ..scene import Box
+from ..perception.target_prompt import Box
 from .text import font, shortened
 
 Colour = tuple[int, int, int]

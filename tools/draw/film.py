@@ -13,8 +13,8 @@ from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
 from ..geometry.sampling import nearest
 from ..perception.image import Picture
-from ..scene import Scene
 from ..store import write_whole
+from ..world import World
 from .canvas import (
     ALLOWED,
     CERTIFIED,
@@ -71,7 +71,8 @@ STYLE: tuple[Colour, ...] = (
 
 
 def draw_deployment(
-    scene: Scene,
+    picture: Picture,
+    world: World,
     plan: Plan,
     frames: Sequence[FloatArray],
     title: str,
@@ -79,18 +80,18 @@ def draw_deployment(
     """One picture per frame, all of one size, no side over 640 px.
 
     Args:
-        scene: what the plan was made in.
+        world: what the plan was made in.
         plan: its places are the goals.
         frames: (n, 2) each: where the robots are over time, in the order of their places, px.
         title: usually the instruction.
 
     Raises:
-        ToolError: the plan names a target that the scene does not have.
+        ToolError: the plan names a target that the world does not have.
     """
     goals = plan.formation.points
-    page = make_page(scene.picture, _long(scene.picture), UNIT, title, TITLE_LINES, NARROWEST)
+    page = make_page(picture, _long(picture), UNIT, title, TITLE_LINES, NARROWEST)
     for name in plan.formation.contract.target_ids:
-        draw_outline(page.canvas, scene.target(name).outline)
+        draw_outline(page.canvas, world.target(name).outline)
     radius = robot_size(page.canvas, goals)
     _draw_goals(page.canvas, goals, radius)
     draw_bars(page)

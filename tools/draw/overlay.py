@@ -15,7 +15,8 @@ from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
 from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
-from ..scene import Box, Scene
+from ..perception.target_prompt import Box
+from ..world import World
 from .canvas import CERTIFIED, FINDING, INK, PARTIAL, Canvas, Colour, Labels
 from .captions import draw_bars, draw_footer, make_page
 from .escape_path import draw_escape
@@ -61,7 +62,7 @@ NEAR = 2.0
 """Robots more than so many long sides of the picture away are not led lines to."""
 
 
-def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
+def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.Image:
     """The photograph with the contract, the robots and the verdict.
 
     Areas where robots' centres may stand are tinted; what a ring leaves open, a side, a line
@@ -70,7 +71,7 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
     metres too and the footer has a scale bar.
 
     Args:
-        scene: what the plan was made in.
+        world: what the plan was made in.
         plan: certified or not; robots at no finite place are left out.
         title: usually the instruction; in any language, of any length.
 
@@ -78,12 +79,12 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
         RGB, the photograph's long side 1200 to 1500 px, with a title above and a footer below.
 
     Raises:
-        ToolError: the plan names a target that the scene does not have.
+        ToolError: the plan names a target that the world does not have.
     """
     contract, points = plan.formation.contract, plan.formation.points
-    site = scene.site(contract)
-    long = _long(scene.picture)
-    page = make_page(scene.picture, long, long / UNITS, title, TITLE_LINES, NARROWEST)
+    site = world.site(contract)
+    long = _long(picture)
+    page = make_page(picture, long, long / UNITS, title, TITLE_LINES, NARROWEST)
     canvas = page.canvas
     draw_areas(canvas, contract, site, points)
     drivable = len(points) == contract.robots and _near(points, site).all()
@@ -96,15 +97,18 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
     if drivable:
         label_openings(canvas, contract, site, points, labels)
     draw_bars(page)
-    scale = scene.metres_per_pixel
+    scale = world.metres_per_pixel
     taken = draw_scale_bar(canvas, scale) if scale else 0.0
     badge, ground = _badge(plan)
-    draw_footer(canvas, scene.told(badge), ground, list(map(scene.told, _facts(plan))), taken)
+    draw_footer(
+        canvas, world.with_metres(badge), ground, list(map(world.with_metres, _facts(plan))), taken
+    )
     return canvas.finish()
 
 
 def draw_look(
-    scene: Scene,
+    picture: Picture,
+    world: World,
     *,
     plan: Plan | None = None,
     candidates: Sequence[Candidate] = (),
@@ -113,7 +117,7 @@ def draw_look(
     """The photograph with what coordinates and ids can be read from.
 
     Args:
-        scene: its targets are outlined and tagged with their ids.
+        world: its targets are outlined and tagged with their ids.
         plan: its robots are drawn.
         candidates: outlined and numbered, 3 for c3.
         rulers: whether all four edges bear rulers in image pixels.
@@ -122,34 +126,34 @@ def draw_look(
         RGB, the photograph's long side 1200 to 1500 px.
 
     Raises:
-        ToolError: the plan names a target that the scene does not have.
+        ToolError: the plan names a target that the world does not have.
     """
-    long = _long(scene.picture)
+    long = _long(picture)
     unit = long / UNITS
     left, top, right, bottom = (round(m * unit) if rulers else 0 for m in RULER)
-    canvas = Canvas(scene.picture, long, unit, (left, top, right, bottom))
-    draw_scene(canvas, scene, plan, candidates, Labels(canvas.photo))
+    canvas = Canvas(picture, long, unit, (left, top, right, bottom))
+    draw_world(canvas, world, plan, candidates, Labels(canvas.photo))
     if rulers:
         draw_rulers(canvas)
     return canvas.finish()
 
 
-def draw_scene(
+def draw_world(
     canvas: Canvas,
-    scene: Scene,
+    world: World,
     plan: Plan | None,
     candidates: Sequence[Candidate],
     labels: Labels,
 ) -> None:
     """Targets with their ids, a plan's robots and numbered candidates, on a photograph."""
-    count = len(scene.targets)
-    colours = colours_of([thing.outline for thing in (*scene.targets, *candidates)])
-    for target, colour in zip(scene.targets, colours[:count], strict=True):
+    count = len(world.targets)
+    colours = colours_of([thing.outline for thing in (*world.targets, *candidates)])
+    for target, colour in zip(world.targets, colours[:count], strict=True):
         draw_outline(canvas, target.outline, colour)
     if plan is not None:
-        _draw_robots(canvas, plan, scene.site(plan.formation.contract), labels)
+        _draw_robots(canvas, plan, world.site(plan.formation.contract), labels)
     draw_numbered(canvas, candidates, colours[count:], labels)
-    for target, colour in zip(scene.targets, colours[:count], strict=True):
+    for target, colour in zip(world.targets, colours[:count], strict=True):
         _draw_tag(canvas, target.id, target.box, colour, labels)
 
 

@@ -14,10 +14,10 @@ import numpy as np
 from ..formation.plan import Plan
 from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
-from ..perception.target_prompt import Point
-from ..scene import Box, Scene
+from ..perception.target_prompt import Box, Point
+from ..world import World
 from .canvas import WHITE, Canvas, Labels
-from .overlay import draw_scene
+from .overlay import draw_world
 from .rulers import RULER, draw_rulers
 
 MOST_LONG, LEAST_LONG = 1024, 400
@@ -36,7 +36,8 @@ def view_scale(picture: Picture) -> float:
 
 
 def draw_view(
-    scene: Scene,
+    picture: Picture,
+    world: World,
     *,
     plan: Plan | None = None,
     candidates: Sequence[Candidate] = (),
@@ -46,16 +47,16 @@ def draw_view(
     """The photograph with rulers along its right and lower edge, as a JPEG file.
 
     Args:
-        scene: its targets are outlined and tagged with their ids.
+        world: its targets are outlined and tagged with their ids.
         plan: its robots are drawn.
         candidates: outlined and numbered, 3 for c3.
         region: x0, y0, x1, y1, a part to look at closer, image pixels; the rulers go with it.
         drawn: vertices (x, y) of an outline somebody drew, which is dashed; none for none.
 
     Raises:
-        ToolError: the plan names a target that the scene does not have.
+        ToolError: the plan names a target that the world does not have.
     """
-    picture, origin = scene.picture, (0, 0)
+    origin = (0, 0)
     long = max(round(view_scale(picture) * max(picture.size)), 1)
     if region is not None:
         picture, origin = _part(picture, region)
@@ -63,7 +64,7 @@ def draw_view(
     canvas = Canvas(picture, long, 1.0, (0, 0, RULER[2], RULER[3]), origin)
     if drawn:
         canvas.dashes([np.asarray([*drawn, drawn[0]], dtype=float)], WHITE, 1.0)
-    draw_scene(canvas, scene, plan, candidates, Labels(canvas.photo))
+    draw_world(canvas, world, plan, candidates, Labels(canvas.photo))
     draw_rulers(canvas)
     file = BytesIO()
     canvas.finish().save(file, "JPEG", quality=QUALITY, subsampling=0)

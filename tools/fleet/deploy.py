@@ -55,6 +55,7 @@ class Arrival(BaseModel):
         observed: where they were seen last, px.
         residual_px: distance of observed to requested.
         corrections: how many times robots were sent again after the first drive.
+        track: hash of the file that holds where they were on their way.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -68,6 +69,7 @@ class Arrival(BaseModel):
     residual_px: tuple[float, ...]
     tolerance_px: float
     corrections: int
+    track: str | None = None
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,7 @@ def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Pictur
     digest.update(copy.tobytes())
     return Picture(copy, digest.hexdigest(), name, ())
 
+
 def picture_file(picture: Picture) -> bytes:
     """A file that holds the picture: the one it came from while that is the same, else a PNG."""
     if picture.path is not None:

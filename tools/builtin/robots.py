@@ -1,0 +1,156 @@
+"""Robots for plans: which robot takes which place, and the drive there."""
+
+import json
+from contextlib import suppress
+
+import numpy as np
+
+from ..context import Context
+from ..errors import ApprovalError, FleetError, StorageError, ToolError
+from ..fleet.deploy import MAX_AGE, Arrival, Track, assign_robots, deploy
+from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
+from ..fleet.registry import FLEETS
+from ..formation.contract import Contract
+from ..formation.plan import Plan
+from ..motion.motion import obstacles
+from ..tool import in_thread
+from ..world import PlanNode, World
+
+
+async def with_robots(context: Context, node: PlanNode) -> World:
+    """The world with a plan as the current one and, if it is certified, robots for its places.
+
+    Raises:
+        ToolError: a real fleet has too few robots.
+        FleetError: the fleet cannot be observed.
+        InputError: starting positions that cannot be.
+    """
+    world, plan = context.world, node.plan
+    if not plan.verdict.certified:
+        return world.with_plan(node)
+    try:
+        fleet = await _team(context, plan.formation.contract)
+        poses = await fleet.observe(max_age=MAX_AGE)
+        points = plan.formation.points
+        found = await in_thread(lambda: assign_robots(poses, points))
+    except FleetSizeError as error:
+        if error.available < error.needed and context.settings.fleet != "simulated":
+            raise ToolError(str(error)) from None
+        return world.with_plan(node)  # more than are simulated can be planned
+    plan = plan.for_robots(found.robots, [pose.id for pose in poses])
+    if found.gap is not None:
+        note = (
+            "Which robot takes which place is approximate: another assignment could save "
+            f"{found.gap:.2%} of the summed squared ways at most."
+        )
+        verdict = plan.verdict.model_copy(update={"notes": (*plan.verdict.notes, note)})
+        plan = plan.model_copy(update={"verdict": verdict})
+    return world.having(robots=poses).with_plan(node.model_copy(update={"plan": plan}))
+
+
+async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World]:
+    """Drive the robots of a plan to their places, and say what was observed.
+
+    Where they stand at its end is kept also if it fails or is cancelled. Robots that are there
+    already are not moved.
+
+    Raises:
+        ApprovalError: real robots, and the person has not approved this plan.
+        ToolError: more robots than can be driven, or one stands on a place.
+        FleetError: robots failed or were stopped on the way.
+    """
+    plan, world = node.plan, context.world
+    last: tuple[Pose, ...] = ()
+
+    def watch(poses: tuple[Pose, ...]) -> None:
+        nonlocal last
+        last = poses
+
+    try:
+        fleet = await _team(context, plan.formation.contract)
+        if fleet.real and context.settings.approved != plan.id:
+            raise ApprovalError(plan.id)
+        before = world.arrivals.get(plan.id)
+        if before is not None and _are_there(await fleet.observe(max_age=MAX_AGE), plan, before):
+            return before, world
+        context.moving(plan.id)
+        site = world.site(plan.formation.contract)
+        made = await deploy(plan, site, fleet, plan.formation.robot_of_place, watch=watch)
+    except (FleetSizeError, PlaceTakenError) as error:
+        raise ToolError(str(error)) from None
+    finally:
+        if last:
+            context.observed(world.having(robots=last))
+    arrival = _in_robot_order(made.arrival, plan)
+    with suppress(StorageError):  # a film is not worth failing for
+        stored = context.services.artefacts.put(_track_file(made.track))
+        arrival = arrival.model_copy(update={"track": stored})
+    world = world.having(robots=made.poses).with_arrival(plan.id, arrival)
+    if arrival.reason is not None:
+        context.observed(world)
+        raise FleetError(arrival.reason)
+    return arrival, world
+
+
+async def _team(context: Context, contract: Contract) -> Fleet:
+    """The robots, as many as a contract wants if they are simulated."""
+    settings, world, fleets = context.settings, context.world, context.services.fleets
+    held = fleets.get(settings.fleet)
+    driven = any(pose.seen > 0 for pose in world.robots)
+    enough = len(world.robots) >= contract.robots if driven else False
+    if held is not None and (held.real or enough):
+        return held
+    radius = contract.robot_radius
+    fleet = FLEETS.load(settings.fleet)(
+        FleetRequest(
+            size=world.picture.size,
+            robots=contract.robots,
+            known=world.robots if driven or len(world.robots) == contract.robots else (),
+            driven=driven,
+            starts=None if settings.starts is None else np.asarray(settings.starts, dtype=float),
+            solid=obstacles(contract, world.site(contract)),
+            radius=radius,
+            seed=settings.seed,
+        )
+    )
+    if held is not None:
+        if held.stopped:
+            await fleet.stop()
+        await held.close()
+    fleets[settings.fleet] = fleet
+    return fleet
+
+
+def _are_there(poses: tuple[Pose, ...], plan: Plan, arrival: Arrival) -> bool:
+    """Whether all robots of a plan stand where they had arrived."""
+    seen = {pose.id: (pose.x, pose.y) for pose in poses}
+    wanted = zip(arrival.robots, plan.formation.positions, strict=True)
+    return arrival.arrived and all(
+        robot in seen and np.hypot(*np.subtract(seen[robot], place)) <= arrival.tolerance_px
+        for robot, place in wanted
+    )
+
+
+def _in_robot_order(arrival: Arrival, plan: Plan) -> Arrival:
+    """An arrival by places as one by robots, as the plan's positions are."""
+    place_of = {robot: place for place, robot in enumerate(arrival.robots)}
+    order = [place_of[robot] for robot in plan.formation.robots or arrival.robots]
+    return arrival.model_copy(
+        update={
+            "robots": tuple(arrival.robots[i] for i in order),
+            "observed": tuple(arrival.observed[i] for i in order),
+            "residual_px": tuple(arrival.residual_px[i] for i in order),
+        }
+    )
+
+
+def _track_file(track: Track) -> bytes:
+    """Robots on their way as JSON, to a tenth of a pixel."""
+    points = np.round(track.points, 1).tolist()
+    return json.dumps({"robots": track.ids, "points": points}, separators=(",", ":")).encode()
+
+
+def read_track(data: bytes) -> Track:
+    """The track of a file that a deployment left."""
+    content = json.loads(data)
+    return Track(tuple(content["robots"]), np.asarray(content["points"], dtype=float))
