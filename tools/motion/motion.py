@@ -28,8 +28,10 @@ ROOM_SHARES = (0.7, 0.3, 0.03)
 room, squeezing past where not."""
 LEAST_EXIT = 1.0
 """Robots that stand on an obstacle go at least so far off it, px."""
-EXIT_SEGMENTS = 16
-"""Segments of a quarter circle of the line on which they leave it."""
+ROUND_SEGMENTS = 16
+"""Segments of a quarter circle where distances are to be exact."""
+ROUND_DIP = math.cos(math.pi / 4 / ROUND_SEGMENTS)
+"""How near the middle of such a segment comes, as a share of the radius."""
 NOBODY = np.empty((0, 2))
 
 Bodies = NDArray[np.object_]
@@ -96,7 +98,7 @@ def _exits(
     if solid.is_empty or not (on := distances(solid, starts) <= radius).any():
         return starts
     away = max(float(distances(solid, goals).min()), LEAST_EXIT)
-    rim = solid.buffer(away / math.cos(math.pi / 4 / EXIT_SEGMENTS), quad_segs=EXIT_SEGMENTS)
+    rim = solid.buffer(away / ROUND_DIP, quad_segs=ROUND_SEGMENTS)
     free = shapely.difference(rim.boundary, shapely.union_all(bodies))
     inside = shapely.intersection(free, frame.box)
     line = next(part for part in (inside, free, rim.boundary) if not part.is_empty)
@@ -111,8 +113,9 @@ def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
     if not len(idle):
         return np.empty(0, dtype=object)
     nearest = np.linalg.norm(idle[:, None] - ends, axis=2).min(axis=1)
-    reach = np.minimum(max(2 * radius, MIN_SPACING), 0.99 * nearest)
-    return np.asarray(shapely.buffer(shapely.points(idle), reach), dtype=object)
+    reach = np.minimum(max(2 * radius, MIN_SPACING), 0.99 * nearest) / ROUND_DIP
+    discs = shapely.buffer(shapely.points(idle), reach, quad_segs=ROUND_SEGMENTS)
+    return np.asarray(discs, dtype=object)
 
 
 def _past(
@@ -125,17 +128,30 @@ def _past(
 ) -> list[FloatArray]:
     """Shortest paths past the obstacles and those bodies that would be in the way."""
     paths = _around(starts, goals, solid, radius, frame, bodies[:0])
-    tree, known = shapely.STRtree(bodies), np.empty(0, dtype=np.intp)
-    while len(bodies) and len(paths):
+    if not len(bodies) or not len(paths):
+        return paths
+    tree, cluster = shapely.STRtree(bodies), _clusters(bodies)
+    in_the_way = np.zeros(len(bodies), dtype=bool)
+    while True:
         lines = np.asarray([LineString(path) for path in paths], dtype=object)
         blocked, hit = tree.query(lines, predicate="intersects")
         if not len(hit):
-            break
-        again, known = np.unique(blocked), np.union1d(known, hit)
-        found = _around(starts[again], goals[again], solid, radius, frame, bodies[known])
+            return paths
+        again = np.unique(blocked)
+        in_the_way |= np.isin(cluster, cluster[hit])
+        found = _around(starts[again], goals[again], solid, radius, frame, bodies[in_the_way])
         for i, path in zip(again, found, strict=True):
             paths[i] = path
-    return paths
+
+
+def _clusters(bodies: Bodies) -> NDArray[np.intp]:
+    """The number of the cluster each body belongs to, (m,); nobody fits between its members."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = shapely.STRtree(bodies).query(bodies, predicate="intersects")
+    graph = coo_array((np.ones(pairs.shape[1]), pairs), shape=(len(bodies), len(bodies)))
+    return np.asarray(connected_components(graph)[1], dtype=np.intp)
 
 
 def _around(
@@ -160,13 +176,14 @@ def _around(
     if not open_ends:
         return paths
     for keep in keeps:
-        barrier, nodes = _barrier(solid, keep, bodies), _nodes(solid, keep, bodies)
+        barrier = _barrier(solid, keep, bodies)
+        nodes = _nodes(solid, keep, bodies, barrier)
         graph = _Visibility(nodes[shapely.intersects_xy(frame.box, nodes)], barrier)
         open_ends = [i for i in open_ends if not _settled(paths, i, graph, barrier)]
         if not open_ends:
             return paths
     barrier = _barrier(solid, keeps[-1], bodies)
-    anywhere = _Visibility(_nodes(solid, keeps[-1], bodies), barrier)
+    anywhere = _Visibility(_nodes(solid, keeps[-1], bodies, barrier), barrier)
     for i in open_ends:
         if not _settled(paths, i, anywhere, barrier):
             what = "the target and the robots that stay" if len(bodies) else "the target"
@@ -206,7 +223,7 @@ def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
     return shapely.get_coordinates(shapely.line_interpolate_point(lines, shares, normalized=True))
 
 
-def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies) -> FloatArray:
+def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeometry) -> FloatArray:
     """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
     dip = math.cos(math.pi / (4 * BEND_SEGMENTS))
     grown = solid.buffer((1.01 * keep + 0.05) / dip, quad_segs=BEND_SEGMENTS)
@@ -217,15 +234,12 @@ def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies) -> FloatArray:
         if len(coordinates) <= MAX_NODES:
             break
         tolerance = max(1.5 * tolerance, 0.25)
-    return np.unique(np.concatenate([coordinates, *map(_bends, bodies)]), axis=0)
-
-
-def _bends(body: Polygon) -> FloatArray:
-    """Corners, (8, 2), to bend around a disc."""
-    centre, (x0, _, x1, _) = np.array(body.centroid.coords[0]), body.bounds
-    angle = np.arange(4 * BEND_SEGMENTS) * math.pi / (2 * BEND_SEGMENTS)
-    reach = (1.01 * (x1 - x0) / 2 + 0.05) / math.cos(math.pi / (4 * BEND_SEGMENTS))
-    return centre + reach * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    x0, _, x1, _ = shapely.bounds(bodies).reshape(-1, 4).T
+    reach = (1.01 * (x1 - x0) / 2 + 0.05) / dip
+    corners = shapely.buffer(shapely.centroid(bodies), reach, quad_segs=BEND_SEGMENTS)
+    bends = shapely.get_coordinates(corners)
+    free = bends[~shapely.intersects_xy(barrier, bends)]
+    return np.unique(np.concatenate([coordinates, free]), axis=0)
 
 
 class _Visibility:

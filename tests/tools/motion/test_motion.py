@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import shapely
-from formup.tools.errors import FleetError
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.placement.place import Site
 from formup.tools.geometry.curves import Frame
-from formup.tools.geometry.outline import FloatArray, make_outline
-from formup.tools.motion.motion import along, obstacles, routes
+from formup.tools.geometry.outline import FloatArray, distances, make_outline
+from formup.tools.motion.motion import NoRouteError, along, obstacles, routes
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -73,7 +74,7 @@ def test_a_place_that_is_walled_off_is_refused_not_driven_through_the_wall() -> 
     wall = Polygon(
         shapely.box(200, 100, 440, 380).exterior, [shapely.box(220, 120, 420, 360).exterior]
     )
-    with pytest.raises(FleetError):
+    with pytest.raises(NoRouteError, match=r"place \(320, 240\)"):
         routes(np.array([[50.0, 50]]), np.array([[320.0, 240]]), wall, 3.0, FRAME)
 
 
@@ -114,3 +115,72 @@ def test_a_narrow_passage_wide_enough_for_a_body_is_taken() -> None:
     assert walls.distance(LineString(path)) > 5
     assert path[:, 1].min() >= 0
     assert path[:, 1].max() <= 479
+
+
+SEEDS, RADII = st.integers(0, 2**32 - 1), st.sampled_from([0.0, 3.0, 9.0])
+
+
+@settings(max_examples=60)
+@given(st.sampled_from(sorted(SOLIDS)), RADII, SEEDS)
+def test_who_stands_on_a_target_leaves_it_by_the_shortest_way_and_stays_off(
+    name: str, radius: float, seed: int
+) -> None:
+    solid, rng = SOLIDS[name], np.random.default_rng(seed)
+    goals = free_points(rng, solid, 6, radius + 2)
+    starts = rng.uniform((20, 20), (620, 460), (6, 2))
+    x0, y0, x1, y1 = solid.bounds
+    starts[:3] = rng.uniform((x0, y0), (x1, y1), (3, 2))
+    away = shapely.distance(solid, shapely.points(goals)).min()
+    for start, goal, path in zip(
+        starts, goals, routes(starts, goals, solid, radius, FRAME), strict=True
+    ):
+        assert np.array_equal(path[0], start)
+        assert np.array_equal(path[-1], goal)
+        on = solid.distance(shapely.Point(start)) <= radius
+        assert solid.distance(LineString(path[1:] if on else path)) > radius
+        if on:
+            out = shapely.Point(start).distance(solid.buffer(away).boundary)
+            assert np.linalg.norm(path[1] - start) <= 1.02 * out + 0.1
+
+
+@settings(max_examples=60)
+@given(st.sampled_from(["none", *sorted(SOLIDS)]), RADII, st.integers(1, 40), SEEDS)
+def test_idle_robots_are_driven_around(name: str, radius: float, count: int, seed: int) -> None:
+    solid, rng = SOLIDS.get(name, Polygon()), np.random.default_rng(seed)
+    if name == "none":
+        starts, goals, idle = (rng.uniform((20, 20), (620, 460), (n, 2)) for n in (6, 6, count))
+    else:
+        points = free_points(rng, solid, 400, radius + 2)
+        starts, goals, idle = points[:6], points[6:12], points[12 : 12 + count]
+        starts[0] = solid.representative_point().coords[0]
+    body = max(2 * radius, 2.0)
+    clear = np.linalg.norm(idle[:, None] - np.concatenate([starts, goals]), axis=2).min(axis=1)
+    paths = routes(starts, goals, solid, radius, FRAME, idle=idle[clear > 1.5 * body])
+    alone = routes(starts, goals, solid, radius, FRAME)
+    for start, goal, path, other in zip(starts, goals, paths, alone, strict=True):
+        assert np.array_equal(path[0], start)
+        assert np.array_equal(path[-1], goal)
+        nearest, without = (
+            distances(LineString(p), idle[clear > 1.5 * body]).min(initial=1e9)
+            for p in (path, other)
+        )
+        assert nearest >= body - 1e-9
+        if without > 1.01 * body:
+            assert path == pytest.approx(other), "nobody is in the way"
+
+
+def test_a_gap_between_idle_robots_too_narrow_for_a_body_is_not_taken() -> None:
+    start, goal = np.array([[100.0, 240]]), np.array([[500.0, 240]])
+    wall = np.array([(300.0, y) for y in range(60, 430, 15)])
+    path = routes(start, goal, Polygon(), 5.0, FRAME, idle=wall)[0]
+    assert shapely.distance(LineString(path), shapely.points(wall)).min() >= 10
+    assert LineString(path).length < 2.1 * np.hypot(200, 190)
+    wide = routes(start, goal, Polygon(), 5.0, FRAME, idle=wall * (1, 1.5) - (0, 127.5))[0]
+    assert LineString(wide).length < 401, "there is room between these"
+
+
+def test_a_robot_shut_in_by_idle_ones_has_no_way_out() -> None:
+    angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * 30 + (320, 240)
+    with pytest.raises(NoRouteError, match="the robots that stay to place"):
+        routes(np.array([[320.0, 240]]), np.array([[50.0, 50]]), Polygon(), 8.0, FRAME, idle=ring)
