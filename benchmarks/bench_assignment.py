@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from ..tools.geometry.assignment import Objective, assign
+from ..tools.geometry.assignment import assign
 from ..tools.geometry.outline import FloatArray
 from .growth import best, growth, peak
 
@@ -20,19 +20,17 @@ PITCH = 10.0
 BARE_MOST = 5_000
 """Robots for which the bare call is made: ten seconds or so."""
 SIZES = (2_500, 5_000, 10_000, 20_000)
-FEWER = (250, 500, 1_000, 2_000)
 REPEATS = 1
 Team = Callable[[int], tuple[FloatArray, FloatArray]]
-CASES: tuple[tuple[str, int, Objective], ...] = (
-    ("distant", 1_000, "squares"),
-    ("distant", 1_000, "makespan"),
-    ("block to ring", 2_000, "makespan"),
-    ("block to far ring", 2_000, "makespan"),
-    ("overlapping", 1_000, "squares"),
-    ("distant", 2_000, "squares"),
-    ("overlapping", 2_000, "squares"),
-    ("distant", 10_000, "squares"),
-    ("overlapping", 10_000, "squares"),
+CASES = (
+    ("distant", 1_000),
+    ("block to ring", 2_000),
+    ("block to far ring", 2_000),
+    ("overlapping", 1_000),
+    ("distant", 2_000),
+    ("overlapping", 2_000),
+    ("distant", 10_000),
+    ("overlapping", 10_000),
 )
 
 
@@ -45,18 +43,16 @@ def main() -> None:
 def rows() -> Iterator[str]:
     """A table of cases, the growth of time with N, and the memory of the approximation."""
     yield f"{'case':38} {'CPU s':>7} {'bare s':>7} {'method':>12} {'above bare':>11} {'gap':>9}"
-    for name, n, objective in CASES:
-        yield _case(name, n, objective)
+    for name, n in CASES:
+        yield _case(name, n)
     yield f"\n{'growth':28} fitted"
     for name in ("distant", "overlapping"):
-        times = [best(_squares(name, n), REPEATS) for n in SIZES]
+        times = [best(_assigned(name, n), REPEATS) for n in SIZES]
         yield growth(name, "robots", SIZES, times)
     for name in ("distant", "overlapping"):
         yield growth(
-            f"{name}, memory", "robots", SIZES, [peak(_squares(name, n)) for n in SIZES], "MiB"
+            f"{name}, memory", "robots", SIZES, [peak(_assigned(name, n)) for n in SIZES], "MiB"
         )
-    times = [best(_makespan(n), REPEATS) for n in FEWER]
-    yield growth("block to far ring, makespan", "robots", FEWER, times)
 
 
 def distant(n: int) -> tuple[FloatArray, FloatArray]:
@@ -94,26 +90,21 @@ TEAMS: dict[str, Team] = {
 }
 
 
-def _squares(name: str, n: int) -> Callable[[], object]:
+def _assigned(name: str, n: int) -> Callable[[], object]:
     starts, goals = TEAMS[name](n)
     return lambda: assign(starts, goals)
 
 
-def _makespan(n: int) -> Callable[[], object]:
-    starts, goals = TEAMS["block to far ring"](n)
-    return lambda: assign(starts, goals, objective="makespan")
-
-
-def _case(name: str, n: int, objective: Objective) -> str:
+def _case(name: str, n: int) -> str:
     starts, goals = TEAMS[name](n)
-    found = assign(starts, goals, objective=objective)
-    seconds = best(lambda: assign(starts, goals, objective=objective), REPEATS) / 1000
+    found = assign(starts, goals)
+    seconds = best(lambda: assign(starts, goals), REPEATS) / 1000
     bare = above = "-"
     if n <= BARE_MOST:
         taken = best(lambda: _bare(starts, goals), REPEATS) / 1000
         least = float(((goals - starts[_bare(starts, goals)]) ** 2).sum())
         bare, above = f"{taken:.2f}", f"{max(found.cost / least - 1, 0.0):.4%}"
-    title = f"{n:,} {name}, {objective}"
+    title = f"{n:,} {name}"
     return f"{title:38} {seconds:7.2f} {bare:>7} {found.method:>12} {above:>11} {found.gap:9.4%}"
 
 

@@ -12,7 +12,7 @@ from ..model import Request
 from .failures import cut_off, empty, foreign, refused
 from .prices import Price
 from .wire import (
-    Once,
+    MessageCache,
     Wire,
     base64_text,
     count,
@@ -20,6 +20,7 @@ from .wire import (
     make_calls,
     media_type,
     safe_name,
+    usage_of,
 )
 
 VERSION = "2023-06-01"
@@ -54,7 +55,7 @@ class Anthropic(Wire):
 
     def __init__(self, model: str, price: Price) -> None:
         self._model, self.price = dumped(model), price
-        self._blocks = Once(_blocks)
+        self._blocks = MessageCache(_role_and_blocks)
 
     def path(self, *, stream: bool) -> str:
         """What follows the base URL."""
@@ -68,18 +69,37 @@ class Anthropic(Wire):
         """A request as JSON."""
         parts = [b'{"model":', self._model, b',"max_tokens":%d' % MAX_TOKENS]
         if request.system:
-            parts += [b',"system":[', _marked(_text(request.system)), b"]"]
+            parts += [b',"system":[', _cache_marked(_text_block(request.system)), b"]"]
         if request.tools:
             # Tools come before the system prompt in the cache, so that its mark covers both.
-            parts += [b',"tools":[', _tools(request.tools, not request.system), b"]"]
+            parts += [b',"tools":[', _tool_list(request.tools, not request.system), b"]"]
         parts += [b',"messages":[', self._turns(request), b"]"]
         if stream:
             parts.append(b',"stream":true')
         return b"".join([*parts, b"}"])
 
-    def reading(self, request: Request) -> "_Reading":
-        """How the answer to a request is read."""
-        return _Reading(request, self.price)
+    def assembly(self) -> "_Assembly":
+        """A place for the events of one stream."""
+        return _Assembly()
+
+    def reply(self, body: Any, request: Request) -> Reply:
+        """What a complete body answers to a request."""
+        try:
+            message = _Message.model_validate(body)
+        except ValidationError:
+            raise foreign("something that is no message") from None
+        text = "".join(b.text or "" for b in message.content if b.type == "text").strip()
+        if message.stop_reason == "refusal":
+            raise refused(text)
+        if message.stop_reason == "max_tokens":
+            raise cut_off(MAX_TOKENS)
+        if message.stop_reason == "model_context_window_exceeded":
+            raise cut_off()
+        written = [(b.id, b.name or "", b.input) for b in message.content if b.type == "tool_use"]
+        if not text and not written:
+            raise empty()
+        calls = make_calls(written, request.messages)
+        return Reply(text=text, calls=calls, usage=_anthropic_usage(message.usage, self.price))
 
     def _turns(self, request: Request) -> bytes:
         """Messages by turns: results and what a person says belong to the same one."""
@@ -93,36 +113,10 @@ class Anthropic(Wire):
             else:
                 turns.append((role, [blocks]))
         for _, blocks in [turn for turn in turns if turn[0] == b"user"][-CACHED_TURNS:]:
-            blocks[-1] = _marked(blocks[-1])
+            blocks[-1] = _cache_marked(blocks[-1])
         return b",".join(
             [b'{"role":"%b","content":[%b]}' % (role, b",".join(blocks)) for role, blocks in turns]
         )
-
-
-class _Reading:
-    def __init__(self, request: Request, price: Price) -> None:
-        self._request, self._price = request, price
-
-    def assembly(self) -> "_Assembly":
-        return _Assembly()
-
-    def reply(self, data: Any) -> Reply:
-        try:
-            message = _Message.model_validate(data)
-        except ValidationError:
-            raise foreign("something that is no message") from None
-        text = "".join(b.text or "" for b in message.content if b.type == "text").strip()
-        if message.stop_reason == "refusal":
-            raise refused(text)
-        if message.stop_reason == "max_tokens":
-            raise cut_off(MAX_TOKENS)
-        if message.stop_reason == "model_context_window_exceeded":
-            raise cut_off()
-        written = [(b.id, b.name or "", b.input) for b in message.content if b.type == "tool_use"]
-        if not text and not written:
-            raise empty()
-        calls = make_calls(written, self._request.messages)
-        return Reply(text=text, calls=calls, usage=_usage(message.usage, self._price))
 
 
 class _Assembly:
@@ -173,20 +167,17 @@ class _Assembly:
         return ""
 
 
-def _usage(usage: Any, price: Price) -> Usage:
-    fresh, output = count(usage, "input_tokens"), count(usage, "output_tokens")
-    cached = count(usage, "cache_read_input_tokens")
-    written = count(usage, "cache_creation_input_tokens")
-    cost = price.cost(fresh=fresh, cached=cached, written=written, output=output)
-    return Usage(
-        input_tokens=fresh + cached + written,
-        cached_tokens=cached,
-        output_tokens=output,
-        cost_usd=cost,
+def _anthropic_usage(usage: Any, price: Price) -> Usage:
+    return usage_of(
+        price,
+        fresh=count(usage, "input_tokens"),
+        cached=count(usage, "cache_read_input_tokens"),
+        written=count(usage, "cache_creation_input_tokens"),
+        output=count(usage, "output_tokens"),
     )
 
 
-def _blocks(message: User | Reply | Result) -> tuple[bytes, bytes]:
+def _role_and_blocks(message: User | Reply | Result) -> tuple[bytes, bytes]:
     """Role and blocks of a message; none where it says nothing, for empty ones are refused."""
     if isinstance(message, Reply):
         uses = [
@@ -200,40 +191,40 @@ def _blocks(message: User | Reply | Result) -> tuple[bytes, bytes]:
             )
             for call in message.calls
         ]
-        said = [_text(message.text)] if message.text.strip() else []
-        return b"assistant", b",".join([*said, *uses])
-    said = [_text(message.text)] if message.text.strip() else []
-    shown = [_image(image) for image in message.images]
+        spoken = [_text_block(message.text)] if message.text.strip() else []
+        return b"assistant", b",".join([*spoken, *uses])
+    spoken = [_text_block(message.text)] if message.text.strip() else []
+    shown = [_image_block(image) for image in message.images]
     if isinstance(message, User):
-        return b"user", b",".join([*shown, *said])
-    return b"user", _result(message, b",".join([*said, *shown]))
+        return b"user", b",".join([*shown, *spoken])
+    return b"user", _result_block(message, b",".join([*spoken, *shown]))
 
 
-def _result(result: Result, content: bytes) -> bytes:
+def _result_block(result: Result, content: bytes) -> bytes:
     head = {"type": "tool_result", "tool_use_id": safe_name(result.call_id)}
     if result.error:
         head |= {"is_error": True}
     return dumped(head)[:-1] + b',"content":[' + content + b"]}"
 
 
-def _text(text: str) -> bytes:
+def _text_block(text: str) -> bytes:
     return dumped({"type": "text", "text": text})
 
 
-def _image(image: bytes) -> bytes:
+def _image_block(image: bytes) -> bytes:
     source = {"type": "base64", "media_type": media_type(image), "data": base64_text(image)}
     return dumped({"type": "image", "source": source})
 
 
-def _marked(blocks: bytes) -> bytes:
+def _cache_marked(blocks: bytes) -> bytes:
     """Blocks with a cache mark in the last of them."""
     return blocks[:-1] + _MARK
 
 
 @lru_cache(maxsize=16)
-def _tools(tools: tuple[Tool, ...], marked: bool) -> bytes:
+def _tool_list(tools: tuple[Tool, ...], marked: bool) -> bytes:
     listed = [
         {"name": t.name, "description": t.description, "input_schema": t.offered} for t in tools
     ]
     written = b",".join(dumped(tool) for tool in listed)
-    return _marked(written) if marked else written
+    return _cache_marked(written) if marked else written

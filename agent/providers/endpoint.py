@@ -49,12 +49,12 @@ def endpoint(base_url: str, *variables: str) -> Endpoint:
     Raises:
         InputError: no usable URL, or a key is needed and there is none.
     """
-    url = _checked(base_url)
+    url = _checked_url(base_url)
     if not variables:
         return Endpoint(url, None, "it asks for a key, and none is sent to such a server")
     given = [v for v in variables if os.environ.get(v) or os.environ.get(f"{v}_FILE")]
     variable = (given or variables)[0]
-    found = Endpoint(url, _key(variable), f"check the key in {variable}")
+    found = Endpoint(url, _key_from_environment(variable), f"check the key in {variable}")
     if found.key is None and not found.is_loopback:
         raise InputError(
             f"No key for {url}: set {variable}, or {variable}_FILE to a file that holds it."
@@ -62,7 +62,7 @@ def endpoint(base_url: str, *variables: str) -> Endpoint:
     return found
 
 
-def _checked(base_url: str) -> str:
+def _checked_url(base_url: str) -> str:
     advice = "give one such as http://127.0.0.1:8000/v1"
     try:
         parts = urlsplit(base_url)
@@ -78,7 +78,7 @@ def _checked(base_url: str) -> str:
     return base_url.rstrip("/")
 
 
-def _key(variable: str) -> str | None:
+def _key_from_environment(variable: str) -> str | None:
     key, source = os.environ.get(variable, "").strip(), variable
     path = os.environ.get(f"{variable}_FILE", "")
     if not key and path:

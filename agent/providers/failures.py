@@ -10,7 +10,7 @@ from typing import Any, Literal, cast
 Again = Literal["never", "unless-same", "later"]
 """never: the request itself is refused; unless-same: until it fails the very same way twice in a
 row, for then nothing will change; later: the server is busy, or the network failed."""
-MAX_SAID = 300
+MAX_QUOTED = 300
 """Characters of a server's own words that are passed on."""
 MAX_WAIT = 60.0
 """Seconds; a server that asks for a longer wait is not waited for."""
@@ -55,25 +55,25 @@ class AskError(Exception):
 
 def of_status(status: int, headers: Mapping[str, str], body: bytes, key_advice: str) -> AskError:
     """The failure that an HTTP status other than success is."""
-    wait = _wait(headers)
+    wait = _retry_after(headers)
     try:
         data = json.loads(body)
-        message, code = _said(data)
+        message, code = _message_and_code(data)
         wait = _retry_delay(data) if wait is None else wait
     except ValueError:
         text = body.decode(errors="replace")
         message, code = ("" if text.lstrip().startswith("<") else text), ""
-    return _failure(f"answered {status}", status, message, code, key_advice, wait)
+    return _server_failure(f"answered {status}", status, message, code, key_advice, wait)
 
 
 def of_error_body(data: object, key_advice: str) -> AskError | None:
     """The failure in a body that came as a success or within a stream, or None."""
     if not isinstance(data, dict) or not cast("dict[str, Any]", data).get("error"):
         return None
-    message, code = _said(cast("dict[str, Any]", data))
+    message, code = _message_and_code(cast("dict[str, Any]", data))
     is_status = len(code) == 3 and code.isascii() and code.isdecimal()
     status = int(code) if is_status else _STATUS_OF.get(code, 500)
-    return _failure("answered with an error", status, message, code, key_advice, None)
+    return _server_failure("answered with an error", status, message, code, key_advice, None)
 
 
 def cut_off(limit: int | None = None) -> AskError:
@@ -99,7 +99,7 @@ def foreign(what: str) -> AskError:
     )
 
 
-def _failure(
+def _server_failure(
     verb: str, status: int, message: str, code: str, key_advice: str, wait: float | None
 ) -> AskError:
     what = f"{verb}{_quoted(message)}"
@@ -128,9 +128,9 @@ def _advice(status: int, key_advice: str) -> str:
     return "try again later" if status >= 500 else "it does not take such a request"
 
 
-def _said(data: object) -> tuple[str, str]:
+def _message_and_code(data: object) -> tuple[str, str]:
     """Message and code of an error body, of whichever of the usual shapes."""
-    data = _alone(data)
+    data = _unwrapped(data)
     if not isinstance(data, dict):
         return (data, "") if isinstance(data, str) else ("", "")
     whole = cast("dict[str, Any]", data)
@@ -146,11 +146,11 @@ def _said(data: object) -> tuple[str, str]:
 def _quoted(words: str) -> str:
     """A server's words in brackets: one line, printable, of bearable length."""
     line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
-    shown = line.rstrip(".") if len(line) <= MAX_SAID else line[: MAX_SAID - 3] + "..."
+    shown = line.rstrip(".") if len(line) <= MAX_QUOTED else line[: MAX_QUOTED - 3] + "..."
     return f" ({shown})" if shown else ""
 
 
-def _alone(data: object) -> object:
+def _unwrapped(data: object) -> object:
     """What stands alone in a list, as Gemini writes errors where a stream was asked for."""
     listed = cast("list[Any]", data) if isinstance(data, list) else []
     alone = len(listed) == 1 and isinstance(listed[0], dict)
@@ -160,14 +160,14 @@ def _alone(data: object) -> object:
 def _retry_delay(data: object) -> float | None:
     """Seconds of a wait that Gemini asks for among an error's details."""
     try:
-        details = cast("Any", _alone(data))["error"]["details"]
+        details = cast("Any", _unwrapped(data))["error"]["details"]
         delays = [detail["retryDelay"] for detail in details if "retryDelay" in detail]
         return max(0.0, float(delays[0].removesuffix("s")))
     except (TypeError, KeyError, IndexError, AttributeError, ValueError):
         return None
 
 
-def _wait(headers: Mapping[str, str]) -> float | None:
+def _retry_after(headers: Mapping[str, str]) -> float | None:
     """Seconds of a Retry-After header, in either of its forms."""
     given = headers.get("retry-after", "")
     try:

@@ -17,13 +17,14 @@ from ..model import Request
 from .failures import AskError, cut_off, empty, foreign, refused
 from .prices import Price
 from .wire import (
-    Once,
+    MessageCache,
     Wire,
     base64_text,
     count,
     dumped,
     make_calls,
     media_type,
+    usage_of,
 )
 
 UNSIGNED = "skip_thought_signature_validator"
@@ -94,7 +95,7 @@ class Gemini(Wire):
         self._name, self.price = f"gemini:{model}", price
         self._resource = quote(model if "/" in model else f"models/{model}")
         self._signs = _WANTS_SIGNATURES.match(model) is not None
-        self._turns = Once(self._turn)
+        self._turns = MessageCache(self._turn)
 
     def path(self, *, stream: bool) -> str:
         """What follows the base URL."""
@@ -111,12 +112,35 @@ class Gemini(Wire):
         if request.system:
             parts += [b'"systemInstruction":{"parts":[', dumped({"text": request.system}), b"]},"]
         if request.tools:
-            parts += [b'"tools":', _tools(request.tools), b","]
+            parts += [b'"tools":', _function_declarations(request.tools), b","]
         return b"".join([*parts, b'"contents":[', self._contents(request), b"]}"])
 
-    def reading(self, request: Request) -> "_Reading":
-        """How the answer to a request is read."""
-        return _Reading(request, self._name, self.price)
+    def assembly(self) -> "_Assembly":
+        """A place for the events of one stream."""
+        return _Assembly()
+
+    def reply(self, body: Any, request: Request) -> Reply:
+        """What a complete body answers to a request."""
+        try:
+            response = _Response.model_validate(body)
+        except ValidationError:
+            raise foreign("something that is no content of Gemini's") from None
+        if not response.candidates:
+            raise _without_candidates(body, response.promptFeedback)
+        candidate = response.candidates[0]
+        _check_finish_reason(candidate)
+        parts = candidate.content.parts or [] if candidate.content else []
+        text = "".join(part.text or "" for part in parts if not part.thought).strip()
+        made = [part.functionCall for part in parts if part.functionCall is not None]
+        if not text and not made:
+            raise empty()
+        calls = make_calls([(f.id, f.name or "", f.args) for f in made], request.messages)
+        opaque = None
+        if any(part.thoughtSignature for part in parts):
+            written = body["candidates"][0]["content"]["parts"]
+            opaque = Opaque(model=self._name, items=_with_ids(written, calls))
+        usage = _gemini_usage(response.usageMetadata, self.price)
+        return Reply(text=text, calls=calls, usage=usage, opaque=opaque)
 
     def _contents(self, request: Request) -> bytes:
         """Messages by turns: all results of one reply belong to the same."""
@@ -139,10 +163,10 @@ class Gemini(Wire):
         """Role and parts of a message; none where it says nothing, for empty ones are refused."""
         if isinstance(message, Reply):
             return b"model", b",".join(map(dumped, self._model_parts(message)))
-        shown = [_image(image) for image in message.images]
+        shown = [_inline_data(image) for image in message.images]
         if isinstance(message, User):
-            said = [{"text": message.text}] if message.text.strip() else []
-            return b"user", b",".join(map(dumped, [*shown, *said]))
+            text = [{"text": message.text}] if message.text.strip() else []
+            return b"user", b",".join(map(dumped, [*shown, *text]))
         answer = {
             "id": message.call_id,
             "name": _function_name(message.name),
@@ -154,7 +178,7 @@ class Gemini(Wire):
     def _model_parts(self, reply: Reply) -> list[dict[str, Any]]:
         if reply.opaque and reply.opaque.model == self._name:
             return list(reply.opaque.items)
-        said = [{"text": reply.text}] if reply.text.strip() else []
+        text = [{"text": reply.text}] if reply.text.strip() else []
         calls: list[dict[str, Any]] = [
             {
                 "functionCall": {
@@ -167,37 +191,7 @@ class Gemini(Wire):
         ]
         if calls and self._signs:
             calls[0]["thoughtSignature"] = UNSIGNED
-        return [*said, *calls]
-
-
-class _Reading:
-    def __init__(self, request: Request, name: str, price: Price) -> None:
-        self._request, self._name, self._price = request, name, price
-
-    def assembly(self) -> "_Assembly":
-        return _Assembly()
-
-    def reply(self, data: Any) -> Reply:
-        try:
-            response = _Response.model_validate(data)
-        except ValidationError:
-            raise foreign("something that is no content of Gemini's") from None
-        if not response.candidates:
-            raise _nothing(data, response.promptFeedback)
-        candidate = response.candidates[0]
-        _check_end(candidate)
-        parts = candidate.content.parts or [] if candidate.content else []
-        text = "".join(part.text or "" for part in parts if not part.thought).strip()
-        made = [part.functionCall for part in parts if part.functionCall is not None]
-        if not text and not made:
-            raise empty()
-        calls = make_calls([(f.id, f.name or "", f.args) for f in made], self._request.messages)
-        opaque = None
-        if any(part.thoughtSignature for part in parts):
-            written = data["candidates"][0]["content"]["parts"]
-            opaque = Opaque(model=self._name, items=_with_ids(written, calls))
-        usage = _usage(response.usageMetadata, self._price)
-        return Reply(text=text, calls=calls, usage=usage, opaque=opaque)
+        return [*text, *calls]
 
 
 class _Assembly:
@@ -250,7 +244,7 @@ class _Assembly:
             self._text = []
 
 
-def _nothing(data: Any, feedback: _Feedback | None) -> AskError:
+def _without_candidates(data: Any, feedback: _Feedback | None) -> AskError:
     """What a body without candidates means."""
     if feedback and feedback.blockReason:
         return refused(feedback.blockReasonMessage or feedback.blockReason)
@@ -259,7 +253,7 @@ def _nothing(data: Any, feedback: _Feedback | None) -> AskError:
     return foreign("something that is no content of Gemini's")
 
 
-def _check_end(candidate: _Candidate) -> None:
+def _check_finish_reason(candidate: _Candidate) -> None:
     reason = candidate.finishReason or "STOP"
     if reason in _CUT_OFF:
         raise cut_off()
@@ -282,13 +276,12 @@ def _with_ids(parts: list[dict[str, Any]], calls: tuple[Call, ...]) -> tuple[dic
     )
 
 
-def _usage(usage: Any, price: Price) -> Usage:
+def _gemini_usage(usage: Any, price: Price) -> Usage:
     given = count(usage, "promptTokenCount")
     cached = min(given, count(usage, "cachedContentTokenCount"))
     # Thoughts are billed as output and not among the candidates' tokens.
-    written = count(usage, "candidatesTokenCount") + count(usage, "thoughtsTokenCount")
-    cost = price.cost(fresh=given - cached, cached=cached, output=written)
-    return Usage(input_tokens=given, cached_tokens=cached, output_tokens=written, cost_usd=cost)
+    output = count(usage, "candidatesTokenCount") + count(usage, "thoughtsTokenCount")
+    return usage_of(price, fresh=given - cached, cached=cached, output=output)
 
 
 def _function_name(name: str) -> str:
@@ -296,12 +289,12 @@ def _function_name(name: str) -> str:
     return re.sub(r"[^a-zA-Z0-9_.:-]", "_", name)[:64] or "unnamed"
 
 
-def _image(image: bytes) -> dict[str, Any]:
+def _inline_data(image: bytes) -> dict[str, Any]:
     return {"inlineData": {"mimeType": media_type(image), "data": base64_text(image)}}
 
 
 @lru_cache(maxsize=16)
-def _tools(tools: tuple[Tool, ...]) -> bytes:
+def _function_declarations(tools: tuple[Tool, ...]) -> bytes:
     declared = [
         {"name": t.name, "description": t.description, "parametersJsonSchema": t.offered}
         for t in tools

@@ -18,14 +18,14 @@ from ..model import Request
 from .failures import AskError, cut_off, empty, foreign, refused
 from .prices import Price
 from .wire import (
-    Once,
+    MessageCache,
     Wire,
-    base64_text,
     count,
+    data_url,
     dumped,
     make_calls,
-    media_type,
     safe_name,
+    usage_of,
 )
 
 _THOUGHTS = re.compile(r"\A\s*<think>.*?</think>", re.DOTALL)
@@ -49,7 +49,7 @@ class _Message(BaseModel):
 
     @property
     def text(self) -> str:
-        return _said(self.content or "")
+        return _joined_text(self.content or "")
 
 
 class _Choice(BaseModel):
@@ -72,7 +72,7 @@ class OpenAIChat(Wire):
 
     def __init__(self, model: str, price: Price) -> None:
         self._model, self.price = dumped(model), price
-        self._messages = Once(_written)
+        self._messages = MessageCache(_rendered)
 
     def path(self, *, stream: bool) -> str:
         """What follows the base URL."""
@@ -84,7 +84,7 @@ class OpenAIChat(Wire):
 
     def body(self, request: Request, *, stream: bool) -> bytes:
         """A request as JSON."""
-        written = [_system(request.system)] if request.system else []
+        written = [_system_message(request.system)] if request.system else []
         pictures: list[bytes] = []
         for message in request.messages:
             if pictures and not isinstance(message, Result):
@@ -96,44 +96,38 @@ class OpenAIChat(Wire):
                 pictures.append(picture)
         parts = [b'{"model":', self._model, b',"messages":[', b",".join(written + pictures), b"]"]
         if request.tools:
-            parts += [b',"tools":', _tools(request.tools)]
+            parts += [b',"tools":', _functions(request.tools)]
         if stream:
             parts.append(b',"stream":true,"stream_options":{"include_usage":true}')
         return b"".join([*parts, b"}"])
 
-    def reading(self, request: Request) -> "_Reading":
-        """How the answer to a request is read."""
-        return _Reading(request, self.price)
-
-
-class _Reading:
-    def __init__(self, request: Request, price: Price) -> None:
-        self._request, self._price = request, price
-
     def assembly(self) -> "_Assembly":
+        """A place for the events of one stream."""
         return _Assembly()
 
-    def reply(self, data: Any) -> Reply:
+    def reply(self, body: Any, request: Request) -> Reply:
+        """What a complete body answers to a request."""
         try:
-            completion = _Completion.model_validate(data)
+            completion = _Completion.model_validate(body)
         except ValidationError:
             raise foreign("something that is no chat completion") from None
         choice = completion.choices[0]
         message = choice.message
         if message.refusal:
             raise refused(message.refusal)
-        _check_end(choice.finish_reason)
+        _check_finish_reason(choice.finish_reason)
         text = _THOUGHTS.sub("", message.text).strip()
         written = [
             (None if c.id is None else str(c.id), c.function.name or "", c.function.arguments)
             for c in message.tool_calls or ()
         ]
-        if not written and (call := call_in_text(text, self._request.tools)):
+        if not written and (call := call_in_text(text, request.tools)):
             text, written = "", [(None, *call)]
         if not text and not written:
             raise empty()
-        calls = make_calls(written, self._request.messages)
-        return Reply(text=text, calls=calls, usage=_usage(completion.usage, self._price))
+        calls = make_calls(written, request.messages)
+        usage = openai_usage(completion.usage, self.price, "prompt", "completion")
+        return Reply(text=text, calls=calls, usage=usage)
 
 
 class _Assembly:
@@ -174,8 +168,8 @@ class _Assembly:
         for part in delta.get("tool_calls") or ():
             self._call(part)
         if delta.get("refusal"):
-            self._refusal.write(_said(delta["refusal"]))
-        text = _said(delta.get("content") or "")
+            self._refusal.write(_joined_text(delta["refusal"]))
+        text = _joined_text(delta.get("content") or "")
         self._text.write(text)
         return text
 
@@ -194,7 +188,7 @@ class _Assembly:
             call["arguments"].append(given if isinstance(given, str) else dumped(given).decode())
 
 
-def _said(content: str | list[dict[str, Any]]) -> str:
+def _joined_text(content: str | list[dict[str, Any]]) -> str:
     """Text; some servers answer in parts, as one may ask."""
     if isinstance(content, str):
         return content
@@ -225,7 +219,7 @@ def call_in_text(text: str, tools: tuple[Tool, ...]) -> tuple[str, dict[str, Any
     return str(name), cast("dict[str, Any]", arguments)
 
 
-def _check_end(reason: str | None) -> None:
+def _check_finish_reason(reason: str | None) -> None:
     if reason == "length":
         raise cut_off()
     if reason == "content_filter":
@@ -234,37 +228,36 @@ def _check_end(reason: str | None) -> None:
         raise AskError("broke its reply off with an error", "try again later", "later")
 
 
-def _usage(usage: Any, price: Price) -> Usage:
-    given, written = count(usage, "prompt_tokens"), count(usage, "completion_tokens")
-    cached = min(given, count(usage, "prompt_tokens_details", "cached_tokens"))
-    stored = count(usage, "prompt_tokens_details", "cache_write_tokens") if price.written else 0
-    stored = min(given - cached, stored)
-    fresh = given - cached - stored
-    cost = price.cost(fresh=fresh, cached=cached, written=stored, output=written)
-    return Usage(input_tokens=given, cached_tokens=cached, output_tokens=written, cost_usd=cost)
+def openai_usage(usage: Any, price: Price, read: str, wrote: str) -> Usage:
+    """Tokens and their cost; `read` and `wrote` are what the interface calls input and output."""
+    given, details = count(usage, f"{read}_tokens"), f"{read}_tokens_details"
+    cached = min(given, count(usage, details, "cached_tokens"))
+    written = count(usage, details, "cache_write_tokens") if price.written else 0
+    written = min(given - cached, written)
+    fresh, output = given - cached - written, count(usage, f"{wrote}_tokens")
+    return usage_of(price, fresh=fresh, cached=cached, written=written, output=output)
 
 
-def _written(message: User | Reply | Result) -> tuple[bytes, bytes | None]:
+def _rendered(message: User | Reply | Result) -> tuple[bytes, bytes | None]:
     """A message, and the one that must follow the last result to show its images."""
     if isinstance(message, User):
-        return _user(message.text, message.images), None
+        return _user_message(message.text, message.images), None
     if isinstance(message, Reply):
-        return _assistant(message), None
+        return _assistant_message(message), None
     result = {"role": "tool", "tool_call_id": safe_name(message.call_id), "content": message.text}
-    said = f"What {safe_name(message.name)} shows ({safe_name(message.call_id)}):"
+    caption = f"What {safe_name(message.name)} shows ({safe_name(message.call_id)}):"
     # Results of tools hold text only in this interface.
-    return dumped(result), _user(said, message.images) if message.images else None
+    return dumped(result), _user_message(caption, message.images) if message.images else None
 
 
-def _user(text: str, images: tuple[bytes, ...]) -> bytes:
+def _user_message(text: str, images: tuple[bytes, ...]) -> bytes:
     if not images:
         return dumped({"role": "user", "content": text})
-    urls = [f"data:{media_type(image)};base64,{base64_text(image)}" for image in images]
-    shown = [{"type": "image_url", "image_url": {"url": url}} for url in urls]
+    shown = [{"type": "image_url", "image_url": {"url": data_url(image)}} for image in images]
     return dumped({"role": "user", "content": [{"type": "text", "text": text}, *shown]})
 
 
-def _assistant(reply: Reply) -> bytes:
+def _assistant_message(reply: Reply) -> bytes:
     message: dict[str, Any] = {"role": "assistant", "content": reply.text}
     if reply.calls:
         message["tool_calls"] = [
@@ -282,12 +275,12 @@ def _assistant(reply: Reply) -> bytes:
 
 
 @lru_cache(maxsize=16)
-def _system(text: str) -> bytes:
+def _system_message(text: str) -> bytes:
     return dumped({"role": "system", "content": text})
 
 
 @lru_cache(maxsize=16)
-def _tools(tools: tuple[Tool, ...]) -> bytes:
+def _functions(tools: tuple[Tool, ...]) -> bytes:
     functions = [
         {"name": t.name, "description": t.description, "parameters": t.offered} for t in tools
     ]

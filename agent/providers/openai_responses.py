@@ -9,18 +9,17 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ...tools.tool import Tool
-from ..messages import Call, Opaque, Reply, Result, Usage, User
+from ..messages import Call, Opaque, Reply, Result, User
 from ..model import Request
 from .failures import AskError, cut_off, empty, foreign, of_error_body, refused
+from .openai_chat import openai_usage
 from .prices import Price
 from .wire import (
-    Once,
+    MessageCache,
     Wire,
-    base64_text,
-    count,
+    data_url,
     dumped,
     make_calls,
-    media_type,
     safe_name,
 )
 
@@ -66,7 +65,7 @@ class OpenAIResponses(Wire):
     def __init__(self, model: str, price: Price) -> None:
         self._model, self._name, self.price = dumped(model), f"openai-responses:{model}", price
         self._keeps_thoughts = True
-        self._items = Once(self._written)
+        self._items = MessageCache(self._written)
 
     def path(self, *, stream: bool) -> str:
         """What follows the base URL."""
@@ -84,67 +83,61 @@ class OpenAIResponses(Wire):
         if request.system:
             parts += [b',"instructions":', dumped(request.system)]
         if request.tools:
-            parts += [b',"tools":', _tools(request.tools)]
+            parts += [b',"tools":', _function_tools(request.tools)]
         written = [text for message in request.messages if (text := self._items(message))]
         parts += [b',"input":[', b",".join(written), b"]"]
         if stream:
             parts.append(b',"stream":true')
         return b"".join([*parts, b"}"])
 
-    def reading(self, request: Request) -> "_Reading":
-        """How the answer to a request is read."""
-        return _Reading(request, self._name, self.price)
+    def assembly(self) -> "_Assembly":
+        """A place for the events of one stream."""
+        return _Assembly()
+
+    def reply(self, body: Any, request: Request) -> Reply:
+        """What a complete body answers to a request."""
+        if failure := of_error_body(body, _KEY_ADVICE):
+            raise failure
+        try:
+            response = _Response.model_validate(body)
+        except ValidationError:
+            raise foreign("something that is no response") from None
+        _check_status(response)
+        messages = [item for item in response.output if item.type == "message"]
+        parts = [part for message in messages for part in message.content or ()]
+        if refusal := "".join(part.refusal or "" for part in parts):
+            raise refused(refusal)
+        text = "".join(part.text or "" for part in parts).strip()
+        made = [item for item in response.output if item.type == "function_call"]
+        if not text and not made:
+            raise empty()
+        written = [(item.call_id, item.name or "", item.arguments) for item in made]
+        calls = make_calls(written, request.messages)
+        opaque = None
+        if _must_be_kept(response.output):
+            opaque = Opaque(model=self._name, items=_with_ids(body["output"], calls))
+        usage = openai_usage(response.usage, self.price, "input", "output")
+        return Reply(text=text, calls=calls, usage=usage, opaque=opaque)
 
     def gives_up(self, refusal: str) -> bool:
         """Do without encrypted thoughts: models that do not think refuse to be asked for them."""
         if not self._keeps_thoughts or "encrypted" not in refusal.lower():
             return False
         self._keeps_thoughts = False
-        self._items = Once(self._written)
+        self._items = MessageCache(self._written)
         return True
 
     def _written(self, message: User | Reply | Result) -> bytes:
         """The items of a message, none where it says nothing."""
         if isinstance(message, User):
-            return dumped({"role": "user", "content": _content(message.text, message.images)})
+            return dumped({"role": "user", "content": _input_content(message.text, message.images)})
         if isinstance(message, Result):
             head = {"type": "function_call_output", "call_id": safe_name(message.call_id)}
-            return dumped(head | {"output": _content(message.text, message.images)})
+            return dumped(head | {"output": _input_content(message.text, message.images)})
         opaque = message.opaque if self._keeps_thoughts else None
         own = opaque is not None and opaque.model == self._name
-        items = opaque.items if opaque and own else _spoken(message)
+        items = opaque.items if opaque and own else _items_of(message)
         return b",".join(map(dumped, items))
-
-
-class _Reading:
-    def __init__(self, request: Request, name: str, price: Price) -> None:
-        self._request, self._name, self._price = request, name, price
-
-    def assembly(self) -> "_Assembly":
-        return _Assembly()
-
-    def reply(self, data: Any) -> Reply:
-        if failure := of_error_body(data, _KEY_ADVICE):
-            raise failure
-        try:
-            response = _Response.model_validate(data)
-        except ValidationError:
-            raise foreign("something that is no response") from None
-        _check_end(response)
-        said = [p for item in response.output if item.type == "message" for p in item.content or ()]
-        if refusal := "".join(part.refusal or "" for part in said):
-            raise refused(refusal)
-        text = "".join(part.text or "" for part in said).strip()
-        made = [item for item in response.output if item.type == "function_call"]
-        if not text and not made:
-            raise empty()
-        written = [(item.call_id, item.name or "", item.arguments) for item in made]
-        calls = make_calls(written, self._request.messages)
-        opaque = None
-        if _must_be_kept(response.output):
-            opaque = Opaque(model=self._name, items=_with_ids(data["output"], calls))
-        usage = _usage(response.usage, self._price)
-        return Reply(text=text, calls=calls, usage=usage, opaque=opaque)
 
 
 class _Assembly:
@@ -177,7 +170,7 @@ class _Assembly:
         return ""
 
 
-def _check_end(response: _Response) -> None:
+def _check_status(response: _Response) -> None:
     status = response.status or "completed"
     if status == "incomplete":
         details = response.incomplete_details
@@ -208,19 +201,9 @@ def _with_ids(items: list[dict[str, Any]], calls: tuple[Call, ...]) -> tuple[dic
     return tuple(kept)
 
 
-def _usage(usage: Any, price: Price) -> Usage:
-    given, output = count(usage, "input_tokens"), count(usage, "output_tokens")
-    cached = min(given, count(usage, "input_tokens_details", "cached_tokens"))
-    written = count(usage, "input_tokens_details", "cache_write_tokens") if price.written else 0
-    written = min(given - cached, written)
-    fresh = given - cached - written
-    cost = price.cost(fresh=fresh, cached=cached, written=written, output=output)
-    return Usage(input_tokens=given, cached_tokens=cached, output_tokens=output, cost_usd=cost)
-
-
-def _spoken(reply: Reply) -> tuple[dict[str, Any], ...]:
+def _items_of(reply: Reply) -> tuple[dict[str, Any], ...]:
     """A reply of which text and calls are all there is."""
-    said = [{"role": "assistant", "content": reply.text}] if reply.text.strip() else []
+    text = [{"role": "assistant", "content": reply.text}] if reply.text.strip() else []
     calls = [
         {
             "type": "function_call",
@@ -230,19 +213,19 @@ def _spoken(reply: Reply) -> tuple[dict[str, Any], ...]:
         }
         for call in reply.calls
     ]
-    return (*said, *calls)
+    return (*text, *calls)
 
 
-def _content(text: str, images: tuple[bytes, ...]) -> str | list[dict[str, str]]:
+def _input_content(text: str, images: tuple[bytes, ...]) -> str | list[dict[str, str]]:
     if not images:
         return text
-    urls = [f"data:{media_type(image)};base64,{base64_text(image)}" for image in images]
+    urls = [data_url(image) for image in images]
     shown = [{"type": "input_image", "detail": "auto", "image_url": url} for url in urls]
     return [{"type": "input_text", "text": text}, *shown]
 
 
 @lru_cache(maxsize=16)
-def _tools(tools: tuple[Tool, ...]) -> bytes:
+def _function_tools(tools: tuple[Tool, ...]) -> bytes:
     listed = [
         {
             "type": "function",

@@ -111,7 +111,7 @@ class RemoteModel:
 
     async def _ask(self, request: Request) -> Reply:
         body = self._wire.body(request, stream=self._streams)
-        return await self._transport.ask(body, self._wire.reading(request), self._show)
+        return await self._transport.ask(self._wire, request, body, self._show)
 
 
 def remote_model(

@@ -18,9 +18,10 @@ from pydantic_core import from_json
 
 from ...tools.errors import ModelError
 from ..messages import Reply
+from ..model import Request
 from .endpoint import Endpoint
 from .failures import AskError, foreign, of_error_body, of_status
-from .wire import Assembly, Reading, Show
+from .wire import Assembly, Show, Wire
 
 TRIES = 4
 FIRST_PAUSE = 0.5
@@ -60,8 +61,10 @@ class Transport:
         # Connections belong to an event loop, and every Agent.run has its own.
         self._pools = WeakKeyDictionary()
 
-    async def ask(self, body: bytes, reading: Reading, show: Show | None = None) -> Reply:
-        """Send a request until it is answered.
+    async def ask(
+        self, wire: Wire, request: Request, body: bytes, show: Show | None = None
+    ) -> Reply:
+        """Send a request, whose body the wire has written, until it is answered.
 
         Raises:
             ModelError: it will not be; one sentence says who did what and what to do.
@@ -71,7 +74,7 @@ class Transport:
         while True:
             tries += 1
             try:
-                return await self._once(body, reading, show)
+                return await self._once(wire, request, body, show)
             except AskError as failure:
                 if tries == TRIES or failure.ends(before):
                     raise ModelError(self._sentence(failure, tries)) from None
@@ -105,30 +108,32 @@ class Transport:
             self._pools[loop] = pool
         return pool
 
-    async def _once(self, body: bytes, reading: Reading, show: Show | None) -> Reply:
-        request = httpx.Request(
+    async def _once(self, wire: Wire, request: Request, body: bytes, show: Show | None) -> Reply:
+        post = httpx.Request(
             "POST", self._url, headers=self._headers, content=body, extensions=self._extensions
         )
         try:
-            response = await self._pool().handle_async_request(request)
+            response = await self._pool().handle_async_request(post)
             try:
-                return await self._read(response, reading, show)
+                return await self._read(wire, request, response, show)
             finally:
                 await response.aclose()
         except httpx.HTTPError as error:
-            raise _of_network(error) from None
+            raise _network_failure(error) from None
 
-    async def _read(self, response: httpx.Response, reading: Reading, show: Show | None) -> Reply:
+    async def _read(
+        self, wire: Wire, request: Request, response: httpx.Response, show: Show | None
+    ) -> Reply:
         advice = self._endpoint.key_advice
         if not response.is_success:
-            body = await _all(response)
+            body = await _whole_body(response)
             raise of_status(response.status_code, response.headers, body, advice)
         if response.headers.get("content-type", "").startswith("text/event-stream"):
-            return reading.reply(await self._assembled(response, reading.assembly(), show))
-        data = _parsed(await _all(response))
+            return wire.reply(await self._assembled(response, wire.assembly(), show), request)
+        data = _parsed_json(await _whole_body(response))
         if failure := of_error_body(data, advice):
             raise failure
-        reply = reading.reply(data)
+        reply = wire.reply(data, request)
         if show is not None:
             show(reply.text)
         return reply
@@ -139,12 +144,12 @@ class Transport:
         events, size = Events(), 0
         try:
             async for chunk in _chunks(response):
-                size = _within(size + len(chunk))
+                size = _bounded_size(size + len(chunk))
                 for event in events.feed(chunk):
                     if event == b"[DONE]":
                         assembly.done = True
                         continue
-                    data = _parsed(event)
+                    data = _parsed_json(event)
                     if failure := of_error_body(data, self._endpoint.key_advice):
                         raise failure
                     text = assembly.add(data)
@@ -154,7 +159,7 @@ class Transport:
             if not assembly.done:
                 raise
         if not assembly.done:
-            raise _dropped()
+            raise _dropped_connection()
         return assembly.whole()
 
 
@@ -209,20 +214,20 @@ def _chunks(response: httpx.Response) -> AsyncIterator[bytes]:
     return aiter(response.stream)
 
 
-async def _all(response: httpx.Response) -> bytes:
+async def _whole_body(response: httpx.Response) -> bytes:
     chunks: list[bytes] = []
     size = 0
     async for chunk in _chunks(response):
-        size = _within(size + len(chunk))
+        size = _bounded_size(size + len(chunk))
         chunks.append(chunk)
     return b"".join(chunks)
 
 
-def _within(size: int) -> int:
-    """A size that is still no sign of something else than a model.
+def _bounded_size(size: int) -> int:
+    """The size of an answer so far, bytes.
 
     Raises:
-        AskError: it is.
+        AskError: no model answers at such length.
     """
     if size > MAX_BYTES:
         advice = "is the base URL right?"
@@ -230,14 +235,14 @@ def _within(size: int) -> int:
     return size
 
 
-def _parsed(body: bytes) -> Any:
+def _parsed_json(body: bytes) -> Any:
     try:
         return from_json(body)
     except ValueError:
         raise foreign("something that is not JSON") from None
 
 
-def _dropped() -> AskError:
+def _dropped_connection() -> AskError:
     return AskError("dropped the connection before its reply was complete", "try again", "later")
 
 
@@ -247,7 +252,7 @@ def _bad_proxy() -> AskError:
     return AskError("cannot be asked through the proxy that the environment names", advice)
 
 
-def _of_network(error: httpx.HTTPError) -> AskError:
+def _network_failure(error: httpx.HTTPError) -> AskError:
     """What the network did. No request is repeated in the text: it holds the key."""
     if isinstance(error, httpx.ConnectTimeout):
         what = f"could not be reached within {CONNECT_S:.0f} s"
@@ -259,7 +264,7 @@ def _of_network(error: httpx.HTTPError) -> AskError:
         what = f"could not be reached ({error})"
         return AskError(what, "is it running, and the address right?", "unless-same")
     if isinstance(error, httpx.NetworkError | httpx.RemoteProtocolError):
-        return _dropped()
+        return _dropped_connection()
     return AskError(f"could not be asked ({type(error).__name__})", "is the base URL right?")
 
 

@@ -9,8 +9,9 @@ from typing import Any, Generic, Protocol, TypeVar, cast
 
 from pydantic_core import from_json
 
-from ..messages import Call, History, Reply, Result, User
+from ..messages import Call, History, Reply, Result, Usage, User
 from ..model import Request
+from .prices import Price
 
 T = TypeVar("T")
 UNREADABLE = "this is not a JSON object"
@@ -44,22 +45,6 @@ class Assembly(Protocol):
         ...
 
 
-class Reading(Protocol):
-    """How the answer to one request is read."""
-
-    def assembly(self) -> Assembly:
-        """A place for the events of one stream."""
-        ...
-
-    def reply(self, data: Any) -> Reply:
-        """What a complete body says.
-
-        Raises:
-            AskError: it is no reply that may be acted on.
-        """
-        ...
-
-
 class Wire(Protocol):
     """One provider's language. It does no I/O."""
 
@@ -75,8 +60,16 @@ class Wire(Protocol):
         """A request as JSON."""
         ...
 
-    def reading(self, request: Request) -> Reading:
-        """How the answer to a request is read."""
+    def assembly(self) -> Assembly:
+        """A place for the events of one stream."""
+        ...
+
+    def reply(self, body: Any, request: Request) -> Reply:
+        """What a complete body answers to a request.
+
+        Raises:
+            AskError: it is no reply that may be acted on.
+        """
         ...
 
     def gives_up(self, refusal: str) -> bool:
@@ -84,7 +77,7 @@ class Wire(Protocol):
         return False
 
 
-class Once(Generic[T]):
+class MessageCache(Generic[T]):
     """Renders each message once, and forgets it together with the message.
 
     Histories are tuples of frozen messages that grow at their end, so that the next turn finds
@@ -121,6 +114,11 @@ def media_type(image: bytes) -> str:
 def base64_text(image: bytes) -> str:
     """A file as text."""
     return base64.b64encode(image).decode()
+
+
+def data_url(image: bytes) -> str:
+    """A PNG or JPEG file as a URL that holds it."""
+    return f"data:{media_type(image)};base64,{base64_text(image)}"
 
 
 def safe_name(name: str) -> str:
@@ -166,3 +164,13 @@ def count(usage: object, *path: str) -> int:
     for name in path:
         value = cast("dict[str, Any]", value).get(name) if isinstance(value, dict) else None
     return value if isinstance(value, int) and 0 < value < MOST_TOKENS else 0
+
+
+def usage_of(price: Price, *, fresh: int, cached: int, written: int = 0, output: int) -> Usage:
+    """Tokens and their cost; input is fresh, read from a cache (cached) or written to one."""
+    return Usage(
+        input_tokens=fresh + cached + written,
+        cached_tokens=cached,
+        output_tokens=output,
+        cost_usd=price.cost(fresh=fresh, cached=cached, written=written, output=output),
+    )

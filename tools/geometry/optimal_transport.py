@@ -40,18 +40,6 @@ class Matching:
     prices: FloatArray
 
 
-@dataclass(frozen=True)
-class Reach:
-    """The greatest distance allowed, px, between starts and goals shifted back by (2,) px."""
-
-    px: float
-    shift: FloatArray
-
-    def beyond(self, goals: FloatArray, starts: FloatArray) -> NDArray[np.bool_]:
-        """Which pairs are too far apart; the arrays' shapes broadcast, (..., 2)."""
-        return ((goals + self.shift - starts) ** 2).sum(axis=-1) > self.px**2
-
-
 def squares(goals: FloatArray, starts: FloatArray, robots: IntArray) -> float:
     """The sum of squared distances, px^2."""
     return float(_squared(goals, starts[robots]).sum())
@@ -87,19 +75,11 @@ def matched(goals: FloatArray, starts: FloatArray) -> Matching:
     coarse = exchanged(here, there, matched(here, there))
     robots = _spread_out(goals, starts, goal_blocks, start_blocks, coarse.robots)
     prices = _interpolated(starts, start_blocks, there, here, coarse)
-    return blockwise(goals, starts, Matching(robots, prices))
+    return _blockwise(goals, starts, Matching(robots, prices))
 
 
-def blockwise(
-    goals: FloatArray, starts: FloatArray, matching: Matching, reach: Reach | None = None
-) -> Matching:
-    """Exact reassignments within blocks of neighbours, laid anew a few times.
-
-    Args:
-        goals, starts: (n, 2).
-        matching: within reach.
-        reach: what limits the pairs.
-    """
+def _blockwise(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matching:
+    """Exact reassignments within blocks of neighbours, laid anew a few times."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
@@ -109,15 +89,11 @@ def blockwise(
         turned = by @ _rotation(k * GOLDEN_ANGLE)
         for block in _blocks(turned, turned, LEAF)[0]:
             cost = cdist(goals[block], starts[robots[block]], "sqeuclidean")
-            if reach:
-                cost[reach.beyond(goals[block, None], starts[robots[block]])] = np.inf
             robots[block] = robots[block][linear_sum_assignment(cost)[1]]
     return replace(matching, robots=robots)
 
 
-def exchanged(
-    goals: FloatArray, starts: FloatArray, matching: Matching, reach: Reach | None = None
-) -> Matching:
+def exchanged(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matching:
     """A round of cycles of exchanges that save (Klein 1967), and prices nearer to the dual's.
 
     Prices fall by Bellman-Ford: a robot is worth no more than the price at which another goal
@@ -125,10 +101,8 @@ def exchanged(
 
     Args:
         goals, starts: (n, 2).
-        matching: within reach.
-        reach: what limits the pairs.
     """
-    goal, robot, cost = _candidates(goals, starts, matching, reach)
+    goal, robot, cost = _candidates(goals, starts, matching)
     nothing = ROUNDING * float(cost.max())
     first = np.flatnonzero(np.diff(robot, prepend=-1))
     robots, prices = matching.robots.copy(), matching.prices.copy()
@@ -181,7 +155,7 @@ def _exchange(
 
 
 def _candidates(
-    goals: FloatArray, starts: FloatArray, matching: Matching, reach: Reach | None
+    goals: FloatArray, starts: FloatArray, matching: Matching
 ) -> tuple[IntArray, IntArray, FloatArray]:
     """Pairs worth considering, ordered by robot: goal, robot, squared distance, (m,) each."""
     from scipy.spatial import cKDTree
@@ -192,11 +166,7 @@ def _candidates(
     options = np.concatenate([around[matching.robots], cheap], axis=1)
     pairs = np.unique(options * n + np.arange(n)[:, None])
     robot, goal = pairs // n, pairs % n
-    cost = _squared(goals[goal], starts[robot])
-    if reach:
-        kept = ~reach.beyond(goals[goal], starts[robot])
-        return goal[kept], robot[kept], cost[kept]
-    return goal, robot, cost
+    return goal, robot, _squared(goals[goal], starts[robot])
 
 
 def _cheapest(

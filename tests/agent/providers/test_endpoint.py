@@ -15,7 +15,7 @@ from formup.agent.providers.openai_chat import OpenAIChat
 from formup.agent.providers.prices import UNKNOWN, price_of
 from formup.agent.providers.registry import model_named
 from formup.agent.providers.remote import remote_model
-from formup.agent.providers.wire import Once
+from formup.agent.providers.wire import MessageCache
 from formup.agent.wrappers.doubles import ScriptedModel
 from formup.tools.errors import InputError, ModelError
 from formup.tools.perception.image import picture_from_array
@@ -210,7 +210,7 @@ def test_another_server_has_no_known_price(
 
     server.script = [http.response(body)]
     assert asyncio.run(asking()) == 0
-    own = OpenAIChat("gpt-4o", price_of("openai", "gpt-4o")).reading(request).reply(body)
+    own = OpenAIChat("gpt-4o", price_of("openai", "gpt-4o")).reply(body, request)
     assert own.usage.cost_usd == pytest.approx((40 * 2.5 + 60 * 1.25 + 20 * 10) / 1e6)
 
 
@@ -219,7 +219,7 @@ def fresh(message: object) -> object:
 
 
 def test_what_is_rendered_goes_with_its_message() -> None:
-    once: Once[object] = Once(fresh)
+    once: MessageCache[object] = MessageCache(fresh)
     message = formup.User(text="x")
     assert once(message) is once(message)
     other = formup.User(text="x")

@@ -176,7 +176,7 @@ def test_an_error_in_a_list_is_read(server: Any, gemini: Any, http: Any) -> None
 def test_thoughts_cost_what_output_costs(gemini: Any) -> None:
     price = price_of("gemini", "gemini-2.5-pro")
     wire = Gemini("gemini-2.5-pro", price)
-    usage = wire.reading(Request("", (GO,), ())).reply(gemini.body("x")).usage
+    usage = wire.reply(gemini.body("x"), Request("", (GO,), ())).usage
     assert (usage.input_tokens, usage.cached_tokens, usage.output_tokens) == (100, 60, 20)
     assert usage.cost_usd == pytest.approx((40 * 1.25 + 60 * 0.125 + 20 * 10) / 1e6)
 
@@ -216,13 +216,13 @@ def test_signed_parts_come_back_as_they_came(
 
 
 def test_without_signatures_nothing_is_kept(gemini: Any) -> None:
-    reading = Gemini("m", UNKNOWN).reading(Request("", (GO,), ()))
-    assert reading.reply(gemini.body("x", [("a", "look", {})])).opaque is None
+    body = gemini.body("x", [("a", "look", {})])
+    assert Gemini("m", UNKNOWN).reply(body, Request("", (GO,), ())).opaque is None
 
 
 def test_calls_of_another_model_are_said_to_be_unsigned(gemini: Any) -> None:
-    reading = Gemini("gemini-3-pro", UNKNOWN).reading(Request("", (GO,), ()))
-    other = reading.reply(gemini.frame(SIGNED, "STOP"))
+    wire = Gemini("gemini-3-pro", UNKNOWN)
+    other = wire.reply(gemini.frame(SIGNED, "STOP"), Request("", (GO,), ()))
     chat = Reply(calls=tuple(Call(id=i, name="look", arguments={}) for i in ("a", "b")))
 
     def signatures(model: str, reply: Reply) -> list[str | None]:

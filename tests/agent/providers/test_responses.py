@@ -131,8 +131,8 @@ def test_arguments_that_are_not_json_go_back(
 def test_writing_to_the_cache_has_a_price_with_some_models(responses: Any) -> None:
     old, new = Price(1, 0.1, 0, 10), Price(1, 0.1, 2, 10)
     for price, cost in ((old, 40 + 6 + 200), (new, 10 + 6 + 60 + 200)):
-        reading = OpenAIResponses("m", price).reading(Request("", (GO,), ()))
-        assert reading.reply(responses.body("x")).usage.cost_usd == pytest.approx(cost / 1e6)
+        reply = OpenAIResponses("m", price).reply(responses.body("x"), Request("", (GO,), ()))
+        assert reply.usage.cost_usd == pytest.approx(cost / 1e6)
 
 
 def with_thought(responses: Any, *said: Any, **more: Any) -> dict[str, Any]:
@@ -162,17 +162,17 @@ def test_thoughts_come_back_before_their_calls(
 
 
 def test_what_holds_no_thought_is_not_kept(responses: Any) -> None:
-    reading = OpenAIResponses("m", UNKNOWN).reading(Request("", (GO,), ()))
+    wire, request = OpenAIResponses("m", UNKNOWN), Request("", (GO,), ())
     plain = responses.body("x", [("a", "look", {})])
-    assert reading.reply(plain).opaque is None
+    assert wire.reply(plain, request).opaque is None
     # Without its content a thought is a mere reference to what no server has stored.
     body = with_thought(responses, "x")
     body["output"][0] = THOUGHT | {"encrypted_content": None}
-    assert reading.reply(body).opaque is None
+    assert wire.reply(body, request).opaque is None
     body["output"][0] = {"id": "rs", "type": "reasoning", "content": [{"type": "reasoning_text"}]}
-    assert reading.reply(body).opaque is not None
+    assert wire.reply(body, request).opaque is not None
     plain["output"][0]["phase"] = "commentary"
-    assert reading.reply(plain).opaque is not None
+    assert wire.reply(plain, request).opaque is not None
 
 
 def test_a_model_that_does_not_think_is_asked_for_no_thoughts(
@@ -217,7 +217,7 @@ def test_no_other_model_is_sent_what_is_opaque(
     body = with_thought(responses, "", [("a", "look", {})])
     if maker is Gemini:
         body = gemini.frame([{"functionCall": call, "thoughtSignature": "gAAA"}], "STOP")
-    reply = maker("m", UNKNOWN).reading(Request("", (GO,), ())).reply(body)
+    reply = maker("m", UNKNOWN).reply(body, Request("", (GO,), ()))
     bare = Reply(calls=(Call(id="a", name="look", arguments={}),))
     assert reply.model_copy(update={"opaque": None, "usage": bare.usage}) == bare
     for kind in WIRES:

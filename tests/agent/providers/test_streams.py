@@ -51,12 +51,12 @@ REQUEST = Request("", (User(text="go"),), TOOLS)
 @pytest.mark.parametrize("wire", WIRES)
 @given(events=st.lists(ANY, min_size=1, max_size=4))
 def test_any_stream_is_a_reply_or_an_ask_error(wire: Any, events: list[Any]) -> None:
-    reading = wire("m", UNKNOWN).reading(REQUEST)
-    assembly = reading.assembly()
+    spoken = wire("m", UNKNOWN)
+    assembly = spoken.assembly()
     with suppress(AskError):
         for event in events:
             assert isinstance(assembly.add(event), str)
-        reading.reply(assembly.whole())
+        spoken.reply(assembly.whole(), REQUEST)
 
 
 ODD = [None, True, 0, -1, 2.5, inf, -inf, nan, 10**400, "", "x", [], [1], [None], {}, {"x": 1}]
@@ -79,14 +79,14 @@ def test_one_odd_value_anywhere_is_a_reply_or_an_ask_error(dialect: Any, odd: An
     body: Any = dialect.body(*said)
     for holder, key in [*places(events), *places(body)]:
         kept, holder[key] = holder[key], odd
-        reading = SPOKEN[dialect.name]("m", UNKNOWN).reading(REQUEST)
-        assembly = reading.assembly()
+        spoken = SPOKEN[dialect.name]("m", UNKNOWN)
+        assembly = spoken.assembly()
         with suppress(AskError):
-            reading.reply(body)
+            spoken.reply(body, REQUEST)
         with suppress(AskError):
             for event in events:
                 assembly.add(event)
-            reading.reply(assembly.whole())
+            spoken.reply(assembly.whole(), REQUEST)
         holder[key] = kept
 
 
@@ -94,7 +94,7 @@ def test_one_odd_value_anywhere_is_a_reply_or_an_ask_error(dialect: Any, odd: An
 @given(body=ANY)
 def test_any_body_is_a_reply_or_an_ask_error(wire: Any, body: Any) -> None:
     with suppress(AskError):
-        wire("m", UNKNOWN).reading(REQUEST).reply(body)
+        wire("m", UNKNOWN).reply(body, REQUEST)
 
 
 @settings(max_examples=500)

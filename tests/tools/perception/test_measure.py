@@ -1,0 +1,121 @@
+"""What is pointed at is measured by any segmenter, of ours or of a package that is installed."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formup.tools.errors import InputError, ToolError
+from formup.tools.perception.detectors.registry import DETECTORS, detector_named
+from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.measure import measure_outline, missed_vertices
+from formup.tools.perception.segmenters.registry import SEGMENTERS, segmenter_named
+from formup.tools.perception.target_prompt import TargetPrompt
+from PIL import Image
+from shapely.geometry import box
+
+BOX = (60.0, 40.0, 139.0, 99.0)
+
+
+@pytest.fixture
+def lamp() -> Picture:
+    """A bright rectangle, BOX, on a dark ground."""
+    pixels = np.full((150, 220, 3), 30, dtype=np.uint8)
+    pixels[40:100, 60:140] = 230
+    return picture_from_array(pixels)
+
+
+def test_what_is_built_in_goes_in_as_other_packages_do() -> None:
+    assert SEGMENTERS.names() == ("grabcut",)
+    assert DETECTORS.names() == ("standout",)
+    assert segmenter_named("grabcut") is segmenter_named("grabcut")
+    for name in SEGMENTERS.names():
+        assert segmenter_named(name).name == name
+    for name in DETECTORS.names():
+        assert detector_named(name).name == name
+
+
+def test_an_unknown_name_lists_the_known_ones() -> None:
+    with pytest.raises(InputError, match=r"Unknown segmenter 'sam'\. There are: grabcut\."):
+        segmenter_named("sam")
+    with pytest.raises(InputError, match=r"Unknown detector 'eye'\. There are: standout\."):
+        detector_named("eye")
+
+
+@pytest.mark.usefixtures("example_package")
+def test_an_installed_segmenter_is_used_by_its_name(lamp: Picture) -> None:
+    assert "example-ellipse" in SEGMENTERS.names()
+    ellipse = segmenter_named("example-ellipse")
+    found = measure_outline(lamp, TargetPrompt(box=BOX), ellipse)
+    assert found.confidence == 0.9
+    assert found.parts == {"example": 0.9}
+    assert found.outline.area == pytest.approx(np.pi / 4 * 79 * 59, rel=0.03)
+
+
+@pytest.mark.usefixtures("example_package")
+def test_what_a_segmenter_does_not_take_is_refused(lamp: Picture) -> None:
+    ellipse = segmenter_named("example-ellipse")
+    drawn = TargetPrompt(outline=((60, 40), (139, 40), (139, 99)), points=((100, 50),))
+    with pytest.raises(ToolError) as refused:
+        measure_outline(lamp, drawn, ellipse)
+    assert str(refused.value) == (
+        "The segmenter 'example-ellipse' cannot be pointed with outline or points. "
+        "It takes box: use that, or another segmenter."
+    )
+
+
+@pytest.mark.usefixtures("example_package")
+def test_an_installed_detector_finds_candidates_that_any_segmenter_measures(lamp: Picture) -> None:
+    bright = detector_named("example-bright")
+    assert bright.detect(lamp, "red car") == ()
+    assert bright.detect(lamp, "lamp") == bright.detect(lamp, None)
+    (candidate,) = bright.detect(lamp, None)
+    assert candidate.label == "white rectangle"
+    assert not candidate.attributes.touches_border
+    prompt = TargetPrompt(candidate=candidate.id)
+    by_outline = measure_outline(lamp, prompt, segmenter_named("grabcut"), candidate)
+    by_box = measure_outline(lamp, prompt, segmenter_named("example-ellipse"), candidate)
+    truth = box(59.5, 39.5, 139.5, 99.5)
+    for found in (by_outline, by_box):
+        shared = found.outline.polygon.intersection(truth).area
+        assert shared > 0.95 * found.outline.polygon.union(truth).area
+    # An ellipse is not what the detector found: its outline stays, and is trusted less.
+    assert by_box.outline == candidate.outline
+    assert by_box.confidence == pytest.approx((np.pi / 4 + 0.8) / 2, abs=0.02)
+
+
+@pytest.mark.usefixtures("example_package")
+def test_an_entry_point_that_leads_nowhere_is_one_sentence() -> None:
+    with pytest.raises(InputError, match=r"'example-absent' .* cannot be imported"):
+        segmenter_named("example-absent")
+
+
+def test_an_installed_segmenter_runs_from_the_command_line(
+    installed: Path, lamp: Picture, tmp_path: Path
+) -> None:
+    Image.fromarray(lamp.pixels).save(tmp_path / "lamp.png")
+    command = [sys.executable, "-m", "formup", "run", "lamp.png", "surround it", "-n", "6"]
+    command += ["--box", ",".join(map(str, BOX)), "--segmenter", "example-ellipse"]
+    found = [str(installed), os.environ.get("PYTHONPATH", "")]
+    done = subprocess.run(
+        [*command, "--plan-only", "--json"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, found))},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    (target,) = json.loads(done.stdout)["targets"]
+    assert target["confidence"] == 0.9
+
+
+def test_vertices_that_the_measured_outline_leaves_out_are_named(lamp: Picture) -> None:
+    drawn = ((60, 40), (139, 40), (200, 120), (139, 99), (60, 99))
+    prompt = TargetPrompt(outline=drawn)
+    found = measure_outline(lamp, prompt, segmenter_named("grabcut"))
+    assert missed_vertices(found.outline, prompt) == ((200.0, 120.0),)
+    assert missed_vertices(found.outline, TargetPrompt(box=BOX)) == ()
