@@ -87,6 +87,8 @@ class Result(_Value):
 
     Attributes:
         error: what kind of mistake it reports, if any.
+        cause: the kind of the tool's error, see `tools.errors.Kind`; what code reacts to.
+        facts: that error's numbers and ids.
         told: what the person is told, where the call has closed the run.
     """
 
@@ -95,6 +97,8 @@ class Result(_Value):
     name: str
     text: str
     error: ErrorKind | None = None
+    cause: str | None = None
+    facts: dict[str, Any] = {}
     images: tuple[bytes, ...] = ()
     told: str | None = None
 

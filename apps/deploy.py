@@ -11,6 +11,7 @@ from ..agent.report import Report, metric_data, target_data
 from ..tools.builtin.committing import deploy as deploy_tool
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.plan import Plan
+from ..tools.formation.units import length_text
 from ..tools.store import Stored, read_stored, restore
 from ..tools.world import Settings, Workspace
 from . import options as o
@@ -46,11 +47,10 @@ def deploy(plan: o.PlanFile, fleet: o.FleetName = "simulated", as_json: o.Json =
 def _report(plan: Plan, workspace: Workspace, stored: Stored, animation: str | None) -> Report:
     arrival, scene = workspace.arrivals[plan.id], workspace.scene
     state = "All arrived" if arrival.arrived else "Not all arrived"
+    furthest = length_text(max(arrival.residual_px), scene.metres_per_pixel)
     return Report(
         status="deployed" if arrival.arrived else "failed",
-        message=scene.told(
-            f"{state}; the furthest is {max(arrival.residual_px):.1f} px from its place."
-        )
+        message=f"{state}; the furthest is {furthest} from its place."
         + (f" The plan is partial: {plan.partial.sentence}" if plan.partial else ""),
         instruction=stored.instruction or "",
         image=json.loads(stored.image.model_dump_json(exclude={"path", "metres_per_pixel"})),

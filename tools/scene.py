@@ -12,7 +12,7 @@ from .errors import ToolError
 from .formation.contract import Contract
 from .formation.placement.place import Site
 from .formation.plan import scene_version
-from .formation.units import also_metres, check_scale
+from .formation.units import check_scale
 from .geometry.outline import Outline
 from .perception.image import Picture
 from .perception.target_prompt import TargetPrompt
@@ -72,10 +72,6 @@ class Scene:
         outlines = {t.id: _canonical(t.outline) for t in self.targets}
         return scene_version(self.picture.sha256, outlines, self.metres_per_pixel)
 
-    def told(self, text: str) -> str:
-        """A text with each length in px told in metres too, where the scale is known."""
-        return also_metres(text, self.metres_per_pixel)
-
     def target(self, name: str) -> Target:
         """The target with an id.
 
@@ -86,7 +82,7 @@ class Scene:
             if target.id == name:
                 return target
         known = ", ".join(t.id for t in self.targets) or "none yet: segment something first"
-        raise ToolError(f"There is no target {name!r}. Targets: {known}.")
+        raise ToolError(f"There is no target {name!r}. Targets: {known}.", "unknown_target")
 
     def with_target(self, target: Target) -> "Scene":
         """The scene with one more target, or with the one of the same id replaced."""

@@ -142,7 +142,7 @@ class Workspace:
             outline, confidence, parts = self._measured(prompt)
         except InputError as error:
             text = f"Insufficient segmentation accuracy. {error} {ADVICE[prompt.how]}"
-            raise ToolError(text) from None
+            raise ToolError(text, "low_confidence", threshold=threshold) from None
         target = Target(
             id=prompt.id,
             label=prompt.label or "the thing pointed at",
@@ -156,7 +156,9 @@ class Workspace:
         )
         if confidence < threshold:
             self.doubted = target
-            raise ToolError(_insufficient(confidence, threshold, prompt.how))
+            facts = {"confidence": confidence, "threshold": threshold}
+            text = _insufficient(confidence, threshold, prompt.how)
+            raise ToolError(text, "low_confidence", **facts)
         self.scene = self.scene.with_target(target)
         return target
 
@@ -237,12 +239,13 @@ class Workspace:
         if plan_id is None or plan_id not in self.plans:
             known = ", ".join(self.plans) or "none yet: propose a formation first"
             named = "" if plan_id is None else f" {plan_id!r}"
-            raise ToolError(f"There is no plan{named}. Plans: {known}.")
+            raise ToolError(f"There is no plan{named}. Plans: {known}.", "unknown_plan")
         plan = self.plans[plan_id]
         if plan.formation.scene_version != self.scene.version:
             raise ToolError(
                 f"Plan {plan_id} is void: what it is about was measured again since, or the scale "
-                "is another. Deploy one proposed since, or propose this again as it was."
+                "is another. Deploy one proposed since, or propose this again as it was.",
+                "void_plan",
             )
         return plan
 
@@ -256,7 +259,8 @@ class Workspace:
         if contract.robots > MAX_ROBOTS:
             raise ToolError(
                 f"{contract.robots} robots can be placed and certified, but motion is simulated "
-                f"only up to {MAX_ROBOTS} so far: the plan stands, nothing was moved."
+                f"only up to {MAX_ROBOTS} so far: the plan stands, nothing was moved.",
+                "too_many_robots",
             )
         solid, radius = obstacles(contract, site), contract.robot_radius
         if self.settings.starts is None:

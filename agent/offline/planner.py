@@ -5,12 +5,10 @@ asks when the words do not settle what to do. It is no language model: it sees m
 """
 
 import json
-import re
 from typing import Any
 
-from ...tools.builtin.committing import SHOW_PARTIAL
 from ...tools.formation.contract import MAX_ROBOTS
-from ...tools.formation.units import also_metres
+from ...tools.formation.units import length_text
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User
 from ..model import Request
@@ -25,8 +23,6 @@ FARTHEST = 100_000
 """Inside, a length that is named is the least distance from the edge, px."""
 DISTANCELESS = {"between": "between", "centre": "at the centre of"}
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
-PLACE = re.compile(r"^propose_formation: contract\.groups\.0[\w.]*: ")
-"""Where in the arguments something is wrong, which says nothing to a person."""
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 
 
@@ -246,15 +242,17 @@ def _target_ids(task: Task) -> list[str]:
 
 def _after_proposal(task: Task, result: Result, history: History) -> Reply:
     if result.error:
-        if "There is no room" in result.text and _may_move_on(task, history):
+        if result.cause == "no_room_beside" and _may_move_on(task, history):
             return _begin(task, history)
-        if "Insufficient segmentation accuracy" in result.text:
+        if result.cause == "low_confidence":
             return _call(history, "ask_user", {"question": result.text})
-        return _impossible(history, PLACE.sub("", result.text))
+        reason = result.facts.get("plain", result.text)
+        return _impossible(history, reason, result.facts.get("partial_plan"))
     plan = json.loads(result.text)
     if not plan["certified"]:
-        said = [*plan["findings"], plan.get("partial", "")]
-        return _impossible(history, " ".join(said).strip(), plan["plan_id"])
+        partial = plan.get("partial", {"plan_id": plan["plan_id"]})
+        reason = [*plan["findings"], *([partial["sentence"]] if "sentence" in partial else [])]
+        return _impossible(history, " ".join(reason), partial["plan_id"])
     if task.deploy:
         return _call(history, "deploy", {"plan_id": plan["plan_id"]})
     return Reply(text=f"{_planned(plan, history)} Nothing was moved.")
@@ -269,12 +267,9 @@ def _may_move_on(task: Task, history: History) -> bool:
     return form.where(reading.relations, None, _refusals(history)) is not None
 
 
-def _impossible(history: History, said: str, plan_id: str | None = None) -> Reply:
-    """Give up, in the words of the tool, with the partial plan it made, else the plan proposed."""
-    reason = said.removesuffix(SHOW_PARTIAL).rstrip()
-    partial = re.findall(r"\bp-[0-9a-f]{10}\b", said) if reason != said else []
-    named = partial[-1] if partial else plan_id
-    arguments = {"reason": reason} | ({"plan_id": named} if named else {})
+def _impossible(history: History, reason: str, plan_id: str | None) -> Reply:
+    """Give up, in the words of the tool, with the best plan there is."""
+    arguments = {"reason": reason} | ({"plan_id": plan_id} if plan_id else {})
     return _call(history, "report_impossible", arguments)
 
 
@@ -286,12 +281,13 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
     if result.error:
         return f"{planned} {result.text}"
     arrival = json.loads(result.text)
-    off = f"{arrival['worst_residual_px']:.1f} px from its place"
+    worst = length_text(arrival["worst_residual_px"], task.metres_per_pixel)
+    off = f"{worst} from its place"
     said = f"All arrived; the furthest is {off}."
     if not arrival["arrived"]:
         corrected = f"after {arrival['corrections']} corrections"
         said = f"Robot {arrival['worst_robot']} stopped {off} {corrected}."
-    return f"{planned} {also_metres(said, task.metres_per_pixel)}"
+    return f"{planned} {said}"
 
 
 def _planned(plan: dict[str, Any], history: History) -> str:

@@ -83,7 +83,8 @@ def measuring(messages: History) -> int | None:
 
 def _uncertified(messages: History) -> bool:
     proposals = [m for m in messages if isinstance(m, Result) and m.name == "propose_formation"]
-    return bool(proposals) and '"certified":true' not in proposals[-1].text
+    last = proposals[-1] if proposals else None
+    return last is not None and (last.error is not None or not json.loads(last.text)["certified"])
 
 
 def _handed_over(messages: History, found: int) -> History:

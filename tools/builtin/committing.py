@@ -12,7 +12,7 @@ from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
 from ..formation.placement.partial import REFUSALS, Refusal, best_partial
 from ..formation.plan import Plan, make_plan
-from ..formation.units import contract_in_pixels, with_metres
+from ..formation.units import contract_in_pixels, length_text, with_metres
 from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
 from ..scene import Scene, Target
@@ -55,7 +55,8 @@ def propose_formation(
     if asked is not None and contract.robots != asked:
         raise ToolError(
             f"The person asked for {asked} robots; the contract's groups add up to "
-            f"{contract.robots}."
+            f"{contract.robots}.",
+            "count",
         )
     stated = contract_in_pixels(contract, workspace.scene.metres_per_pixel)
     _check_doubts(workspace, stated)
@@ -68,9 +69,10 @@ def propose_formation(
     unseen = workspace.unseen[plan.id] = _unseen(workspace, held)
     data = _proposal(workspace, plan)
     if places is None and not plan.verdict.certified:
-        found = _partial(workspace, held, None)
+        partial = _partial(workspace, held, None)
         _keep(workspace, plan)
-        data |= {"partial": found.strip()} if found else {}
+        if partial is not None:
+            data |= {"partial": partial, "next": SHOW_PARTIAL}
     if plan.verdict.certified and (advice := _to_see(workspace, plan)):
         data |= {"look_first": advice}
     return ToolResult(data, overlays(workspace, map(workspace.scene.target, unseen), plan))
@@ -94,9 +96,13 @@ def _planned(workspace: Workspace, held: Contract, places: Any) -> Plan:
     scene = workspace.scene
     try:
         return make_plan(held, scene.site(held), scene.version, places)
-    except ToolError as error:
-        less = _partial(workspace, held, error) if isinstance(error, REFUSALS) else ""
-        raise ToolError(f"{scene.told(str(error))}{less}") from None
+    except REFUSALS as error:
+        partial = _partial(workspace, held, error)
+        if partial is None:
+            raise
+        plain = f"{error} {partial['sentence']}"
+        facts = error.facts | {"partial_plan": partial["plan_id"], "plain": plain}
+        raise ToolError(f"{plain} {SHOW_PARTIAL}", error.kind, **facts) from None
 
 
 def _unseen(workspace: Workspace, held: Contract) -> tuple[str, ...]:
@@ -122,8 +128,9 @@ async def deploy(
         raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
     if plan.partial is not None and workspace.settings.approved != plan.id:
         raise ToolError(
-            f"Plan {plan.id} is partial ({workspace.scene.told(plan.partial.short)}): nothing of a "
-            "task is done unasked. A person may have exactly this plan driven, with formup deploy."
+            f"Plan {plan.id} is partial ({plan.partial.short(workspace.scene.metres_per_pixel)}): "
+            "nothing of a task is done unasked. A person may have exactly this plan driven, with "
+            "formup deploy."
         )
     if not workspace.settings.may_deploy:
         raise ToolError("The person asked for the plan only: nothing may be moved.")
@@ -191,13 +198,16 @@ def _keep(workspace: Workspace, plan: Plan) -> None:
     workspace.plans[plan.id] = plan
 
 
-def _partial(workspace: Workspace, held: Contract, refusal: Refusal | None) -> str:
-    """Keep the best partial plan; what there is to say of it, nothing where there is none."""
+def _partial(
+    workspace: Workspace, held: Contract, refusal: Refusal | None
+) -> dict[str, str] | None:
+    """Keep the best partial plan: its id and what there is to say of it; None where none is."""
     plan = best_partial(held, workspace.scene.site(held), workspace.scene.version, refusal)
     if plan is None or plan.partial is None:
-        return ""
+        return None
     _keep(workspace, plan)
-    return f" Plan {plan.id} is certified as partial: {plan.partial.sentence} {SHOW_PARTIAL}"
+    sentence = f"Plan {plan.id} is certified as partial: {plan.partial.sentence}"
+    return {"plan_id": plan.id, "sentence": sentence}
 
 
 def _to_see(workspace: Workspace, plan: Plan) -> str:
@@ -205,16 +215,18 @@ def _to_see(workspace: Workspace, plan: Plan) -> str:
     unseen = workspace.unseen.get(plan.id, plan.formation.contract.target_ids)
     for target in map(workspace.scene.target, unseen):
         if plan.id in workspace.unseen or doubtful(target):
-            return workspace.scene.told(
-                f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
-                f"about {_slack(plan, target.id):.0f} px, deploy plan_id {plan.id} (with tell). "
+            scale = workspace.scene.metres_per_pixel
+            slack = length_text(_slack(plan, target.id), scale, ".0f")
+            return (
+                f"{target.id} {_doubt(target, scale)}. If the outline shown follows the thing to "
+                f"within about {slack}, deploy plan_id {plan.id} (with tell). "
                 f"Where it does not and yours (dashed) does, propose again with {target.id} and "
                 "`points` on the thing there or `negative` ones off it; else with a closer outline."
             )
     return ""
 
 
-def _doubt(target: Target) -> str:
+def _doubt(target: Target, scale: float | None) -> str:
     """Why a target has to be looked at."""
     if not doubtful(target):
         return "has an edge that a named distance is measured from"
@@ -222,7 +234,7 @@ def _doubt(target: Target) -> str:
         return f"was measured with confidence {target.confidence:.2f}"
     away = distances(target.outline.filled, np.asarray(target.missed))
     places = zip(target.missed, away, strict=True)
-    left = ", ".join(f"({x:g}, {y:g}) by {px:.0f} px" for (x, y), px in places)
+    left = ", ".join(f"({x:g}, {y:g}) by {length_text(px, scale, '.0f')}" for (x, y), px in places)
     return f"as measured leaves out your {left}, which has so much less clearance"
 
 
@@ -239,8 +251,8 @@ def _told(tell: str | None, arrival: Arrival, scene: Scene) -> str | None:
         return None
     count, worst = len(arrival.observed), max(arrival.residual_px)
     robots = "The robot was" if count == 1 else f"All {count} robots were"
-    observed = scene.told(f"{robots} observed within {max(worst, 0.1):.1f} px of the plan.")
-    return f"{tell.strip()} {observed}"
+    within = length_text(max(worst, 0.1), scene.metres_per_pixel)
+    return f"{tell.strip()} {robots} observed within {within} of the plan."
 
 
 def _held_to(contract: Contract, settings: Settings) -> Contract:
