@@ -50,9 +50,9 @@ async def answer(
             result = await tool.call(context, call.arguments)
             text = result.text
     except ArgumentsError as error:
-        return failed(call, "arguments", str(error))
+        return failed(call, "arguments", str(error), error)
     except ToolError as error:
-        return failed(call, "tool", str(error), error.images)
+        return failed(call, "tool", str(error), error)
     except FormupError:
         raise
     except Exception as error:
@@ -67,9 +67,13 @@ async def answer(
     )
 
 
-def failed(call: Call, kind: ErrorKind, text: str, images: tuple[bytes, ...] = ()) -> Result:
+def failed(call: Call, kind: ErrorKind, text: str, error: ToolError | None = None) -> Result:
     """The answer to a call that came to nothing."""
-    return Result(call_id=call.id, name=call.name, text=text, error=kind, images=images)
+    result = Result(call_id=call.id, name=call.name, text=text, error=kind)
+    if error is None:
+        return result
+    causes = {"images": error.images, "cause": error.kind, "facts": error.facts}
+    return result.model_copy(update=causes)
 
 
 def refused(call: Call, why: str) -> Result:

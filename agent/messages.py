@@ -87,6 +87,8 @@ class Result(_Value):
 
     Attributes:
         error: what kind of mistake it reports, if any.
+        cause: the kind of the tool's error, see `tools.errors.Kind`; what code reacts to.
+        facts: that error's numbers and ids.
         message: what the person is told, where the call has ended the turn.
     """
 
@@ -95,6 +97,8 @@ class Result(_Value):
     name: str
     text: str
     error: ErrorKind | None = None
+    cause: str | None = None
+    facts: dict[str, Any] = {}
     images: tuple[bytes, ...] = ()
     message: str | None = None
 

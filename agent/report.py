@@ -203,7 +203,7 @@ def _named(messages: History) -> str | None:
     last = messages[-1] if messages else None  # none where a run was killed before its first
     if not isinstance(last, Result) or last.name != "report_impossible" or last.error:
         return None
-    calls = [c for m in messages if isinstance(m, Reply) for c in m.calls]
+    calls = [c for m in turn_of(messages) if isinstance(m, Reply) for c in m.calls]
     return next(c.arguments.get("plan_id") for c in calls if c.id == last.call_id)
 
 

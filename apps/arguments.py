@@ -15,6 +15,7 @@ from ..agent.limits import Limits
 from ..agent.policy import Policy
 from ..evals.tasks.photographs import Task
 from ..prompts.inputs import Input
+from ..tools.context import Descriptor
 from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_LENGTH, MAX_ROBOTS
 from ..tools.formation.named_lengths import named_lengths
@@ -23,7 +24,6 @@ from ..tools.geometry.outline import FARTHEST
 from ..tools.perception.target_prompt import Point, TargetPrompt
 from ..tools.store import read_text
 from ..tools.tool import violations
-from ..tools.context import Descriptor
 
 MAX_SPAN = 10_000
 """Seeds in one run."""
@@ -279,7 +279,7 @@ def starts(path: Path | None) -> tuple[Point, ...] | None:
         raise InputError(
             f"--starts {path} must hold one x,y a line, or JSON [[x, y], ...], in pixels."
         )
-    return tuple((float(x), float(y)) for x, y in values.tolist())
+    return tuple(zip(values[:, 0].tolist(), values[:, 1].tolist(), strict=True))
 
 
 def limits(given: list[str] | None, before: Mapping[str, Any] | None = None) -> Limits:

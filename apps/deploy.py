@@ -13,6 +13,7 @@ from ..tools.builtin.robots import drive_to
 from ..tools.context import Context, Settings
 from ..tools.errors import FleetError, InputError, ToolError
 from ..tools.formation.plan import Plan
+from ..tools.formation.units import length_text
 from ..tools.perception.image import load_picture
 from ..tools.store import StoredWorld, picture_of, plan_file, read_world, write_whole
 from ..tools.world import World
@@ -68,11 +69,10 @@ def _driven(context: Context, plan: Plan, path: Path) -> World:
 def _report(plan: Plan, world: World, stored: StoredWorld, animation: str | None) -> Report:
     arrival = world.arrivals[plan.id]
     state = "All arrived" if arrival.arrived else arrival.reason or "Not all arrived"
+    furthest = length_text(max(arrival.residual_px), world.metres_per_pixel)
     return Report(
         status="deployed" if arrival.arrived else "failed",
-        message=world.with_metres(
-            f"{state}; the furthest is {max(arrival.residual_px):.1f} px from its place."
-        )
+        message=f"{state}; the furthest is {furthest} from its place."
         + (f" The plan is partial: {plan.partial.sentence}" if plan.partial else ""),
         instruction=stored.instruction or "",
         image=world.picture.model_dump(),

@@ -12,7 +12,7 @@ from rich.text import Text
 from ..agent.report import Report
 from ..tools.formation.checking.verdict import Measure
 from ..tools.formation.contract import Group
-from ..tools.formation.units import also_metres
+from ..tools.formation.units import length_text
 
 LONGEST = 600
 """Characters of an error message; a value given may be vast."""
@@ -60,7 +60,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
         )
     if report.contract is not None:
         for group in report.contract.groups:
-            _line(console, "contract", _told(_group(group), report))
+            _line(console, "contract", _group(group, _scale(report)))
     if report.verdict is not None:
         _certificate(console, report)
     if report.arrival is not None:
@@ -117,15 +117,15 @@ def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
     console.print(table)
 
 
-def _group(group: Group) -> str:
+def _group(group: Group, scale: float | None) -> str:
     noun = "robot" if group.robots == 1 else "robots"
     words = [f"{group.robots} {noun} {PLACES[group.relation]}", " and ".join(group.targets)]
     if group.side:
         words.append(f"({group.side} side)")
     if group.clearance is not None and group.relation == "inside":
-        words.append(f"at least {group.clearance[0]:.1f} px from its edge")
+        words.append(f"at least {length_text(group.clearance[0], scale)} from its edge")
     elif group.clearance is not None and group.relation != "corners":
-        words.append(f"{group.clearance[0]:.1f} to {group.clearance[1]:.1f} px away")
+        words.append(f"{length_text(group.clearance, scale)} away")
     escape_proof = group.closure == "escape-proof"
     if group.spacing == "even" and group.relation not in ("corners", "centre") and not escape_proof:
         words.append("evenly spaced")
@@ -134,17 +134,20 @@ def _group(group: Group) -> str:
     return " ".join(word for word in words if word)
 
 
-def _told(text: str, report: Report) -> str:
-    """With lengths in metres too, where the picture's scale is known."""
-    return also_metres(text, report.metric["metres_per_pixel"] if report.metric else None)
+def _scale(report: Report) -> float | None:
+    return report.metric["metres_per_pixel"] if report.metric else None
 
 
-def _measures(measures: dict[str, Measure]) -> str:
-    """Measures as words, those in pixels with their unit behind the number."""
+def _measures(measures: dict[str, Measure], scale: float | None) -> str:
+    """Measures as words."""
+
+    def shown(name: str, value: Measure) -> str:
+        if isinstance(value, str):
+            return value
+        return length_text(value, scale, "g") if name.endswith("_px") else f"{value:g}"
+
     return ", ".join(
-        f"{name.removesuffix('_px').replace('_', ' ')} "
-        + (value if isinstance(value, str) else f"{value:g}")
-        + (" px" if name.endswith("_px") else "")
+        f"{name.removesuffix('_px').replace('_', ' ')} {shown(name, value)}"
         for name, value in measures.items()
     )
 
@@ -152,7 +155,7 @@ def _measures(measures: dict[str, Measure]) -> str:
 def _certificate(console: Console, report: Report) -> None:
     verdict = report.verdict
     assert verdict is not None
-    measures = _told(_measures(verdict.measures), report)
+    measures = _measures(verdict.measures, _scale(report))
     if report.partial is not None:
         _line(console, "partial", report.partial.sentence)
     if verdict.certified:

@@ -1,19 +1,59 @@
-"""Every exception formup raises on purpose, so that callers can catch one or all.
+"""Every exception formup raises on purpose, by who has to act. Code reads `kind` and `facts`.
 
 FormupError
-├── InputError     a person gave something that cannot be used; the text says what would do
-│   ├── ImageError     the picture file: missing, broken, too large, of a foreign format
-│   └── StorageError   a log, state or artefact that cannot be read or written
-├── ToolError      a model asked a tool for something it cannot do; goes back to the model
+│   the model mends its call and goes on:
+├── ToolError      a tool cannot do what it was asked for
 │   └── ArgumentsError the arguments are against the tool's schema
-├── ApprovalError  a person must approve a plan before real robots move
+│   the person changes what was given:
+├── InputError     something that cannot be used; the text says what would do
+│   ├── ImageError     the picture file: missing, broken, too large, of a foreign format
+│   ├── StorageError   a log, state or artefact that cannot be read or written
+│   └── ApprovalError  a plan waits for a person's approval before real robots move
+│   the turn halts:
 ├── ModelError     a model or its provider failed, or does not exist
 └── FleetError     robots could not be moved or observed
 """
 
+from typing import Any, Literal
+
+Kind = Literal[
+    "capacity",
+    "cage",
+    "crowded",
+    "no_room_beside",
+    "low_confidence",
+    "count",
+    "unknown_target",
+    "unknown_plan",
+    "void_plan",
+    "too_many_robots",
+]
+"""capacity: a group has more robots than fit (`robots_that_fit`); cage: they cannot be placed
+escape-proof (`robots_that_fit`, `robots_needed` where it is known); crowded: two groups stand in
+each other's way (`groups`, from 1); no_room_beside: a form has no room on a side of a target;
+low_confidence: a mask is below the threshold (`confidence`, `threshold`); count: another number of
+robots than the person gave; unknown_target, unknown_plan: no such id; void_plan: the world has
+changed since; too_many_robots: more than can be driven. The first three may have
+`partial_plan`, the id of a plan that is certified for less."""
+
 
 class FormupError(Exception):
-    """Base of all errors whose message is meant to be read by a person or a model."""
+    """Base of all errors whose message is meant to be read by a person or a model.
+
+    Args:
+        message: one sentence or more.
+        kind: what went wrong, where code reacts to it.
+        facts: its numbers and ids, values of JSON. `plain` is the message for a person where
+            the message itself speaks to a model, of arguments or of what to call next.
+
+    Attributes:
+        kind, facts: as given.
+    """
+
+    def __init__(self, message: str, kind: Kind | None = None, **facts: Any) -> None:
+        super().__init__(message)
+        self.kind: Kind | None = kind
+        self.facts = facts
 
 
 class InputError(FormupError):
@@ -26,6 +66,18 @@ class ImageError(InputError):
 
 class StorageError(InputError):
     """A log, a state file or an artefact that cannot be read or written."""
+
+
+class ApprovalError(InputError):
+    """Real robots wait for a person's approval of exactly this plan.
+
+    Attributes:
+        plan_id: of the plan.
+    """
+
+    def __init__(self, plan_id: str) -> None:
+        super().__init__(f"Plan {plan_id} moves real robots and waits for a person's approval.")
+        self.plan_id = plan_id
 
 
 class ToolError(FormupError):
@@ -45,18 +97,6 @@ class ToolError(FormupError):
 
 class ArgumentsError(ToolError):
     """Arguments against the tool's schema; the text names every violation."""
-
-
-class ApprovalError(FormupError):
-    """Real robots wait for a person's approval of exactly this plan.
-
-    Attributes:
-        plan_id: of the plan.
-    """
-
-    def __init__(self, plan_id: str) -> None:
-        super().__init__(f"Plan {plan_id} moves real robots and waits for a person's approval.")
-        self.plan_id = plan_id
 
 
 class ModelError(FormupError):

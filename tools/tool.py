@@ -84,7 +84,8 @@ class Tool:
         try:
             return self.arguments.model_validate(dict(arguments))
         except ValidationError as error:
-            raise ArgumentsError(f"{self.name}: {violations(error)}") from None
+            text = f"{self.name}: {violations(error)}"
+            raise ArgumentsError(text, plain=violations(error, plain=True)) from None
 
     async def call(self, context: Context, arguments: Mapping[str, Any]) -> ToolResult:
         """Validate and run; a plain function runs in a thread of its own.
@@ -165,22 +166,28 @@ def tool(kind: Kind) -> Callable[[ToolFunction], Tool]:
     return wrap
 
 
-def violations(error: ValidationError) -> str:
-    """All violations of a validation as one line a model or a person can act on."""
+def violations(error: ValidationError, *, plain: bool = False) -> str:
+    """All violations of a validation as one line a model or a person can act on.
+
+    Args:
+        plain: name the argument alone, not its place among the others, and not where the text does.
+    """
     lines: list[str] = []
     items = error.errors(include_url=False)
     deeper = {item["loc"][:k] for item in items for k in range(len(item["loc"]))}
     for item in items:
         if item["loc"] in deeper:
             continue  # a consequence of what is wrong inside it
-        where = ".".join(str(part) for part in item["loc"]) or "arguments"
+        names = [str(part) for part in item["loc"]]
+        named = [name for name in names if not name.isdigit()]
+        where = (named[-1] if plain and named else ".".join(names)) or "arguments"
         given = repr(item["input"])
         shown = given if len(given) <= 60 else given[:57] + "..."
         text = item["msg"].removeprefix("Value error, ")
         if item["type"] == "missing":
             lines.append(f"{where}: is missing")
         elif isinstance(item["input"], dict):  # the text names what of it is wrong
-            lines.append(f"{where}: {text}")
+            lines.append(text if plain else f"{where}: {text}")
         else:
             lines.append(f"{where}: {text} (got {shown})")
     return "; ".join(dict.fromkeys(lines)) + "."

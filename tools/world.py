@@ -17,7 +17,7 @@ from .fleet.protocol import Pose
 from .formation.contract import Contract
 from .formation.placement.place import Site
 from .formation.plan import Plan, scene_version
-from .formation.units import also_metres, check_scale
+from .formation.units import check_scale
 from .formation.value import Value
 from .geometry.outline import Outline, make_outline
 from .perception.image import Picture
@@ -187,10 +187,6 @@ class World(Value):
         outlines |= {f"-{k.id}": _canonical(k.outline) for k in self.keep_out if k.hard}
         return scene_version(self.picture.sha256, outlines, self.metres_per_pixel)
 
-    def with_metres(self, text: str) -> str:
-        """A text with each length in px given in metres too, where the scale is known."""
-        return also_metres(text, self.metres_per_pixel)
-
     def target(self, name: str) -> Target:
         """The target with an id.
 
@@ -201,7 +197,7 @@ class World(Value):
             if target.id == name:
                 return target
         known = ", ".join(t.id for t in self.targets) or "none yet: segment something first"
-        raise ToolError(f"There is no target {name!r}. Targets: {known}.")
+        raise ToolError(f"There is no target {name!r}. Targets: {known}.", "unknown_target")
 
     def with_target(self, target: Target) -> "World":
         """The world with one more target, or with the one of the same id replaced."""
@@ -237,12 +233,13 @@ class World(Value):
         if plan_id is None or plan_id not in self.plans:
             known = ", ".join(self.plans) or "none yet: propose a formation first"
             named = "" if plan_id is None else f" {plan_id!r}"
-            raise ToolError(f"There is no plan{named}. Plans: {known}.")
+            raise ToolError(f"There is no plan{named}. Plans: {known}.", "unknown_plan")
         node = self.plans[plan_id]
         if node.plan.formation.scene_version != self.version:
             raise ToolError(
                 f"Plan {plan_id} is void: what it is about was measured again since, or the scale "
-                "is another. Deploy one proposed since, or propose this again as it was."
+                "is another. Deploy one proposed since, or propose this again as it was.",
+                "void_plan",
             )
         return node
 

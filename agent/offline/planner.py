@@ -5,14 +5,12 @@ asks when the words do not settle what to do. It is no language model: it sees m
 """
 
 import json
-import re
 from typing import Any
 
-from ...tools.builtin.committing import SHOW_PARTIAL
 from ...tools.formation.contract import MAX_ROBOTS
-from ...tools.formation.units import also_metres
+from ...tools.formation.units import length_text
 from ..first_message import Task, read_task
-from ..messages import Call, History, Reply, Result, User
+from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
 from .arrangements import Reading, understand
 from .choosing import Step, find, located_reasons
@@ -25,8 +23,6 @@ FARTHEST = 100_000
 """Inside, a length that is named is the least distance from the edge, px."""
 DISTANCELESS = {"between": "between", "centre": "at the centre of"}
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
-PLACE = re.compile(r"^propose_formation: contract\.groups\.0[\w.]*: ")
-"""Where in the arguments something is wrong, which says nothing to a person."""
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 
 
@@ -37,17 +33,25 @@ class OfflinePlanner:
 
     async def reply(self, request: Request) -> Reply:
         """The next step for a conversation that began with a task message."""
-        first = request.messages[0]
-        assert isinstance(first, User)
-        task = read_task(first.text)
-        last = request.messages[-1]
-        if isinstance(last, Result) and last.name == "propose_formation":
-            return _after_proposal(task, last, request.messages)
-        if isinstance(last, Result) and last.name == "deploy":
-            return Reply(text=_after_deploy(task, last, request.messages))
-        if isinstance(last, Result) and last.error:
-            return Reply(text=_left_off(last, request.messages))
-        return _begin(task, request.messages)
+        reply = _next_step(tuple(turn_of(request.messages)))
+        number = sum(isinstance(m, Reply) for m in request.messages) + 1
+        calls = tuple(c.model_copy(update={"id": f"call-{number}"}) for c in reply.calls)
+        return reply.model_copy(update={"calls": calls})
+
+
+def _next_step(turn: History) -> Reply:
+    """What to do next in a turn, which began with a task message."""
+    first = turn[0]
+    assert isinstance(first, User)
+    task = read_task(first.text)
+    last = turn[-1]
+    if isinstance(last, Result) and last.name == "propose_formation":
+        return _after_proposal(task, last, turn)
+    if isinstance(last, Result) and last.name == "deploy":
+        return Reply(text=_after_deploy(task, last, turn))
+    if isinstance(last, Result) and last.error:
+        return Reply(text=_left_off(last, turn))
+    return _begin(task, turn)
 
 
 def _begin(task: Task, history: History) -> Reply:
@@ -63,12 +67,12 @@ def _begin(task: Task, history: History) -> Reply:
     things = 2 if "between" in reading.relations or faced else 1
     question = _unfit(reading, form, faced, robots) or _open_question(task, reading, robots, things)
     if question or robots is None:
-        return _call(history, "ask_user", {"question": question or "How many robots?"})
+        return _call("ask_user", {"question": question or "How many robots?"})
     prompts = [p for p in task.pointed if p["id"] not in task.targets]
     if not pointed:
         found = find(spoken.things, things, history)
         if isinstance(found, Step):
-            return _call(history, found.name, found.arguments)
+            return _call(found.name, found.arguments)
         prompts = [
             {"id": f"t{i}", "candidate": f.candidate, "label": _label(f.said)}
             for i, f in enumerate(found, start=1)
@@ -83,7 +87,7 @@ def _begin(task: Task, history: History) -> Reply:
         contract["robot_radius"] = reading.robot_radius
     if task.metres_per_pixel is not None:
         contract["unit"] = "px"
-    return _call(history, "propose_formation", {"contract": contract, "targets": prompts})
+    return _call("propose_formation", {"contract": contract, "targets": prompts})
 
 
 def _spoken(told: str, pointed: bool) -> tuple[Words, bool]:
@@ -246,17 +250,19 @@ def _target_ids(task: Task) -> list[str]:
 
 def _after_proposal(task: Task, result: Result, history: History) -> Reply:
     if result.error:
-        if "There is no room" in result.text and _may_move_on(task, history):
+        if result.cause == "no_room_beside" and _may_move_on(task, history):
             return _begin(task, history)
-        if "Insufficient segmentation accuracy" in result.text:
-            return _call(history, "ask_user", {"question": result.text})
-        return _impossible(history, PLACE.sub("", result.text))
+        if result.cause == "low_confidence":
+            return _call("ask_user", {"question": result.text})
+        reason = result.facts.get("plain", result.text)
+        return _impossible(history, reason, result.facts.get("partial_plan"))
     plan = json.loads(result.text)
     if not plan["certified"]:
-        said = [*plan["findings"], plan.get("partial", "")]
-        return _impossible(history, " ".join(said).strip(), plan["plan_id"])
+        partial = plan.get("partial", {"plan_id": plan["plan_id"]})
+        reason = [*plan["findings"], *([partial["sentence"]] if "sentence" in partial else [])]
+        return _impossible(history, " ".join(reason), partial["plan_id"])
     if task.deploy:
-        return _call(history, "deploy", {"plan_id": plan["plan_id"]})
+        return _call("deploy", {"plan_id": plan["plan_id"]})
     return Reply(text=f"{_planned(plan, history)} Nothing was moved.")
 
 
@@ -269,13 +275,10 @@ def _may_move_on(task: Task, history: History) -> bool:
     return form.where(reading.relations, None, _refusals(history)) is not None
 
 
-def _impossible(history: History, said: str, plan_id: str | None = None) -> Reply:
-    """Give up, in the words of the tool, with the partial plan it made, else the plan proposed."""
-    reason = said.removesuffix(SHOW_PARTIAL).rstrip()
-    partial = re.findall(r"\bp-[0-9a-f]{10}\b", said) if reason != said else []
-    named = partial[-1] if partial else plan_id
-    arguments = {"reason": reason} | ({"plan_id": named} if named else {})
-    return _call(history, "report_impossible", arguments)
+def _impossible(history: History, reason: str, plan_id: str | None) -> Reply:
+    """Give up, in the words of the tool, with the best plan there is."""
+    arguments = {"reason": reason} | ({"plan_id": plan_id} if plan_id else {})
+    return _call("report_impossible", arguments)
 
 
 def _after_deploy(task: Task, result: Result, history: History) -> str:
@@ -286,12 +289,13 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
     if result.error:
         return f"{planned} {result.text}"
     arrival = json.loads(result.text)
-    off = f"{arrival['worst_residual_px']:.1f} px from its place"
+    worst = length_text(arrival["worst_residual_px"], task.metres_per_pixel)
+    off = f"{worst} from its place"
     said = f"All arrived; the furthest is {off}."
     if not arrival["arrived"]:
         corrected = f"after {arrival['corrections']} corrections"
         said = f"Robot {arrival['worst_robot']} stopped {off} {corrected}."
-    return f"{planned} {also_metres(said, task.metres_per_pixel)}"
+    return f"{planned} {said}"
 
 
 def _planned(plan: dict[str, Any], history: History) -> str:
@@ -313,6 +317,5 @@ def _taken(history: History) -> list[str]:
     ]
 
 
-def _call(history: History, name: str, arguments: dict[str, Any]) -> Reply:
-    number = sum(isinstance(m, Reply) for m in history) + 1
-    return Reply(calls=(Call(id=f"call-{number}", name=name, arguments=arguments),))
+def _call(name: str, arguments: dict[str, Any]) -> Reply:
+    return Reply(calls=(Call(id="call", name=name, arguments=arguments),))

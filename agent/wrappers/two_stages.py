@@ -11,7 +11,7 @@ from ...prompts import Prompt, PromptError, PromptLibrary
 from ...tools.builtin import TOOLS
 from ...tools.errors import InputError
 from ...tools.tool import Tool
-from ..messages import History, Reply, Result, User
+from ..messages import History, Reply, Result, User, turn_of
 from ..model import Model, Request
 from ..providers.registry import model_named
 
@@ -52,13 +52,13 @@ class TwoStages:
         Raises:
             ModelError: it cannot.
         """
-        messages, tools = request.messages, request.tools
-        found = measuring(messages)
+        tools, turn = request.tools, tuple(turn_of(request.messages))
+        found = measuring(turn)
         if found is None:
-            seen = Request(self._look.render(), messages, offered(tools, self._look))
+            seen = Request(self._look.render(), request.messages, offered(tools, self._look))
             return await self._looker.reply(seen)
-        prompt = self._repair if _uncertified(messages) else self._plan
-        told = Request(prompt.render(), _handed_over(messages, found), offered(tools, prompt))
+        prompt = self._repair if _uncertified(turn) else self._plan
+        told = Request(prompt.render(), _handed_over(turn, found), offered(tools, prompt))
         return await self._planner.reply(told)
 
     async def aclose(self) -> None:
@@ -122,7 +122,8 @@ def measuring(messages: History) -> int | None:
 
 def _uncertified(messages: History) -> bool:
     proposals = [m for m in messages if isinstance(m, Result) and m.name == "propose_formation"]
-    return bool(proposals) and '"certified":true' not in proposals[-1].text
+    last = proposals[-1] if proposals else None
+    return last is not None and (last.error is not None or not json.loads(last.text)["certified"])
 
 
 def _handed_over(messages: History, found: int) -> History:

@@ -11,9 +11,9 @@ from statistics import median
 from typing import get_args
 
 from ...tools.builtin import TOOLS
+from ...tools.context import Context, Descriptor
 from ...tools.perception.image import load_picture
-from ...tools.scene import Scene, Target
-from ...tools.world import Descriptor, Workspace
+from ...tools.world import Target, World
 from ..tasks.photographs import Task
 from .tokens import text_tokens
 
@@ -42,8 +42,16 @@ def descriptor_costs(tasks: Iterable[Task]) -> list[DescriptorCost]:
 
 def _tokens(task: Task, descriptor: str) -> int:
     outline = task.target.outline
-    target = Target("t1", task.target.name, outline.bounds, 1.0, outline, "truth")
-    workspace = Workspace(Scene(load_picture(task.image), (target,)))
+    target = Target(
+        id="t1",
+        label=task.target.name,
+        box=outline.bounds,
+        confidence=1.0,
+        outline=outline,
+        prompt="truth",
+    )
+    picture = load_picture(task.image)
+    context = Context.of(picture, world=World.of(picture, targets=(target,)))
     describe = next(tool for tool in TOOLS if tool.name == "describe_shape")
-    made = asyncio.run(describe.call(workspace, {"target": "t1", "descriptor": descriptor}))
+    made = asyncio.run(describe.call(context, {"target": "t1", "descriptor": descriptor}))
     return text_tokens(made.text)

@@ -19,11 +19,11 @@ from ...agent.messages import Result
 from ...agent.model import Model
 from ...agent.outcomes import Answered, Stopped
 from ...prompts import PromptLibrary
+from ...tools.context import Descriptor, Settings
 from ...tools.errors import InputError
 from ...tools.perception.image import load_picture
 from ...tools.store import write_whole
 from ...tools.tool import Tool
-from ...tools.world import Descriptor, Settings
 from ..grading.graded import VERSION, Graded
 from ..grading.grading import Attempt, grade_attempt
 from ..grading.policies import POLICIES, positions
@@ -274,7 +274,7 @@ def _declined(text: str) -> Literal["question", "impossible"] | None:
 
 def _about(run: Run) -> tuple[Polygon, ...]:
     """Outlines of what the last contract is about, else none."""
-    contract, scene = run.report.contract, run.workspace.scene
+    contract, scene = run.report.contract, run.world
     named = contract.target_ids if contract else ()
     return tuple(t.outline.polygon for t in scene.targets if t.id in named)
 

@@ -19,12 +19,12 @@ import shapely
 from shapely.geometry import LineString, Polygon
 
 from ...agent.agent import Agent, Run
+from ...tools.context import Settings
 from ...tools.errors import InputError
 from ...tools.geometry.outline import FloatArray
 from ...tools.perception.image import Picture, load_picture
 from ...tools.perception.target_prompt import TargetPrompt
-from ...tools.scene import Target
-from ...tools.world import Settings
+from ...tools.world import Target
 from ..grading.photo_rules import grade
 from ..tasks.photographs import Task, Thing
 from .tokens import spent
@@ -156,7 +156,7 @@ def _row(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) ->
     if not agent.tools:
         placed = written_positions(report.message)
     graded = grade(task, placed)
-    targets = run.workspace.scene.targets
+    targets = run.world.targets
     target = targets[0] if targets else None
     return Row(
         task=task.id,
@@ -203,7 +203,14 @@ def _run(task: Task, mode: Mode, seed: int, agent: Agent, trace: Path | None) ->
     if mode == "truth":
         things = [task.target, *filter(None, [task.other])]
         targets = tuple(
-            Target(f"t{i}", thing.name, thing.outline.bounds, 1.0, thing.outline, "truth")
+            Target(
+                id=f"t{i}",
+                label=thing.name,
+                box=thing.outline.bounds,
+                confidence=1.0,
+                outline=thing.outline,
+                prompt="truth",
+            )
             for i, thing in enumerate(things, start=1)
         )
         return agent.run(picture, task.instruction, targets=targets, settings=settings, trace=trace)

@@ -4,14 +4,14 @@ Nothing of what was kept is trusted to be whole: what cannot be read is said to 
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ...agent.store.folder import read_trace
+from ...agent.store.folder import read_events
 from ...tools.errors import InputError
 from ..experiments.journal import Arm
 from ..experiments.methods import kept_as
@@ -101,7 +101,7 @@ class Side:
         if not path.exists():
             return None
         try:
-            lines = read_trace(path).of_type("message")
+            lines = [e.data for e in read_events(path) if e.kind == "message"]
         except InputError:
             return [Said("", "", "The trace cannot be read.")]
         return [said for line in lines for said in _said(line)]
@@ -119,15 +119,17 @@ def side(folder: Path, rows: Sequence[TrialRow], called: str = "") -> Side:
     return Side(folder, read_suite(folder), tuple(rows), called)
 
 
-def _said(line: dict[str, Any]) -> list[Said]:
+def _said(line: Mapping[str, Any]) -> list[Said]:
     """A message of a trace as texts."""
     if line["role"] == "user":
-        return [_cut("person", "", line["text"])]
+        return [_cut("person", "", line.get("text", ""))]
     if line["role"] == "tool":
-        error = f"{line['error']}: " if line["error"] else ""
-        return [_cut("result", line["name"], error + line["text"])]
-    texts = [_cut("model", "", line["text"])] if line["text"] else []
-    calls = [(c["name"], json.dumps(c["arguments"], ensure_ascii=False)) for c in line["calls"]]
+        error = f"{line['error']}: " if line.get("error") else ""
+        return [_cut("result", line["name"], error + line.get("text", ""))]
+    texts = [_cut("model", "", line["text"])] if line.get("text") else []
+    calls = [
+        (c["name"], json.dumps(c["arguments"], ensure_ascii=False)) for c in line.get("calls", ())
+    ]
     return texts + [_cut("call", *call) for call in calls]
 
 

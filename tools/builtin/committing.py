@@ -11,7 +11,7 @@ from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
 from ..formation.placement.partial import REFUSALS, best_partial
 from ..formation.plan import Plan, make_plan
-from ..formation.units import contract_in_pixels, with_metres
+from ..formation.units import contract_in_pixels, length_text, with_metres
 from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
 from ..tool import ToolResult, in_thread, tool
@@ -55,7 +55,8 @@ async def propose_formation(
     if asked is not None and contract.robots != asked:
         raise ToolError(
             f"The person asked for {asked} robots; the contract's groups add up to "
-            f"{contract.robots}."
+            f"{contract.robots}.",
+            "count",
         )
     stated = contract_in_pixels(contract, context.world.metres_per_pixel)
     _check_doubts(context, stated)
@@ -70,7 +71,7 @@ async def propose_formation(
     offered: dict[str, Any] = {}
     if partial is not None:
         world = await with_robots(context.at(world), PlanNode(plan=partial, unseen=node.unseen))
-        offered = {"partial": _offer(world.plan().plan)}
+        offered = {"partial": _offer(world.plan().plan), "next": SHOW_PARTIAL}
     world = await with_robots(context.at(world), node)
     node = world.plan()
     data = _proposal(world, node.plan) | offered
@@ -100,14 +101,15 @@ def _planned(context: Context, held: Contract, places: Any) -> tuple[PlanNode, P
     site = world.site(held)
     try:
         plan = make_plan(held, site, world.version, places)
-    except ToolError as error:
-        text = world.with_metres(str(error))
-        if isinstance(error, REFUSALS) and (
-            partial := best_partial(held, site, world.version, error)
-        ):
-            context.observed(world.with_plan(PlanNode(plan=partial)))
-            text += f" {_offer(partial)}"
-        raise ToolError(text) from None
+    except REFUSALS as error:
+        partial = best_partial(held, site, world.version, error)
+        if partial is None:
+            raise
+        context.observed(world.with_plan(PlanNode(plan=partial)))
+        offer = _offer(partial)
+        plain = f"{error} {offer['sentence']}"
+        facts = error.facts | {"partial_plan": offer["plan_id"], "plain": plain}
+        raise ToolError(f"{plain} {SHOW_PARTIAL}", error.kind, **facts) from None
     partial = None
     if places is None and not plan.verdict.certified:
         partial = best_partial(held, site, world.version, None)
@@ -162,7 +164,7 @@ def _check_may_move(context: Context, plan: Plan) -> None:
     if not plan.verdict.certified:
         raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
     if plan.partial is not None and context.settings.approved != plan.id:
-        short = context.world.with_metres(plan.partial.short)
+        short = plan.partial.short(context.world.metres_per_pixel)
         raise ToolError(
             f"Plan {plan.id} is partial ({short}): nothing of a task is done unasked. A person "
             "may have exactly this plan driven, with formup deploy."
@@ -208,26 +210,28 @@ def report_impossible(
     return ToolResult(data, message=reason)
 
 
-def _offer(partial: Plan) -> str:
-    """What there is to say of a partial plan."""
-    assert partial.partial is not None
-    return f"Plan {partial.id} is certified as partial: {partial.partial.sentence} {SHOW_PARTIAL}"
+def _offer(plan: Plan) -> dict[str, str]:
+    """A partial plan's id, and what there is to say of it."""
+    assert plan.partial is not None
+    sentence = f"Plan {plan.id} is certified as partial: {plan.partial.sentence}"
+    return {"plan_id": plan.id, "sentence": sentence}
 
 
 def _to_see(world: World, node: PlanNode) -> str:
     """What has to be looked at before a plan nobody has seen is carried out, if anything."""
     if not node.unseen:
         return ""
-    target = world.target(node.unseen[0])
-    return world.with_metres(
-        f"{target.id} {_doubt(target)}. If the outline shown follows the thing to within "
-        f"about {_slack(node.plan, target.id):.0f} px, deploy plan_id {node.plan.id} (with tell). "
+    target, scale = world.target(node.unseen[0]), world.metres_per_pixel
+    slack = length_text(_slack(node.plan, target.id), scale, ".0f")
+    return (
+        f"{target.id} {_doubt(target, scale)}. If the outline shown follows the thing to "
+        f"within about {slack}, deploy plan_id {node.plan.id} (with tell). "
         f"Where it does not and yours (dashed) does, propose again with {target.id} and "
         "`points` on the thing there or `negative` ones off it; else with a closer outline."
     )
 
 
-def _doubt(target: Target) -> str:
+def _doubt(target: Target, scale: float | None) -> str:
     """Why a target has to be looked at."""
     if not doubtful(target):
         return "has an edge that a named distance is measured from"
@@ -235,7 +239,7 @@ def _doubt(target: Target) -> str:
         return f"was measured with confidence {target.confidence:.2f}"
     away = distances(target.outline.filled, np.asarray(target.missed))
     places = zip(target.missed, away, strict=True)
-    left = ", ".join(f"({x:g}, {y:g}) by {px:.0f} px" for (x, y), px in places)
+    left = ", ".join(f"({x:g}, {y:g}) by {length_text(px, scale, '.0f')}" for (x, y), px in places)
     return f"as measured leaves out your {left}, which has so much less clearance"
 
 
@@ -252,8 +256,8 @@ def _with_observed(tell: str | None, arrival: Arrival, world: World) -> str | No
         return None
     count, worst = len(arrival.observed), max(arrival.residual_px)
     robots = "The robot was" if count == 1 else f"All {count} robots were"
-    observed = world.with_metres(f"{robots} observed within {max(worst, 0.1):.1f} px of the plan.")
-    return f"{tell.strip()} {observed}"
+    within = length_text(max(worst, 0.1), world.metres_per_pixel)
+    return f"{tell.strip()} {robots} observed within {within} of the plan."
 
 
 def _held_to(contract: Contract, settings: Settings) -> Contract:

@@ -35,7 +35,7 @@ async def with_robots(context: Context, node: PlanNode) -> World:
         found = await in_thread(lambda: assign_robots(poses, points))
     except FleetSizeError as error:
         if error.available < error.needed and context.settings.fleet != "simulated":
-            raise ToolError(str(error)) from None
+            raise ToolError(str(error), "too_many_robots") from None
         return world.with_plan(node)  # more than are simulated can be planned
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
     if found.gap is not None:
@@ -76,7 +76,9 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World]:
         context.moving(plan.id)
         site = world.site(plan.formation.contract)
         made = await deploy(plan, site, fleet, plan.formation.robot_of_place, watch=watch)
-    except (FleetSizeError, PlaceTakenError) as error:
+    except FleetSizeError as error:
+        raise ToolError(str(error), "too_many_robots") from None
+    except PlaceTakenError as error:
         raise ToolError(str(error)) from None
     finally:
         if last:

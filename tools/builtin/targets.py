@@ -71,7 +71,8 @@ def _measured(context: Context, prompt: TargetPrompt) -> Target:
         found = measure_outline(context.picture, prompt, segmenter, candidate)
     except InputError as error:
         text = f"Insufficient segmentation accuracy. {error} {ADVICE[prompt.how]}"
-        raise ToolError(text) from None
+        threshold = _threshold(context, prompt.how)
+        raise ToolError(text, "low_confidence", threshold=threshold) from None
     return Target(
         id=prompt.id,
         label=prompt.label or "the thing pointed at",
@@ -124,7 +125,10 @@ def _insufficient(confidence: float, threshold: float, how: str) -> ToolError:
     shown = math.floor(100 * confidence) / 100  # never rounded up to the threshold
     return ToolError(
         f"Insufficient segmentation accuracy. The mask's confidence is {shown:.2f}, below the "
-        f"threshold {threshold:.2f}. {ADVICE[how]}"
+        f"threshold {threshold:.2f}. {ADVICE[how]}",
+        "low_confidence",
+        confidence=confidence,
+        threshold=threshold,
     )
 
 

@@ -15,7 +15,6 @@ from ..errors import ToolError
 from ..formation.checking.verdict import Part, parts_of
 from ..formation.contract import CENTRE_SHARE, OUTSIDE, Contract
 from ..formation.placement.place import Site, reference_curve
-from ..formation.units import also_metres
 from ..geometry.curves import Curve
 from ..geometry.outline import FloatArray, Outline, distances
 from ..geometry.sampling import corner_points, nearest
@@ -99,8 +98,8 @@ def label_openings(
         opening = _opening(part)
         if opening is None:
             continue
-        text = f"{opening.width:.{0 if opening.width >= 10 else 1}f} px"
-        text = also_metres(text, site.metres_per_pixel).partition(" (")[0]
+        spec = ".0f" if opening.width >= 10 else ".1f"
+        text = site.length(opening.width, spec).partition(" (")[0]
         middle = canvas.at(opening.middle[None])[0]
         away = middle - canvas.at(np.array([part.outline.centre]))[0]
         size = canvas.chip_size(text, LABEL)

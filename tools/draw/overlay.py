@@ -12,6 +12,7 @@ from PIL import Image
 
 from ..formation.placement.place import Site
 from ..formation.plan import Plan
+from ..formation.units import length_text
 from ..geometry.outline import FloatArray
 from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
@@ -44,13 +45,13 @@ NARROWEST = 700.0
 TITLE_LINES = 3
 TAG = 16.0
 MEASURES = (
-    ("min_clearance_px", "clearance {:.1f} px"),
-    ("widest_opening_px", "widest opening {:.1f} px"),
-    ("worst_gap_px", "widest gap {:.1f} px"),
-    ("max_from_corner_px", "{:.1f} px from corners at most"),
-    ("max_from_centre_px", "{:.1f} px from the centre at most"),
+    ("min_clearance_px", "clearance {}"),
+    ("widest_opening_px", "widest opening {}"),
+    ("worst_gap_px", "widest gap {}"),
+    ("max_from_corner_px", "{} from corners at most"),
+    ("max_from_centre_px", "{} from the centre at most"),
     ("spacing_ratio", "spacing ratio {:.2f}"),
-    ("min_spacing_px", "closest pair {:.1f} px"),
+    ("min_spacing_px", "closest pair {}"),
 )
 """What the footer tells: of those measured the first three."""
 CAGED = {
@@ -99,10 +100,8 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
     draw_bars(page)
     scale = world.metres_per_pixel
     taken = draw_scale_bar(canvas, scale) if scale else 0.0
-    badge, ground = _badge(plan)
-    draw_footer(
-        canvas, world.with_metres(badge), ground, list(map(world.with_metres, _facts(plan))), taken
-    )
+    badge, ground = _badge(plan, scale)
+    draw_footer(canvas, badge, ground, _facts(plan, scale), taken)
     return canvas.finish()
 
 
@@ -185,24 +184,27 @@ def _draw_robots(canvas: Canvas, plan: Plan, site: Site, labels: Labels) -> None
     number_robots(canvas, shown, radius, labels, away, flagged)
 
 
-def _badge(plan: Plan) -> tuple[str, Colour]:
+def _badge(plan: Plan, scale: float | None) -> tuple[str, Colour]:
     if plan.partial is not None:
-        return f"partial: {plan.partial.short}", PARTIAL
+        return f"partial: {plan.partial.short(scale)}", PARTIAL
     if plan.verdict.certified:
         return "certified", CERTIFIED
     count = len(plan.verdict.findings)
     return f"NOT certified: {count} finding{'s' * (count != 1)}", FINDING
 
 
-def _facts(plan: Plan) -> list[str]:
+def _facts(plan: Plan, scale: float | None) -> list[str]:
     """Plan id, robots and what was measured, most important first."""
     measured = plan.verdict.measures
     count = len(plan.formation.positions)
-    told = [form.format(measured[key]) for key, form in MEASURES if key in measured]
+    told = [
+        form.format(length_text(float(value), scale) if key.endswith("_px") else value)
+        for key, form in MEASURES
+        if (value := measured.get(key)) is not None
+        and not (key == "worst_gap_px" and "widest_opening_px" in measured)
+    ]
     if "escape_proof" in measured:
         told.insert(0, CAGED[str(measured["escape_proof"])])
-    if "widest_opening_px" in measured:
-        told = [fact for fact in told if not fact.startswith("widest gap")]
     return [plan.id, f"{count} robot{'s' * (count != 1)}", *told[:3]]
 
 

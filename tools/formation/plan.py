@@ -19,6 +19,7 @@ from .checking.check import certify
 from .checking.verdict import Verdict
 from .contract import Contract, Group, with_defaults
 from .placement.place import Site, place
+from .units import length_text
 from .value import Value
 
 DECIMALS = 3
@@ -83,12 +84,13 @@ class Shortfall(BaseModel):
     clearance: tuple[float, float] | None = None
     sentence: str
 
-    @property
-    def short(self) -> str:
+    def short(self, metres_per_pixel: float | None) -> str:
         """In a few words, such as `12 of 30`."""
         if self.clearance is None or self.clearance_asked is None:
             return f"{self.placed} of {self.asked}"
-        return f"clearance {self.clearance[0]:.1f} px, not {self.clearance_asked[0]:.1f} px"
+        pair = (self.clearance[0], self.clearance_asked[0])
+        held, asked = (length_text(px, metres_per_pixel) for px in pair)
+        return f"clearance {held}, not {asked}"
 
 
 class Plan(Value):

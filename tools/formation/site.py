@@ -9,13 +9,14 @@ from ..errors import ToolError
 from ..geometry.curves import Frame
 from ..geometry.outline import MIN_AREA, Outline, largest_part, outline_of
 from .contract import Group
+from .units import length_text
 
 
 @dataclass(frozen=True)
 class Site:
     """What positions are judged in: the targets' outlines and the picture's size, px.
 
-    With metres per pixel, what is said of positions tells lengths in metres too.
+    With metres per pixel, texts about positions give lengths in metres too.
     """
 
     outlines: Mapping[str, Outline]
@@ -27,6 +28,12 @@ class Site:
     def room(self) -> tuple[float, float]:
         """Width and height, px."""
         return self.width, self.height
+
+    def length(
+        self, px: float | tuple[float, float], spec: str = ".1f", joint: str = " to "
+    ) -> str:
+        """A length in px as texts show it, see `length_text`."""
+        return length_text(px, self.metres_per_pixel, spec, joint)
 
     def visible(self, name: str) -> Outline:
         """The part of a target inside the picture.
@@ -68,6 +75,7 @@ class CapacityError(ToolError):
     def __init__(self, group: Group, fits: int, why: str) -> None:
         noun = "robot fits" if fits == 1 else "robots fit"
         asked = "1 robot was" if group.robots == 1 else f"{group.robots} robots were"
-        super().__init__(f"{asked} asked for but only {fits} {noun}: {why}.")
+        text = f"{asked} asked for but only {fits} {noun}: {why}."
+        super().__init__(text, "capacity", robots_that_fit=fits)
         self.fits = fits
         self.group = group

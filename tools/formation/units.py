@@ -4,7 +4,6 @@ All that is computed is pixels. A scale that differs from place to place would c
 """
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,10 +17,6 @@ FINEST, COARSEST = 1e-6, 1e3
 NO_SCALE = "this picture has no scale (metres per pixel)"
 DECIMALS_PX, STATED_PX = 2, 6
 """Decimals of pixels: those that metres beside them tell apart, those kept of a contract's."""
-_SHOWN = re.compile(
-    r"(?P<within>\(?)(?<![\w.])(?P<a>-?[0-9][0-9,]*(?:\.[0-9]+)?)"
-    r"(?:(?P<joint> to | and | x )(?P<b>-?[0-9][0-9,]*(?:\.[0-9]+)?))? px\b"
-)
 
 
 def check_scale(metres_per_pixel: float | None) -> None:
@@ -100,23 +95,30 @@ def in_metres(pixels: float, metres_per_pixel: float) -> float:
     return round(pixels * metres_per_pixel, _decimals(DECIMALS_PX, metres_per_pixel))
 
 
-def also_metres(text: str, metres_per_pixel: float | None) -> str:
-    """A text in which each length in px is told in metres, with the px behind it in brackets."""
+def length_text(
+    px: float | tuple[float, float],
+    metres_per_pixel: float | None,
+    spec: str = ".1f",
+    joint: str = " to ",
+) -> str:
+    """A length, or two of them joined, as every text shows it.
+
+    Args:
+        px: in pixels.
+        metres_per_pixel: where it is known, metres come first: "1.25 m (25.0 px)".
+        spec: how the pixels are formatted; metres have decimals that tell apart as much.
+        joint: what stands between two lengths.
+    """
+    numbers = [format(length, spec) for length in (px if isinstance(px, tuple) else (px,))]
+    text = f"{joint.join(numbers)} px"
     if metres_per_pixel is None:
         return text
-    scale = metres_per_pixel
 
     def metres(number: str) -> str:
-        decimals = _decimals(len(number.partition(".")[2]), scale)
-        return f"{float(number.replace(',', '')) * scale:,.{decimals}f}"
+        decimals = _decimals(len(number.partition(".")[2]), metres_per_pixel)
+        return f"{float(number) * metres_per_pixel:,.{decimals}f}"
 
-    def told(found: re.Match[str]) -> str:
-        if found["within"]:  # the brackets this function writes, or some that say enough
-            return found[0]
-        second = f"{found['joint']}{metres(found['b'])}" if found["b"] else ""
-        return f"{metres(found['a'])}{second} m ({found[0]})"
-
-    return _SHOWN.sub(told, text)
+    return f"{joint.join(map(metres, numbers))} m ({text})"
 
 
 def with_metres(data: Mapping[str, Any], metres_per_pixel: float | None) -> dict[str, Any]:

@@ -9,11 +9,11 @@ from formup.tools.formation.contract import Contract
 from formup.tools.formation.plan import make_plan
 from formup.tools.formation.site import Site
 from formup.tools.formation.units import (
-    also_metres,
     check_scale,
     contract_in_pixels,
     in_metres,
     in_pixels,
+    length_text,
     with_metres,
 )
 from formup.tools.geometry.outline import make_outline
@@ -86,20 +86,20 @@ def test_scales_that_no_picture_has(scale: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("px", "form", "plain", "metric"),
     [
-        ("is 2.5 px off; 3.0 px or more", "is 0.125 m (2.5 px) off; 0.150 m (3.0 px) or more"),
-        ("25.0 to 100.0 px away", "1.250 to 5.000 m (25.0 to 100.0 px) away"),
-        ("a 300 x 200 px picture", "a 15.00 x 10.00 m (300 x 200 px) picture"),
-        ("-0.5 px and t1", "-0.025 m (-0.5 px) and t1"),
-        ("1,200 px off (30, 40)", "60.00 m (1,200 px) off (30, 40)"),
-        ("no length, 3 robots", "no length, 3 robots"),
+        (2.5, {}, "2.5 px", "0.125 m (2.5 px)"),
+        ((25, 100), {}, "25.0 to 100.0 px", "1.250 to 5.000 m (25.0 to 100.0 px)"),
+        ((30, 20), {"spec": "g", "joint": " x "}, "30 x 20 px", "1.50 x 1.00 m (30 x 20 px)"),
+        (-0.5, {}, "-0.5 px", "-0.025 m (-0.5 px)"),
+        (31200, {"spec": ".0f"}, "31200 px", "1,560.00 m (31200 px)"),
     ],
 )  # fmt: skip
-def test_texts_tell_metres_with_the_pixels_behind_them(text: str, told: str) -> None:
-    assert also_metres(text, 0.05) == told
-    assert also_metres(told, 0.05) == told
-    assert also_metres(text, None) == text
+def test_texts_give_metres_with_the_pixels_behind_them(
+    px: float | tuple[float, float], form: dict[str, str], plain: str, metric: str
+) -> None:
+    assert length_text(px, None, **form) == plain
+    assert length_text(px, 0.05, **form) == metric
 
 
 def test_numbers_named_in_px_have_metres_beside_them() -> None:

@@ -5,7 +5,7 @@ The geometry proves or disproves it; here is what is run when, and what a model 
 
 import math
 
-from ...geometry.cages.cages import QUICK, THOROUGH, Cage, cage
+from ...geometry.cages.cages import QUICK, THOROUGH, cage
 from ...geometry.curves import Curve
 from ..placement.caging import escape_proof, walls_of
 from .verdict import Audit, Escape, Part
@@ -42,26 +42,13 @@ def judge(part: Part, curve: Curve, audit: Audit) -> None:
         audit.escape = Escape(target=part.group.targets[0], poses=poses)
     if escape_proof(part.group) and found.state != "caged":
         gap, limit = found.widest_gap or 0.0, found.inscribed_diameter
-        audit.whole("not_caged", gap, limit, _sentence(part, curve, found))
-
-
-def _sentence(part: Part, curve: Curve, found: Cage) -> str:
-    name, limit = part.group.targets[0], found.inscribed_diameter
-    said = (
-        f"{name} can get out between the robots, on a way that was checked"
-        if found.state == "escape"
-        else f"It is not certified that {name} cannot get out"
-    )
-    if found.widest_between is not None and found.widest_gap is not None:
-        i, j = sorted(k + part.first + 1 for k in found.widest_between)
-        said += f": robots {i} and {j} leave a gap of {found.widest_gap:.1f} px"
-    enough = math.floor(curve.whole_length / (limit + 2 * part.radius)) + 1
-    even = (
-        f"{max(enough, 3)} robots evenly on the ring do"
-        if curve.closed
-        else "the picture's border cuts the ring of this clearance, so a nearer one is needed"
-    )
-    return (
-        f"{said}. A ring all of whose gaps are below {limit:.1f} px certainly holds it: {even}. "
-        "Where the positions are left out, fewer may be placed."
-    )
+        between = () if found.widest_gap is None else found.widest_between or ()
+        enough = math.floor(curve.whole_length / (limit + 2 * part.radius)) + 1
+        audit.find(
+            "gets_out" if found.state == "escape" else "not_caged",
+            gap,
+            limit,
+            others=[k + part.first for k in between],
+            about=part.group.targets[0],
+            needed=max(enough, 3) if curve.closed else None,
+        )

@@ -50,33 +50,31 @@ def certify(positions: ArrayLike, contract: Contract, site: Site) -> Verdict:
     if points.ndim != 2 or points.shape[1] != 2:
         raise InputError(f"Positions must be (x, y) pairs, shape (N, 2); got {points.shape}.")
     if len(points) != contract.robots:
-        text = f"The contract wants {contract.robots} positions; {len(points)} were given."
-        audit.whole("count", len(points), contract.robots, text, "robots")
+        audit.find("count", len(points), contract.robots, unit="robots")
         return audit.verdict()
     for i in np.flatnonzero(~(np.abs(points) <= FARTHEST).all(axis=1)):
-        audit.robot("no_place", int(i), 0.0, 0.0, "has a coordinate that is no place in a picture")
+        audit.find("no_place", robot=i)
     if audit.findings:
         return audit.verdict()
     if len(points) > 1:
         audit.least("min_spacing_px", min_spacing(points))
-    _bounds(points, contract, site, audit)
-    _crowding(points, contract, audit)
-    _keep_out(points, contract, site, audit)
+    _check_bounds(points, contract, site, audit)
+    _check_crowding(points, contract, audit)
+    _check_keep_out(points, contract, site, audit)
     for part in parts_of(contract, points, site):
         _RULES[part.group.relation](part, audit)
     return audit.verdict()
 
 
-def _bounds(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
+def _check_bounds(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
     radius = contract.robot_radius
     far = np.array([site.width - 1 - radius, site.height - 1 - radius])
     room = np.minimum(points - radius, far - points).min(axis=1)
     for i in np.flatnonzero(room < -TOLERANCE):
-        text = f"is {-room[i]:.1f} px outside the part of the picture robots may stand in"
-        audit.robot("out_of_picture", int(i), -room[i], 0.0, text)
+        audit.find("out_of_picture", -room[i], robot=i)
 
 
-def _crowding(points: FloatArray, contract: Contract, audit: Audit) -> None:
+def _check_crowding(points: FloatArray, contract: Contract, audit: Audit) -> None:
     """Robots whose nearest neighbour is nearer than their group allows, each once."""
     if len(points) < 2:
         return
@@ -89,12 +87,11 @@ def _crowding(points: FloatArray, contract: Contract, audit: Audit) -> None:
     for i in np.flatnonzero(apart[:, 1] < least - TOLERANCE):
         j = partner[i]
         if j > i and partner[j] == i and apart[j, 1] < least[j] - TOLERANCE:
-            continue  # told of robot j
-        text = f"is {apart[i, 1]:.1f} px from robot {j + 1}; {least[i]:.1f} px or more are needed"
-        audit.robot("too_close", int(i), apart[i, 1], least[i], text)
+            continue  # robot j has the finding
+        audit.find("too_close", apart[i, 1], least[i], robot=i, others=(j,))
 
 
-def _keep_out(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
+def _check_keep_out(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
     """No robot stands on what is kept out of, or on what another group stands around."""
     groups = np.repeat(np.arange(len(contract.groups)), [g.robots for g in contract.groups])
     for name in contract.solid_targets:
@@ -104,11 +101,10 @@ def _keep_out(points: FloatArray, contract: Contract, site: Site, audit: Audit) 
             continue
         distance = distances(site.outlines[name].filled, points)
         for i in np.flatnonzero(foreign & (distance <= contract.robot_radius)):
-            text = f"stands on {name}, which is to be kept free"
-            audit.robot("keep_out", int(i), distance[i], contract.robot_radius, text)
+            audit.find("keep_out", distance[i], contract.robot_radius, robot=i, about=name)
 
 
-def _outside(part: Part, audit: Audit) -> None:
+def _check_outside(part: Part, audit: Audit) -> None:
     """Robots stand off the filled outline, their edges within the clearance range.
 
     At corners the distance to the corner is the upper limit: rounded outlines fall short of it.
@@ -125,27 +121,15 @@ def _outside(part: Part, audit: Audit) -> None:
     name = part.group.targets[0]
     for i, (value, far) in enumerate(zip(clearance, beyond, strict=True), start=part.first):
         if distance[i - part.first] <= 0:
-            audit.robot("on_target", i, 0.0, least, f"stands on {name}")
+            audit.find("on_target", 0.0, least, robot=i, about=name)
         elif value < least - TOLERANCE:
-            audit.robot(
-                "too_near",
-                i,
-                value,
-                least,
-                f"is {value:.1f} px from {name}; {least:.1f} px or more are needed",
-            )
+            audit.find("too_near", value, least, robot=i, about=name)
         elif far > most + TOLERANCE and part.group.relation != "corners":
-            audit.robot(
-                "too_far",
-                i,
-                value,
-                greatest,
-                f"is {value:.1f} px from {name}; {greatest:.1f} px at most are allowed",
-            )
+            audit.find("too_far", value, greatest, robot=i, about=name)
 
 
-def _around(part: Part, audit: Audit) -> None:
-    _outside(part, audit)
+def _check_around(part: Part, audit: Audit) -> None:
+    _check_outside(part, audit)
     curve = reference_curve(part.group, part.site, part.radius)
     if _nowhere(curve, "the ring", audit):
         return
@@ -166,12 +150,12 @@ def _nowhere(curve: Curve, name: str, audit: Audit) -> bool:
     """Whether nothing of a curve lies inside the picture, which is a finding."""
     if curve.length > 0:
         return False
-    audit.whole("out_of_picture", 0.0, 0.0, f"Nothing of {name} lies inside the picture.")
+    audit.find("nothing_in_picture", about=name)
     return True
 
 
-def _along(part: Part, audit: Audit) -> None:
-    _outside(part, audit)
+def _check_along(part: Part, audit: Audit) -> None:
+    _check_outside(part, audit)
     curve = reference_curve(part.group, part.site, part.radius)
     if _nowhere(curve, "that side", audit):
         return
@@ -189,34 +173,33 @@ def _along(part: Part, audit: Audit) -> None:
         spacing.evenness(part, curve, audit)
 
 
-def _shape(part: Part, audit: Audit) -> None:
+def _check_shape(part: Part, audit: Audit) -> None:
     shape = part.group.shape
     if shape is None:
-        _line(part, audit)
+        _check_line(part, audit)
         return
     if not part.group.enters:
-        _off_targets(part, audit)
+        _check_off_targets(part, audit)
     if shape.where == "inside":
-        _within(part, audit)
+        _check_depth(part, audit)
     elif part.group.clearance is not None:
         clearance = distances(part.outline.filled, part.points) - part.radius
         least, name = part.clearance[0], part.group.targets[0]
         audit.least("min_clearance_px", clearance.min())
         for i in np.flatnonzero(clearance < least - TOLERANCE):
-            text = f"is {clearance[i]:.1f} px from {name}; {least:.1f} px or more are needed"
-            audit.robot("too_near", part.first + int(i), clearance[i], least, text)
+            audit.find("too_near", clearance[i], least, robot=part.first + i, about=name)
     on_figure(part, figure_of(part.group, shape, part.site, part.radius), audit)
 
 
-def _off_targets(part: Part, audit: Audit) -> None:
+def _check_off_targets(part: Part, audit: Audit) -> None:
     for name in part.group.targets:
         distance = distances(part.site.outlines[name].filled, part.points)
         for i in np.flatnonzero(distance <= part.radius):
-            audit.robot("on_target", part.first + int(i), 0.0, part.radius, f"stands on {name}")
+            audit.find("on_target", 0.0, part.radius, robot=part.first + i, about=name)
 
 
-def _line(part: Part, audit: Audit) -> None:
-    _off_targets(part, audit)
+def _check_line(part: Part, audit: Audit) -> None:
+    _check_off_targets(part, audit)
     if part.group.relation == "shape" and part.group.line is None:
         audit.notes.append("A free shape: bounds, spacing and named targets were checked.")
         return
@@ -228,18 +211,18 @@ def _line(part: Part, audit: Audit) -> None:
         spacing.evenness(part, curve, audit)
 
 
-def _corners(part: Part, audit: Audit) -> None:
-    _outside(part, audit)
+def _check_corners(part: Part, audit: Audit) -> None:
+    _check_outside(part, audit)
     spacing.corner_matching(part, audit)
 
 
-def _inside(part: Part, audit: Audit) -> None:
-    _within(part, audit)
+def _check_inside(part: Part, audit: Audit) -> None:
+    _check_depth(part, audit)
     if part.group.spacing == "even" and len(part.points) > 1:
-        _evenly_inside(part, audit)
+        _check_spread(part, audit)
 
 
-def _within(part: Part, audit: Audit) -> None:
+def _check_depth(part: Part, audit: Audit) -> None:
     """Every robot as deep inside the target as it must and may be."""
     polygon, name = part.outline.polygon, part.group.targets[0]
     sign = np.where(shapely.intersects_xy(polygon, part.points), 1.0, -1.0)
@@ -247,20 +230,13 @@ def _within(part: Part, audit: Audit) -> None:
     least, greatest = part.clearance
     audit.least("min_clearance_px", depth.min())
     for i in np.flatnonzero(depth < least - TOLERANCE):
-        where = "outside" if sign[i] < 0 else f"{depth[i]:.1f} px from the edge of"
-        audit.robot(
-            "not_inside",
-            part.first + int(i),
-            depth[i],
-            least,
-            f"is {where} {name}; it must be {least:.1f} px or more inside",
-        )
+        kind = "outside" if sign[i] < 0 else "not_inside"
+        audit.find(kind, depth[i], least, robot=part.first + i, about=name)
     for i in np.flatnonzero(depth > greatest + TOLERANCE):
-        text = f"is {depth[i]:.1f} px inside {name}; {greatest:.1f} px at most are allowed"
-        audit.robot("too_deep", part.first + int(i), depth[i], greatest, text)
+        audit.find("too_deep", depth[i], greatest, robot=part.first + i, about=name)
 
 
-def _evenly_inside(part: Part, audit: Audit) -> None:
+def _check_spread(part: Part, audit: Audit) -> None:
     margin, depth = (bound + part.radius for bound in part.clearance)
     floor = part.group.min_spacing or 0.0
     region = part.site.visible(part.group.targets[0])
@@ -273,21 +249,9 @@ def _evenly_inside(part: Part, audit: Audit) -> None:
     least = SPACING_SHARE * ideal_apart
     most = _uncovered_at_most(cover, region, ideal, cells)
     if apart < least - TOLERANCE:
-        audit.whole(
-            "uneven",
-            apart,
-            least,
-            f"The closest two robots inside are {apart:.1f} px apart; even spreading "
-            f"needs {least:.1f} px or more.",
-        )
+        audit.find("uneven", apart, least)
     if cover > most + TOLERANCE:
-        audit.whole(
-            "uncovered",
-            cover,
-            most,
-            f"Part of the target is {cover:.1f} px from the nearest robot; even "
-            f"spreading allows {most:.1f} px.",
-        )
+        audit.find("uncovered", cover, most)
 
 
 def _uncovered_at_most(
@@ -305,28 +269,22 @@ def _uncovered_at_most(
     return most
 
 
-def _centre(part: Part, audit: Audit) -> None:
+def _check_centre(part: Part, audit: Audit) -> None:
     outline = part.site.visible(part.group.targets[0])
     distance = np.linalg.norm(part.points - outline.centre, axis=1)
     most = CENTRE_SHARE * outline.size
     audit.greatest("max_from_centre_px", distance.max())
     for i in np.flatnonzero(distance > most + TOLERANCE):
-        audit.robot(
-            "off_centre",
-            part.first + int(i),
-            distance[i],
-            most,
-            f"is {distance[i]:.1f} px from the centre; {most:.1f} px at most are allowed",
-        )
+        audit.find("off_centre", distance[i], most, robot=part.first + i, about="the centre")
 
 
 _RULES: dict[str, Callable[[Part, Audit], None]] = {
-    "around": _around,
-    "cage": _around,
-    "along": _along,
-    "corners": _corners,
-    "inside": _inside,
-    "between": _line,
-    "shape": _shape,
-    "centre": _centre,
+    "around": _check_around,
+    "cage": _check_around,
+    "along": _check_along,
+    "corners": _check_corners,
+    "inside": _check_inside,
+    "between": _check_line,
+    "shape": _check_shape,
+    "centre": _check_centre,
 }

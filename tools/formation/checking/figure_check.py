@@ -41,9 +41,7 @@ def on_figure(part: Part, figure: Sketch, audit: Audit) -> None:
         closest = min_spacing(part.points)
         audit.least("spacing_ratio", closest / apart)
         if closest < NARROWEST * apart - TOLERANCE:
-            least = NARROWEST * apart
-            text = f"Two robots are {closest:.1f} px apart; an even shape needs {least:.1f} px."
-            audit.whole("crowded", closest, least, text)
+            audit.find("crowded_figure", closest, NARROWEST * apart)
 
 
 def _on_lines(part: Part, figure: Sketch, reach: float, audit: Audit) -> None:
@@ -51,8 +49,7 @@ def _on_lines(part: Part, figure: Sketch, reach: float, audit: Audit) -> None:
     assert part.group.shape is not None
     name = f"the {part.group.shape.name}"
     for i in np.flatnonzero(distance > reach + TOLERANCE):
-        text = f"is {distance[i]:.1f} px from {name}; {reach:.1f} px at most are allowed"
-        audit.robot("off_curve", part.first + int(i), distance[i], reach, text)
+        audit.find("off_curve", distance[i], reach, robot=part.first + i, about=name)
 
 
 def _not_bare(part: Part, found: list[Stretch], allowed: float, audit: Audit) -> None:
@@ -60,13 +57,10 @@ def _not_bare(part: Part, found: list[Stretch], allowed: float, audit: Audit) ->
     for stretch in found:
         if stretch.length <= allowed + TOLERANCE:
             continue
-        limit = f"{allowed:.1f} px are allowed"
         if stretch.robot is None:
-            text = f"A stretch of {stretch.length:.1f} px has no robot; {limit}."
-            audit.whole("bare_stretch", stretch.length, allowed, text)
+            audit.find("bare_stretch", stretch.length, allowed)
         else:
-            text = f"is the last before {stretch.length:.1f} px without a robot; {limit}"
-            audit.robot("gap", part.first + stretch.robot, stretch.length, allowed, text)
+            audit.find("bare_end", stretch.length, allowed, robot=part.first + stretch.robot)
 
 
 def _in_grid(part: Part, places: FloatArray, pitch: float, audit: Audit) -> None:
@@ -77,10 +71,10 @@ def _in_grid(part: Part, places: FloatArray, pitch: float, audit: Audit) -> None
     taken: dict[int, int] = {}
     for i, (away, k) in enumerate(zip(distance, place, strict=True), start=part.first):
         x, y = places[k]
+        at = f"({x:.0f}, {y:.0f})"
         if away > reach + TOLERANCE:
-            text = f"is {away:.1f} px from ({x:.0f}, {y:.0f}), the nearest place of the grid"
-            audit.robot("off_grid", i, away, reach, f"{text}; {reach:.1f} px at most are allowed")
+            about = f"{at}, the nearest place of the grid"
+            audit.find("off_grid", away, reach, robot=i, about=about)
         elif int(k) in taken:
-            text = f"stands at ({x:.0f}, {y:.0f}) as robot {taken[int(k)] + 1} does"
-            audit.robot("off_grid", i, away, reach, text)
+            audit.find("same_place", away, reach, robot=i, others=(taken[int(k)],), about=at)
         taken.setdefault(int(k), i)

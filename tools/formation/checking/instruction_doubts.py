@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from ..contract import Contract, Relation
 from ..named_lengths import LENGTH, named_lengths
-from ..units import also_metres
+from ..units import length_text
 
 NUMBERS = (
     *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"),
@@ -49,11 +49,15 @@ def doubts(
             those the words name are looked for; None leaves them alone.
     """
     text = " ".join(instruction.lower().split())
-    lengths = () if scale is None else _lengths(text, contract, scale)
-    return [*(() if counted else _count(text, contract)), *_relations(text, contract), *lengths]
+    lengths = () if scale is None else _length_doubts(text, contract, scale)
+    return [
+        *(() if counted else _count_doubts(text, contract)),
+        *_relation_doubts(text, contract),
+        *lengths,
+    ]
 
 
-def _count(text: str, contract: Contract) -> Iterator[str]:
+def _count_doubts(text: str, contract: Contract) -> Iterator[str]:
     counted = COUNT.findall(LENGTH.sub(",", text))  # "0.4 m robots" are not four
     said = [NUMBERS.index(n) if n in NUMBERS else int(n) for n in counted]
     found = [n for n in said if n > 1]  # "one robot at each corner" counts nothing
@@ -62,7 +66,7 @@ def _count(text: str, contract: Contract) -> Iterator[str]:
         yield f"the instruction speaks of {counts} robots, the contract has {contract.robots}"
 
 
-def _relations(text: str, contract: Contract) -> Iterator[str]:
+def _relation_doubts(text: str, contract: Contract) -> Iterator[str]:
     used = {group.relation for group in contract.groups}
     for pattern, word, meant in PLAIN:
         plain = [m for m in re.finditer(pattern, text) if not NEGATION.search(text[: m.start()])]
@@ -71,29 +75,26 @@ def _relations(text: str, contract: Contract) -> Iterator[str]:
             yield f"the instruction says {word!r}, but no group has the relation {names}"
 
 
-def _middle(clearance: tuple[float, float] | None) -> float | None:
-    return None if clearance is None else sum(clearance) / 2
-
-
-def _lengths(text: str, contract: Contract, scale: float) -> Iterator[str]:
+def _length_doubts(text: str, contract: Contract, scale: float) -> Iterator[str]:
     """Lengths of the words that the contract has not; forms have lengths of their own."""
     drawn = any(group.relation == "shape" for group in contract.groups)
     stated = [
         length
         for g in contract.groups
-        for length in (*(g.clearance or ()), _middle(g.clearance), g.min_spacing, g.max_gap)
+        for length in (*(g.clearance or ()), g.min_spacing, g.max_gap)
         if length is not None
     ]
+    stated += [sum(g.clearance) / 2 for g in contract.groups if g.clearance is not None]
     for named in named_lengths(text):
         px = named.px(scale)
         if named.of in ("across", "radius"):
             wanted = px / 2 if named.of == "across" else px
-            if not _near(wanted, [contract.robot_radius]):
-                has = also_metres(f"{contract.robot_radius:.1f} px", scale)
+            if not _is_near(wanted, [contract.robot_radius]):
+                has = length_text(contract.robot_radius, scale)
                 yield f"the instruction says {named.said} {named.of}, but robot_radius is {has}"
-        elif named.of != "something" and not drawn and not _near(px, stated):
+        elif named.of != "something" and not drawn and not _is_near(px, stated):
             yield f"the instruction names {named.said}, which is no length of the contract"
 
 
-def _near(length: float, among: Sequence[float]) -> bool:
+def _is_near(length: float, among: Sequence[float]) -> bool:
     return any(abs(length - other) <= SAME * length for other in among)

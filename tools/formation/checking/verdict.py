@@ -1,29 +1,20 @@
 """The certificate: findings, measures and notes, and the audit that gathers them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any, SupportsFloat, SupportsInt
 
 from pydantic import BaseModel, ConfigDict
 
 from ...geometry.outline import FloatArray, Outline
 from ..contract import Contract, Group
 from ..placement.place import Site
-from ..units import also_metres
+from .finding import Finding
 
 TOLERANCE = 5e-3
 """Slack of every comparison, px: rounding of positions to JSON must not turn a verdict."""
-
-
-class Finding(BaseModel):
-    """One violation: what is wrong, with which robot (from 1), by how much."""
-
-    model_config = ConfigDict(frozen=True)
-
-    code: str
-    robot: int | None = None
-    value: float | None = None
-    limit: float | None = None
-    unit: str = "px"
-    sentence: str
+DECIMALS = 3
+"""Places of a pixel that findings give."""
 
 
 class Escape(BaseModel):
@@ -55,6 +46,16 @@ class Verdict(BaseModel):
     measures: dict[str, Measure] = {}
     notes: tuple[str, ...] = ()
     escape: Escape | None = None
+
+    def renumbered(self, mapping: Sequence[int]) -> "Verdict":
+        """The verdict on the same positions in another order.
+
+        Args:
+            mapping: by old index, from 0, the new number of that robot, from 1.
+        """
+        return self.model_copy(
+            update={"findings": tuple(f.renumbered(mapping) for f in self.findings)}
+        )
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class Part:
 class Audit:
     """Gathers what the rules find, over all groups of one contract.
 
-    With metres per pixel the sentences tell lengths in metres too.
+    With metres per pixel the findings' sentences give lengths in metres too.
     """
 
     metres_per_pixel: float | None = None
@@ -97,27 +98,34 @@ class Audit:
     notes: list[str] = field(default_factory=list[str])
     escape: Escape | None = None
 
-    def robot(self, code: str, index: int, value: float, limit: float, text: str) -> None:
-        """Record a violation by the robot with this index from 0; text follows its name."""
-        self.findings.append(
-            Finding(
-                code=code,
-                robot=int(index) + 1,
-                value=round(float(value), 2),
-                limit=round(float(limit), 2),
-                sentence=f"Robot {int(index) + 1} {text}.",
-            )
-        )
+    def find(
+        self,
+        kind: str,
+        value: SupportsFloat = 0.0,
+        limit: SupportsFloat = 0.0,
+        *,
+        robot: SupportsInt | None = None,
+        others: Sequence[SupportsInt] = (),
+        **more: Any,
+    ) -> None:
+        """Record a violation, by the formation as a whole where no robot is named.
 
-    def whole(self, code: str, value: float, limit: float, text: str, unit: str = "px") -> None:
-        """Record a violation by the formation as a whole."""
+        Args:
+            kind: see `Finding`.
+            value, limit: rounded to a thousandth.
+            robot: its index, from 0.
+            others: indices of other robots that the finding is about.
+            more: further fields of the finding.
+        """
         self.findings.append(
             Finding(
-                code=code,
-                value=round(float(value), 2),
-                limit=round(float(limit), 2),
-                unit=unit,
-                sentence=text,
+                kind=kind,
+                robot=None if robot is None else int(robot) + 1,
+                others=tuple(int(other) + 1 for other in others),
+                value=round(float(value), DECIMALS),
+                limit=round(float(limit), DECIMALS),
+                metres_per_pixel=self.metres_per_pixel,
+                **more,
             )
         )
 
@@ -133,16 +141,11 @@ class Audit:
         """What was gathered, as a value."""
         return Verdict(
             certified=not self.findings,
-            findings=tuple(
-                f.model_copy(update={"sentence": self._told(f.sentence)}) for f in self.findings
-            ),
+            findings=tuple(self.findings),
             measures=dict(self.measures),
-            notes=tuple(dict.fromkeys(map(self._told, self.notes))),
+            notes=tuple(dict.fromkeys(self.notes)),
             escape=self.escape,
         )
-
-    def _told(self, sentence: str) -> str:
-        return also_metres(sentence, self.metres_per_pixel)
 
 
 def parts_of(contract: Contract, points: FloatArray, site: Site) -> list[Part]:

@@ -56,16 +56,16 @@ def form_after(group: Group, figure: Sketch, there: Affine) -> tuple[Group, bool
     targets = () if group.enters else group.targets
     kept = group.model_copy(update={"targets": targets, "clearance": None})
     if shape.points is None and (there.upright or shape.kind == "circle"):
-        return _with(kept, _boxed(shape, figure, there)), False
+        return _with_shape(kept, _boxed(shape, figure, there)), False
     if len(figure.lines) == 1 and figure.places is None and shape.kind not in WRITTEN:
         points = tuple((float(x), float(y)) for x, y in there(figure.lines[0]).round(DECIMALS))
-        return _with(kept, ShapeSpec(kind="polyline", points=points)), False
+        return _with_shape(kept, ShapeSpec(kind="polyline", points=points)), False
     if there.mirrors:
-        return _with(kept, _boxed(shape, figure, there)), True
-    return _with(kept, None), False
+        return _with_shape(kept, _boxed(shape, figure, there)), True
+    return _with_shape(kept, None), False
 
 
-def _with(group: Group, shape: ShapeSpec | None) -> Group:
+def _with_shape(group: Group, shape: ShapeSpec | None) -> Group:
     return group.model_copy(update={"shape": shape})
 
 

@@ -140,8 +140,8 @@ def _offset(part: Part, edit: Offset) -> Part:
     by = _by(edit, clearance, inward)
     if clearance + by <= 0:
         raise ToolError(
-            f"{-by:.1f} px nearer to the outline of {group.targets[0]} is too much: robots' edges "
-            f"are {max(clearance, 0.0):.1f} px from it."
+            f"{part.site.length(-by)} nearer to the outline of {group.targets[0]} is too much: "
+            f"robots' edges are {part.site.length(max(clearance, 0.0))} from it."
         )
     least, greatest = (round(max(bound + by, 0.0), DECIMALS) for bound in group.clearance)
     if group.clearance[1] >= UNLIMITED:

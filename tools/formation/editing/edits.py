@@ -96,9 +96,9 @@ def edited(plan: Plan, edit: Edit, site: Site) -> Edited:
     if isinstance(edit, Swap):
         parts = _swapped(parts, edit)
     elif isinstance(edit, Skip):
-        parts = _without(parts, edit.robots, skipped)
+        parts = _without_robots(parts, edit.robots, skipped)
     elif isinstance(edit, Remove):
-        parts = _without(parts, edit.robots or _last(parts, edit), closed_up)
+        parts = _without_robots(parts, edit.robots or _last(parts, edit), closed_up)
     else:
         chosen = set(_chosen(edit, parts))
         parts = [RULES[edit.kind](p, edit) if k in chosen else p for k, p in enumerate(parts)]
@@ -113,9 +113,10 @@ def edited(plan: Plan, edit: Edit, site: Site) -> Edited:
 def _parts(plan: Plan, site: Site) -> list[Part]:
     contract, points = plan.formation.contract, plan.formation.points
     if plan.partial is not None:
+        short = plan.partial.short(site.metres_per_pixel)
         raise ToolError(
-            f"Plan {plan.id} is partial ({plan.partial.short}); propose what is wanted instead "
-            "before changing it."
+            f"Plan {plan.id} is partial ({short}); propose what is wanted instead before changing "
+            "it."
         )
     if len(points) != contract.robots:
         raise ToolError(
@@ -173,7 +174,7 @@ def _chosen(edit: Edit, parts: list[Part]) -> list[int]:
     return list(range(len(parts)))
 
 
-def _checked(robots: Collection[int], parts: list[Part]) -> IntArray:
+def _robot_indices(robots: Collection[int], parts: list[Part]) -> IntArray:
     """Numbers from 0 of robots that are there."""
     count = sum(len(part.points) for part in parts)
     strange = sorted({r for r in robots if r > count})
@@ -186,7 +187,7 @@ def _checked(robots: Collection[int], parts: list[Part]) -> IntArray:
 def _swapped(parts: list[Part], edit: Swap) -> list[Part]:
     if edit.a == edit.b:
         raise ToolError(f"Robot {edit.a} cannot swap with itself: name two robots.")
-    a, b = _checked((edit.a, edit.b), parts)
+    a, b = _robot_indices((edit.a, edit.b), parts)
     points = np.concatenate([part.points for part in parts])
     points[[a, b]] = points[[b, a]]
     return [replace(part, points=points[part.was]) for part in parts]
@@ -201,11 +202,11 @@ def _last(parts: list[Part], edit: Remove) -> list[int]:
     return [int(i) + 1 for i in part.was[count - n :]]
 
 
-def _without(
+def _without_robots(
     parts: list[Part], robots: Collection[int], leave: Callable[[Part, FloatArray], Part]
 ) -> list[Part]:
     """The groups that are left without some robots, numbered from 1."""
-    gone = _checked(robots, parts)
+    gone = _robot_indices(robots, parts)
     left: list[Part] = []
     for part in parts:
         stays = ~np.isin(part.was, gone)

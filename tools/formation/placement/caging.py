@@ -8,9 +8,10 @@ from shapely.geometry.base import BaseGeometry
 
 from ...errors import ToolError
 from ...geometry.cages.cage_places import Demand, caging_places, fewest_cage
-from ...geometry.curves import Curve, Frame
-from ...geometry.outline import FloatArray, Outline
+from ...geometry.curves import Curve
+from ...geometry.outline import FloatArray
 from ..contract import Group
+from ..site import Site
 
 
 class CageError(ToolError):
@@ -22,9 +23,8 @@ class CageError(ToolError):
         fits: how many of the robots have room on the ring where that is fewer than all, else 0.
     """
 
-    def __init__(self, group: Group, needed: int | None, fits: int) -> None:
+    def __init__(self, group: Group, needed: int | None, fits: int, site: Site) -> None:
         assert group.clearance is not None
-        least, greatest = group.clearance
         way = (
             f"{needed} robots would do"
             if needed
@@ -33,8 +33,11 @@ class CageError(ToolError):
             else "no other number is known to do: allow a nearer clearance or take the closure ring"
         )
         super().__init__(
-            f"No places were found where {group.robots} robots, {least:.1f} to {greatest:.1f} px "
-            f"from {group.targets[0]}, certainly cage it; {way}."
+            f"No places were found where {group.robots} robots, {site.length(group.clearance)} "
+            f"from {group.targets[0]}, certainly cage it; {way}.",
+            "cage",
+            robots_needed=needed,
+            robots_that_fit=fits,
         )
         self.needed, self.group, self.fits = needed, group, fits
 
@@ -44,9 +47,7 @@ def escape_proof(group: Group) -> bool:
     return group.closure == "escape-proof"
 
 
-def caged_places(
-    group: Group, outline: Outline, radius: float, frame: Frame, curve: Curve
-) -> FloatArray:
+def caged_places(group: Group, site: Site, radius: float, curve: Curve) -> FloatArray:
     """Places that certainly cage the group's target, evenly on the curve where that does.
 
     Raises:
@@ -54,12 +55,12 @@ def caged_places(
     """
     assert group.clearance is not None
     demand = Demand(
-        outline,
+        site.outlines[group.targets[0]],
         group.clearance,
         radius,
-        frame,
+        site.frame(radius),
         group.min_spacing or 0.0,
-        walls_of(group, (frame.width, frame.height)),
+        walls_of(group, site.room),
     )
     points = caging_places(demand, group.robots, (curve,))
     if points is None:
@@ -67,7 +68,7 @@ def caged_places(
         crowded = longest < (group.robots + 1) * demand.spacing
         enough = None if crowded else fewest_cage(demand, group.robots + 1)
         fits = min(int(longest / demand.spacing), group.robots - 1) if crowded else 0
-        raise CageError(group, None if enough is None else len(enough), fits)
+        raise CageError(group, None if enough is None else len(enough), fits, site)
     return points
 
 

@@ -54,7 +54,7 @@ def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sket
     """
     sketch = _sketch(group, shape)
     try:
-        placed = _placed(sketch, group, shape, site, radius)
+        placed = _figure_placed(sketch, group, shape, site, radius)
     except InputError as error:
         raise ToolError(str(error)) from None
     points = placed.points
@@ -63,7 +63,7 @@ def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sket
         (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
         raise ToolError(
             f"The {shape.name} would reach from ({x0:.0f}, {y0:.0f}) to ({x1:.0f}, {y1:.0f}), out "
-            f"of the {site.width:g} x {site.height:g} px picture: place it elsewhere or smaller."
+            f"of the {site.length(site.room, 'g', ' x ')} picture: place it elsewhere or smaller."
         )
     return placed
 
@@ -91,8 +91,8 @@ def place_figure(group: Group, shape: ShapeSpec, site: Site, radius: float) -> F
         middle = (few + many) // 2
         few, many = (middle, many) if apart(middle) else (few, middle)
     fits = most_that_fit(apart, few, group.robots)
-    size = " x ".join(f"{x:.0f}" for x in figure.size)
-    why = f"no more stand {spacing:g} px apart on the {shape.name}, {size} px"
+    size = site.length(figure.size, ".0f", " x ")
+    why = f"no more stand {site.length(spacing, 'g')} apart on the {shape.name}, {size}"
     raise CapacityError(group, fits, why)
 
 
@@ -128,7 +128,9 @@ def _rows(n: int, box: tuple[float, float, float, float] | None) -> int:
     return min(max(round(math.sqrt(n * tall)), 1), n)
 
 
-def _placed(sketch: Sketch, group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sketch:
+def _figure_placed(
+    sketch: Sketch, group: Group, shape: ShapeSpec, site: Site, radius: float
+) -> Sketch:
     if shape.box is not None:
         return fitted(sketch, shape.box)
     if shape.where is None:
@@ -138,15 +140,16 @@ def _placed(sketch: Sketch, group: Group, shape: ShapeSpec, site: Site, radius: 
         return fitted(sketch, outline.bounds)
     assert group.clearance is not None
     if shape.where == "inside":
-        return _within(sketch, site.visible(group.targets[0]), group.clearance[0] + radius)
+        return _figure_inside(sketch, group, site, group.clearance[0] + radius)
     gap = nominal(group.clearance) + radius
     if shape.where == "around":
-        return _about(sketch, outline, gap)
-    return _beside(sketch, group, outline, site, shape.where, gap, radius)
+        return _figure_around(sketch, outline, gap)
+    return _figure_beside(sketch, group, outline, site, shape.where, gap, radius)
 
 
-def _within(sketch: Sketch, outline: Outline, margin: float) -> Sketch:
-    """As large as it lies in the outline about one of its centres, holes left out."""
+def _figure_inside(sketch: Sketch, group: Group, site: Site, margin: float) -> Sketch:
+    """As large as it lies in the target about one of its centres, holes left out."""
+    outline = site.visible(group.targets[0])
     room = outline.polygon.buffer(-margin * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
     x0, y0, x1, y1 = outline.bounds
     width, height = sketch.size
@@ -159,10 +162,10 @@ def _within(sketch: Sketch, outline: Outline, margin: float) -> Sketch:
             lines = [LineString(line) for line in placed.lines]
             if room.covers(GeometryCollection([*lines, MultiPoint(placed.points)])):
                 return placed
-    raise ToolError(f"It has no room inside the target, {margin:.1f} px from its edge.")
+    raise ToolError(f"It has no room inside the target, {site.length(margin)} from its edge.")
 
 
-def _about(sketch: Sketch, outline: Outline, gap: float) -> Sketch:
+def _figure_around(sketch: Sketch, outline: Outline, gap: float) -> Sketch:
     """As small as it holds the outline and keeps off it."""
     circle = shapely.minimum_bounding_circle(outline.filled)
     centre = (float(circle.centroid.x), float(circle.centroid.y))
@@ -184,7 +187,7 @@ def _about(sketch: Sketch, outline: Outline, gap: float) -> Sketch:
     return sketch.at(centre, high)
 
 
-def _beside(
+def _figure_beside(
     sketch: Sketch,
     group: Group,
     outline: Outline,
@@ -206,7 +209,8 @@ def _beside(
     most = min(wide / width if width else math.inf, high / height if height else math.inf)
     if min(wide, high, most) <= 0:
         place = f"{where} of" if where in ("left", "right") else where
-        raise ToolError(f"There is no room {place} {group.targets[0]} in the picture.")
+        text = f"There is no room {place} {group.targets[0]} in the picture."
+        raise ToolError(text, "no_room_beside")
     extent = (y1 - y0) / height if dx and height else (x1 - x0) / width if dy and width else most
     scale = min(extent, most) if width or height else 1.0
     apart = min_spacing(robots_on(sketch, group.robots)) * scale

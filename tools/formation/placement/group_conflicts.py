@@ -38,13 +38,15 @@ class CrowdedError(ToolError):
         first, second: their places in the contract, from 0.
     """
 
-    def __init__(self, first: int, second: int, apart: float, need: float) -> None:
+    def __init__(self, first: int, second: int, apart: str, need: str) -> None:
         super().__init__(
-            f"Robots of group {first} and of group {second} would stand {apart:.1f} px from each "
-            f"other; {need:.1f} px or more are needed, and no other places were found. Give one of "
-            "the groups another clearance, or fewer robots."
+            f"Robots of group {first + 1} and of group {second + 1} would stand {apart} from each "
+            f"other; {need} or more are needed, and no other places were found. Give one of "
+            "the groups another clearance, or fewer robots.",
+            "crowded",
+            groups=[first + 1, second + 1],
         )
-        self.first, self.second = first - 1, second - 1
+        self.first, self.second = first, second
 
 
 def need(first: Group, second: Group) -> float:

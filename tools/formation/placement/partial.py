@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 
 from ..contract import Contract, Group, with_defaults
 from ..plan import Plan, Shortfall, make_plan
-from ..units import also_metres
 from .caging import CageError, escape_proof
 from .group_conflicts import CrowdedError
 from .place import CapacityError, Site
@@ -58,7 +57,7 @@ def best_partial(
         return make_plan(smaller, site, scene_version)
 
     fewer = None if refusal is None else _fewer(full, attempt)
-    return fewer or _nearer(contract, full, attempt, site.metres_per_pixel)
+    return fewer or _nearer(contract, full, attempt, site)
 
 
 def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
@@ -69,12 +68,12 @@ def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
             plan = attempt(smaller)
         except CrowdedError as error:
             fewer = _parted(smaller, (error.first, error.second), attempt)
-            alone = _without(smaller, error.second)
+            alone = _without_group(smaller, error.second)
             if fewer is None or fewer.robots < alone.robots:
                 names.pop(error.second)
                 fewer = alone
         except (CapacityError, CageError) as error:
-            fewer = _counted(smaller, {smaller.groups.index(error.group): error.fits})
+            fewer = _with_counts(smaller, {smaller.groups.index(error.group): error.fits})
         else:
             short = plan.verdict.certified and smaller != full
             return _marked(plan, _shortfall(full, smaller, names)) if short else None
@@ -84,7 +83,7 @@ def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
     return None
 
 
-def _counted(contract: Contract, robots: Mapping[int, int]) -> Contract | None:
+def _with_counts(contract: Contract, robots: Mapping[int, int]) -> Contract | None:
     """The contract with other numbers of robots in some groups; None where one has too few."""
     groups = list(contract.groups)
     for index, count in robots.items():
@@ -104,7 +103,7 @@ def _parted(contract: Contract, pair: tuple[int, int], attempt: Attempt) -> Cont
     before = contract.model_copy(update={"groups": contract.groups[: second + 1]})
 
     def works(counts: Counts) -> bool:
-        smaller = _counted(before, dict(zip(pair, counts, strict=True)))
+        smaller = _with_counts(before, dict(zip(pair, counts, strict=True)))
         return smaller is not None and _tried(attempt, smaller) is not None
 
     def share(k: int) -> Counts:
@@ -116,7 +115,7 @@ def _parted(contract: Contract, pair: tuple[int, int], attempt: Attempt) -> Cont
         _fewest_less(share, n, works),
     )
     counts = max((c for c in ways if c is not None), key=sum, default=None)
-    return counts and _counted(contract, {first: counts[0], second: counts[1]})
+    return counts and _with_counts(contract, {first: counts[0], second: counts[1]})
 
 
 def _fewest_less(
@@ -134,7 +133,7 @@ def _fewest_less(
     return counts(high)
 
 
-def _without(contract: Contract, index: int) -> Contract:
+def _without_group(contract: Contract, index: int) -> Contract:
     groups = (*contract.groups[:index], *contract.groups[index + 1 :])
     return contract.model_copy(update={"groups": groups})
 
@@ -153,9 +152,7 @@ def _shortfall(full: Contract, smaller: Contract, names: list[int]) -> Shortfall
     return Shortfall(asked=asked, placed=placed, sentence=sentence)
 
 
-def _nearer(
-    stated: Contract, full: Contract, attempt: Attempt, metres_per_pixel: float | None
-) -> Plan | None:
+def _nearer(stated: Contract, full: Contract, attempt: Attempt, site: Site) -> Plan | None:
     """All robots at the greatest clearance that can be held, of the first group it helps.
 
     A ring that goes all the way round comes before a wider one of which the picture leaves a part.
@@ -169,15 +166,16 @@ def _nearer(
             continue
         held = plan.formation.contract.groups[index]
         sentence = (
-            f"{_span(held)} is the greatest clearance found that can be held"
-            f"{' all round' if whole and group.relation in ROUND else ''}, not {_span(group)}."
+            f"{_clearance_text(held, site)} is the greatest clearance found that can be held"
+            f"{' all round' if whole and group.relation in ROUND else ''}, "
+            f"not {_clearance_text(group, site)}."
         )
         short = Shortfall(
             asked=full.robots,
             placed=full.robots,
             clearance_asked=group.clearance,
             clearance=held.clearance,
-            sentence=also_metres(sentence, metres_per_pixel),
+            sentence=sentence,
         )
         return _marked(plan, short)
     return None
@@ -200,7 +198,7 @@ def _greatest(
         if fails - works < 2:
             break
         middle = (works + fails) // 2 if best or fails < 4 else max(fails // 2, 1)
-        plan = _tried(attempt, _with(full, index, _scaled(group, middle / TENTH / aim)))
+        plan = _tried(attempt, _with_group(full, index, _at_share(group, middle / TENTH / aim)))
         if plan is None or not suits(plan):
             fails = middle
         else:
@@ -212,7 +210,7 @@ def _uncut(plan: Plan) -> bool:
     return "ring_in_picture" not in plan.verdict.measures
 
 
-def _scaled(group: Group, share: float) -> Group:
+def _at_share(group: Group, share: float) -> Group:
     """The group at a share of its clearance; inside only the least one is in the way."""
     assert group.clearance is not None
     least, greatest = group.clearance
@@ -229,7 +227,7 @@ def _tried(attempt: Attempt, contract: Contract) -> Plan | None:
     return plan if plan.verdict.certified else None
 
 
-def _with(contract: Contract, index: int, group: Group) -> Contract:
+def _with_group(contract: Contract, index: int, group: Group) -> Contract:
     groups = (*contract.groups[:index], group, *contract.groups[index + 1 :])
     return contract.model_copy(update={"groups": groups})
 
@@ -238,9 +236,8 @@ def _marked(plan: Plan, short: Shortfall) -> Plan:
     return plan.model_copy(update={"partial": short})
 
 
-def _span(group: Group) -> str:
+def _clearance_text(group: Group, site: Site) -> str:
     assert group.clearance is not None
-    least, greatest = group.clearance
-    if greatest >= OPEN or group.relation == "inside":
-        return f"{least:.1f} px or more"
-    return f"{least:.1f} to {greatest:.1f} px"
+    if group.clearance[1] >= OPEN or group.relation == "inside":
+        return f"{site.length(group.clearance[0])} or more"
+    return site.length(group.clearance)

@@ -97,7 +97,7 @@ def reference_curve(group: Group, site: Site, radius: float, offset: float | Non
         ends = np.asarray(group.line or (0, 0, 0, 0), dtype=float).reshape(2, 2)
         return segment(ends[0], ends[1], frame)
     if group.relation == "between":
-        return _between(group, site, frame)
+        return _curve_between(group, site, frame)
     outline = site.outlines[group.targets[0]]
     assert group.clearance is not None
     offset = nominal(group.clearance) + radius if offset is None else offset
@@ -187,7 +187,7 @@ def _elsewhere(
     if clash is None:
         return stand
     index, apart, least = clash
-    raise CrowdedError(index + 1, len(earlier) + 1, apart, least)
+    raise CrowdedError(index, len(earlier), site.length(apart), site.length(least))
 
 
 def _otherwise(
@@ -247,10 +247,10 @@ def _as_many_as_fit(group: Group, site: Site, radius: float) -> tuple[FloatArray
         return _place_at_target(group, site, radius)
     curve = reference_curve(group, site, radius)
     if escape_proof(group):
-        outline = site.outlines[group.targets[0]]
-        return caged_places(group, outline, radius, site.frame(radius), curve), ""
+        return caged_places(group, site, radius, curve), ""
     spacing = group.min_spacing or 0.0
-    why = f"the {curve.length:.0f} px that are left to stand on allow no more at {spacing:g} px"
+    left, apart = site.length(curve.length, ".0f"), site.length(spacing, "g")
+    why = f"the {left} that are left to stand on allow no more at {apart}"
     if group.relation == "cage" and not curve.closed:
         why += ", and the picture's border cuts the ring open"
     return _fit(curve, group.robots, spacing), why
@@ -264,12 +264,12 @@ def _place_at_target(
     if group.relation == "corners":
         count = len(corner_points(outline, n))
         why = f"{group.targets[0]} has {count} corners, less those without room in the picture"
-        return _corners(group, site, radius, earlier), why
+        return _corner_places(group, site, radius, earlier), why
     if group.relation == "inside":
         assert group.clearance is not None
         least, greatest = group.clearance
         points = inside(outline, n, least + radius, greatest + radius, spacing)
-        return points, f"spaced {spacing:g} px and {least:.1f} px from the edge"
+        return points, f"spaced {site.length(spacing, 'g')} and {site.length(least)} from the edge"
     pitch = max(spacing * 1.05, min(0.1 * outline.size, CENTRE_SHARE * outline.size / n**0.5))
     most = CENTRE_SHARE * outline.size
 
@@ -280,7 +280,7 @@ def _place_at_target(
     points = near(around_point(outline.centre, n + min(crowd, n + MOST_AVOIDED), pitch))
     points = near(_drawn_in(points, site.frame(radius).box))
     points = points[clear(points, group, earlier)][:n]
-    return points, f"within {most:.0f} px of the centre"
+    return points, f"within {site.length(most, '.0f')} of the centre"
 
 
 def _drawn_in(points: FloatArray, box: Polygon) -> FloatArray:
@@ -293,7 +293,9 @@ def _drawn_in(points: FloatArray, box: Polygon) -> FloatArray:
     return moved[((moved >= low) & (moved <= high)).all(axis=1)]
 
 
-def _corners(group: Group, site: Site, radius: float, earlier: Sequence[Stand] = ()) -> FloatArray:
+def _corner_places(
+    group: Group, site: Site, radius: float, earlier: Sequence[Stand] = ()
+) -> FloatArray:
     """Places at the corners, drawn in from the picture's border, less those without room."""
     assert group.clearance is not None
     outline, box = site.outlines[group.targets[0]], site.frame(radius).box
@@ -327,7 +329,7 @@ def _fit(curve: Curve, n: int, spacing: float) -> FloatArray:
     return points
 
 
-def _between(group: Group, site: Site, frame: Frame) -> Curve:
+def _curve_between(group: Group, site: Site, frame: Frame) -> Curve:
     """The gap between two targets: joined along their centroids, or parted across the middle."""
     first, second = (site.outlines[t] for t in group.targets)
     ends = [shapely.get_coordinates(o.filled.centroid)[0] for o in (first, second)]

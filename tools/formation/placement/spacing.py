@@ -36,13 +36,10 @@ def evenness(part: Part, curve: Curve, audit: Audit) -> None:
         audit.least("spacing_ratio", min(spread.gaps) / mean if mean > 0 else 0.0)
         audit.greatest("worst_gap_px", max(spread.gaps))
     for gap, (i, j) in zip(spread.gaps, spread.pairs, strict=True):
-        apart = f"and robot {j + 1} are {gap:.1f} px apart along the curve"
         if gap > WIDEST * mean + TOLERANCE:
-            text = f"{apart}; even spacing allows {WIDEST * mean:.1f} px"
-            audit.robot("gap", i, gap, WIDEST * mean, text)
+            audit.find("gap", gap, WIDEST * mean, robot=i, others=(j,))
         elif gap < NARROWEST * mean - TOLERANCE:
-            text = f"{apart}; even spacing needs {NARROWEST * mean:.1f} px"
-            audit.robot("crowded", i, gap, NARROWEST * mean, text)
+            audit.find("crowded", gap, NARROWEST * mean, robot=i, others=(j,))
     _pieces(spread, mean, audit)
 
 
@@ -50,29 +47,20 @@ def _pieces(spread: "_Spread", mean: float, audit: Audit) -> None:
     """What uneven spreading over open or several pieces of a curve looks like."""
     for apart, (i, j) in spread.jumps:
         if apart < NARROWEST * mean - TOLERANCE:
-            text = f"and robot {j + 1} are {apart:.1f} px apart; even spacing needs more"
-            audit.robot("crowded", i, apart, NARROWEST * mean, text)
+            audit.find("crowded", apart, NARROWEST * mean, robot=i, others=(j,))
     for i, stretch in spread.ends:
         if stretch > mean + TOLERANCE:
-            text = f"is the last before {stretch:.1f} px without a robot; {mean:.1f} px are allowed"
-            audit.robot("bare_end", i, stretch, mean, text)
+            audit.find("bare_end", stretch, mean, robot=i)
     for stretch in spread.bare:
         if stretch > mean + TOLERANCE:
-            text = f"A stretch of {stretch:.1f} px has no robot; even spacing allows {mean:.1f} px."
-            audit.whole("bare_stretch", stretch, mean, text)
+            audit.find("bare_stretch", stretch, mean)
 
 
 def on_curve(part: Part, curve: Curve, reach: float, name: str, audit: Audit) -> None:
     """Every robot within `reach` px of the curve."""
     distance = distances(curve.geometry(), part.points)
     for i in np.flatnonzero(~(distance <= reach + TOLERANCE)):
-        audit.robot(
-            "off_curve",
-            part.first + int(i),
-            distance[i],
-            reach,
-            f"is {distance[i]:.1f} px from {name}; {reach:.1f} px at most are allowed",
-        )
+        audit.find("off_curve", distance[i], reach, robot=part.first + i, about=name)
 
 
 def on_side(part: Part, curve: Curve, direction: tuple[float, float], audit: Audit) -> None:
@@ -84,8 +72,8 @@ def on_side(part: Part, curve: Curve, direction: tuple[float, float], audit: Aud
     astray = distances(curve.geometry(), part.points) > NEAR_CURVE * curve.length
     for i in np.flatnonzero(astray & (facing < math.cos(FACING + FACING_SLACK))):
         turned = math.degrees(math.acos(float(np.clip(facing[i], -1, 1))))
-        text = f"stands beside another side of the target, {turned:.0f} degrees off the one meant"
-        audit.robot("wrong_side", part.first + int(i), turned, math.degrees(FACING), text)
+        most = math.degrees(FACING)
+        audit.find("wrong_side", turned, most, robot=part.first + i, unit="degrees")
 
 
 def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
@@ -94,8 +82,8 @@ def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
     off = np.stack([distances(LineString(vertices[list(p)]), part.points) for p in pairs])
     nearest, chosen = off.min(axis=0), off[list(edges)].min(axis=0)
     for i in np.flatnonzero(chosen > nearest * (1 + SIDE_SLACK) + TOLERANCE):
-        text = f"stands nearer to edge {int(np.argmin(off[:, i]))} than to those asked for"
-        audit.robot("wrong_side", part.first + int(i), chosen[i] - nearest[i], 0.0, text)
+        edge = f"edge {int(np.argmin(off[:, i]))}"
+        audit.find("wrong_edge", chosen[i] - nearest[i], robot=part.first + i, about=edge)
 
 
 def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
@@ -116,38 +104,22 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
     )
     name = part.group.targets[0]
     if not encloses and not escape_proof(part.group):
-        audit.whole(
-            "not_enclosed",
-            len(points),
-            3,
-            f"The robots do not enclose {name}; a closed ring takes 3 or more all round.",
-            "robots",
-        )
+        audit.find("not_enclosed", len(points), 3, about=name, unit="robots")
     order = _order(part.points, curve) + part.first
-    mend = _enough(part, curve)
+    kind, needed = "opening" if curve.closed else "opening_at_border", _enough(part, curve)
     for k in np.flatnonzero(opening > allowed + TOLERANCE):
-        other = order[(k + 1) % len(order)] + 1
-        cut = "" if curve.closed else " (the picture's border cuts the ring there)"
-        audit.robot(
-            "opening",
-            int(order[k]),
-            opening[k],
-            allowed,
-            f"and robot {other} leave an opening of {opening[k]:.1f} px; a closed ring "
-            f"allows {allowed:.1f} px{cut}{mend}",
-        )
+        other = order[(k + 1) % len(order)]
+        audit.find(kind, opening[k], allowed, robot=order[k], others=(other,), needed=needed)
 
 
-def _enough(part: Part, curve: Curve) -> str:
+def _enough(part: Part, curve: Curve) -> int | None:
     """How many robots make openings as narrow as a contract names, where more are what it takes."""
     widest = part.group.max_gap
     if not widest or not curve.closed:
-        return ""
+        return None
     needed = math.ceil(curve.length / (widest + 2 * part.radius))  # chords are shorter than arcs
     apart = curve.length / needed
-    if needed <= len(part.points) or apart < (part.group.min_spacing or 0.0):
-        return ""
-    return f"; {needed} robots evenly would do"
+    return None if needed <= len(part.points) or apart < (part.group.min_spacing or 0) else needed
 
 
 def corner_matching(part: Part, audit: Audit) -> None:
@@ -156,13 +128,7 @@ def corner_matching(part: Part, audit: Audit) -> None:
 
     corners = corner_points(part.outline, part.group.robots)
     if part.group.robots > len(corners):
-        audit.whole(
-            "corners",
-            part.group.robots,
-            len(corners),
-            f"The target has {len(corners)} corners for {part.group.robots} robots.",
-            "robots",
-        )
+        audit.find("corners", part.group.robots, len(corners), unit="robots")
         return
     reach = corner_reach(part.group, part.outline, part.radius)
     distance = np.linalg.norm(part.points[:, None] - corners[None], axis=2)
@@ -172,22 +138,16 @@ def corner_matching(part: Part, audit: Audit) -> None:
     for i, k in zip(robots, matched, strict=True):
         if distance[i, k] > reach[k] + TOLERANCE:
             x, y = corners[k]
-            audit.robot(
-                "off_corner",
-                part.first + int(i),
-                distance[i, k],
-                reach[k],
-                f"is {distance[i, k]:.1f} px from its corner ({x:.0f}, {y:.0f}); "
-                f"{reach[k]:.1f} px at most are allowed",
-            )
+            about = f"its corner ({x:.0f}, {y:.0f})"
+            audit.find("off_corner", distance[i, k], reach[k], robot=part.first + i, about=about)
 
 
 def _order(points: FloatArray, curve: Curve) -> NDArray[np.intp]:
     """Indices of the points in the order met along the curve."""
-    return np.argsort(_stations(points, curve)[0], kind="stable")
+    return np.argsort(_stations_on(points, curve)[0], kind="stable")
 
 
-def _stations(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
+def _stations_on(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
     """Arc length of each point's foot on the curve, pieces laid end to end, and its piece."""
     if len(curve.lines) == 1:
         return locate(curve.lines[0], points), np.zeros(len(points), dtype=np.intp)
@@ -214,7 +174,7 @@ class _Spread:
 
 
 def _spread(part: Part, curve: Curve) -> _Spread:
-    station, piece = _stations(part.points, curve)
+    station, piece = _stations_on(part.points, curve)
     order = np.argsort(station, kind="stable")
     names = [int(i) + part.first for i in order]
     cut = 0.0 if curve.closed else curve.cut(len(part.points))

@@ -138,7 +138,7 @@ def test_turning_or_mirroring_the_whole_scene_changes_no_verdict(
     first = certify(wrong, plan.formation.contract, here)
     second = certify(mapped(wrong, which), turned.formation.contract, there)
     assert first.certified == second.certified
-    assert sorted(f.code for f in first.findings) == sorted(f.code for f in second.findings)
+    assert sorted(f.kind for f in first.findings) == sorted(f.kind for f in second.findings)
 
 
 @pytest.mark.parametrize("relation", RELATIONS)
@@ -161,7 +161,7 @@ def test_moving_or_enlarging_the_whole_scene_changes_no_verdict(
     first = certify(wrong, plan.formation.contract, here)
     second = certify(moved(wrong), other.formation.contract, there)
     assert first.certified == second.certified
-    assert sorted(f.code for f in first.findings) == sorted(f.code for f in second.findings)
+    assert sorted(f.kind for f in first.findings) == sorted(f.kind for f in second.findings)
 
 
 def test_a_target_that_parts_the_picture_is_not_surrounded_from_one_side() -> None:
@@ -237,7 +237,7 @@ def test_two_groups_in_each_others_way_are_refused() -> None:
     ring = make_plan(Contract(groups=(group,)), site, "s").formation.points
     both = with_defaults(Contract(groups=(group, group)), site.outlines, site.room)
     found = certify(np.concatenate([ring, ring]), both, site)
-    assert [f.code for f in found.findings].count("too_close") == 4
+    assert [f.kind for f in found.findings].count("too_close") == 4
 
 
 def test_nobody_stands_on_what_is_to_be_kept_out_of_nor_touches_it() -> None:

@@ -77,7 +77,7 @@ def test_a_robot_not_wholly_in_the_picture_is_blamed(
     i = robot % len(points)
     points[i] = where
     found = verdict(name, points)
-    assert {"out_of_picture"} <= {f.code for f in found.findings if f.robot == i + 1}
+    assert {"out_of_picture"} <= {f.kind for f in found.findings if f.robot == i + 1}
 
 
 @given(names, st.integers(0, 99), st.integers(1, 98), st.floats(0, 7.9), st.floats(0, 6.3))
@@ -100,7 +100,7 @@ def test_one_robot_too_few_or_too_many_is_counted(name: str) -> None:
     points = PLACES[name]
     for other in (points[1:], points[:0], np.concatenate([points, points[:1] + 40])):
         found = verdict(name, other)
-        assert [f.code for f in found.findings] == ["count"]
+        assert [f.kind for f in found.findings] == ["count"]
         assert not found.certified
 
 

@@ -75,14 +75,15 @@ def test_what_escape_proof_lacks_is_said_so_that_one_turn_mends_it() -> None:
     contract = loose.formation.contract.model_copy(update={"groups": (group,)})
     site = Site({"t1": SQUARE}, 640, 480)
     verdict = certify(loose.formation.points, contract, site)
-    assert [f.code for f in verdict.findings] == ["not_caged"]
-    said = verdict.findings[0].sentence
+    (finding,) = verdict.findings
+    assert (finding.kind, finding.about, len(finding.others)) == ("gets_out", "t1", 2)
+    said = finding.sentence
     assert said.startswith("t1 can get out between the robots, on a way that was checked")
     assert "leave a gap of" in said
-    limit = verdict.findings[0].limit
-    assert limit == pytest.approx(100, rel=0.01), "the diameter of the inscribed disc"
-    enough = int(said.split(" robots evenly")[0].split()[-1])
-    assert planned(SQUARE, enough).verdict.measures["escape_test"] == "disc"
+    assert finding.limit == pytest.approx(100, rel=0.01), "the diameter of the inscribed disc"
+    assert finding.needed is not None
+    assert f"{finding.needed} robots evenly on the ring do" in said
+    assert planned(SQUARE, finding.needed).verdict.measures["escape_test"] == "disc"
 
 
 def test_uneven_robots_are_no_fault_of_an_escape_proof_cage_but_of_a_ring() -> None:
@@ -104,7 +105,7 @@ def test_the_pictures_border_is_a_wall_only_where_that_is_said() -> None:
     group = plan.formation.contract.groups[0].model_copy(update={"walls": None})
     contract = plan.formation.contract.model_copy(update={"groups": (group,)})
     found = certify(plan.formation.points, contract, Site({"t1": edge}, 640, 480))
-    assert [f.code for f in found.findings] == ["not_caged"]
+    assert [f.kind for f in found.findings] == ["gets_out"]
     with pytest.raises(ValidationError, match="walls belong to the closure escape-proof"):
         Group(relation="cage", targets=("t1",), robots=4, walls=True)
     with pytest.raises(ValidationError, match="walls belongs to cage"):
@@ -136,7 +137,9 @@ def test_too_few_for_the_openings_that_are_named_say_how_many_would_do(
 ) -> None:
     few = planned(thing, 7, radius, max_gap=20)
     assert not few.verdict.certified
-    enough = int(few.verdict.findings[0].sentence.split(" robots evenly would do")[0].split()[-1])
+    enough = few.verdict.findings[0].needed
+    assert enough is not None
+    assert f"; {enough} robots evenly would do" in few.verdict.findings[0].sentence
     assert planned(thing, enough, radius, max_gap=20).verdict.certified
     assert not planned(thing, enough - 3, radius, max_gap=20).verdict.certified
 

@@ -99,8 +99,15 @@ def test_a_spoilt_form_is_not_certified(shape: dict[str, Any], n: int, seed: int
     shuffled = points[random.permutation(n)]
     assert not certify(stacked, contract, SITE).certified
     assert certify(shuffled, contract, SITE).certified
-    codes = {f.code for f in certify(pushed, contract, SITE).findings}
-    assert codes & {"off_curve", "gap", "too_close", "crowded", "out_of_picture", "on_target"}
+    kinds = {f.kind for f in certify(pushed, contract, SITE).findings}
+    assert kinds & {
+        "off_curve",
+        "bare_end",
+        "too_close",
+        "crowded_figure",
+        "out_of_picture",
+        "on_target",
+    }
 
 
 def test_a_robot_off_its_place_in_a_grid_is_named() -> None:
@@ -108,9 +115,10 @@ def test_a_robot_off_its_place_in_a_grid_is_named() -> None:
     points = plan.formation.points.copy()
     points[4] += (60, 0)
     (finding,) = certify(points, plan.formation.contract, SITE).findings
-    assert (finding.code, finding.robot) == ("off_grid", 5)
+    assert (finding.kind, finding.robot) == ("off_grid", 5)
     points[4] = plan.formation.points[7] + (3, 0)
-    assert [f.code for f in certify(points, plan.formation.contract, SITE).findings] == ["off_grid"]
+    (finding,) = certify(points, plan.formation.contract, SITE).findings
+    assert (finding.kind, finding.robot, finding.others) == ("same_place", 8, (5,))
 
 
 def test_a_form_by_a_target_keeps_off_it_or_stays_in_it() -> None:
@@ -163,8 +171,8 @@ def test_the_side_that_faces_the_other_is_lined() -> None:
     assert plan.verdict.findings == ()
     assert plan.formation.points[:, 0] == pytest.approx(410, abs=0.2)
     turned = plan.formation.points * (-1, 1) + (940, 0)
-    codes = {f.code for f in certify(turned, plan.formation.contract, SITE).findings}
-    assert "wrong_side" in codes
+    kinds = {f.kind for f in certify(turned, plan.formation.contract, SITE).findings}
+    assert "wrong_side" in kinds
 
 
 @given(st.floats(0, 6.28))

@@ -65,8 +65,8 @@ def test_as_many_as_fit_are_certified_as_partial(group: dict[str, object]) -> No
         make_plan(contract(group), SITE, "s")
     assert plan.partial.placed <= caught.value.fits < plan.partial.asked
     assert plan.partial.placed >= 0.9 * caught.value.fits
-    assert plan.partial.short == f"{plan.partial.placed} of {plan.partial.asked}"
-    assert plan.partial.short.replace("of", "of the") in plan.partial.sentence
+    assert plan.partial.short(None) == f"{plan.partial.placed} of {plan.partial.asked}"
+    assert plan.partial.short(None).replace("of", "of the") in plan.partial.sentence
 
 
 def test_each_group_gets_what_fits() -> None:
@@ -171,7 +171,12 @@ def test_a_proposal_names_the_partial_plan_which_only_a_person_may_have_driven()
     with pytest.raises(ToolError, match=r"only 4 robots fit.*4 of the 6 robots") as caught:
         call(work, "propose_formation", contract={"groups": [group]})
     (plan,) = work.plans.values()
-    assert plan.id in str(caught.value)
+    assert caught.value.kind == "capacity"
+    assert (caught.value.facts["robots_that_fit"], caught.value.facts["partial_plan"]) == (
+        4,
+        plan.id,
+    )
+    assert str(caught.value).startswith(caught.value.facts["plain"])
     for named in ({"plan_id": plan.id}, {}):
         with pytest.raises(ToolError, match=r"partial \(4 of 6\)"):
             call(work, "deploy", **named)
@@ -193,4 +198,4 @@ def test_a_ring_the_picture_cuts_open_is_offered_nearer() -> None:
     assert data["certified"] is False
     partial_id, shown = list(work.plans)
     assert shown == data["plan_id"]
-    assert partial_id in data["partial"]
+    assert data["partial"]["plan_id"] == partial_id
