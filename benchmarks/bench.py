@@ -6,7 +6,7 @@ OpenCV, shapely, scipy or Pillow on the same data; the ratio is what formup adds
 
 import asyncio
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,12 +21,11 @@ from scipy.spatial.distance import cdist
 
 from ..evals.tasks.photographs import load_tasks
 from ..tools.builtin import TOOLS
+from ..tools.context import Context, Services
 from ..tools.geometry.outline import FloatArray, distances, outline_of
 from ..tools.perception.contours import mask_of_outline
 from ..tools.perception.image import load_picture, picture_from_array
 from ..tools.perception.target_prompt import TargetPrompt
-from ..tools.scene import Scene
-from ..tools.world import Workspace
 from .growth import Work, best, growth
 
 SIZE = (1920, 1080)
@@ -42,136 +41,154 @@ Case = tuple[str, dict[str, Any], tuple[str, Work]]
 
 def main() -> None:
     """Print the table and how the times grow."""
-    workspace = _workspace(SIZE)
+    context = _with_plan(_with_targets(SIZE))
     print(f"{SIZE[0]} x {SIZE[1]} px, CPU milliseconds, best of {REPEATS}")  # noqa: T201
     print(f"{'tool':20} {'formup':>9} {'bare':>9} {'ratio':>7}  bare calls")  # noqa: T201
-    for case in _cases(workspace):
+    for case in _cases(context):
         name, _, (words, bare) = case
-        ours, theirs = _timed(workspace, case), best(bare, REPEATS)
+        ours, theirs = _timed(context, case), best(bare, REPEATS)
         print(f"{name:20} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.1f}  {words}")  # noqa: T201
     print(f"\n{'growth':28} fitted")  # noqa: T201
-    for line in _growths(workspace):
+    for line in _growths(context):
         print(line, flush=True)  # noqa: T201
 
 
-def _growths(workspace: Workspace) -> Iterator[str]:
+def _growths(context: Context) -> Iterator[str]:
     """Every tool against the picture's pixels; those that place robots against their number."""
     sizes = [(round(SIZE[0] * share), round(SIZE[1] * share)) for share in SIDES]
     pixels = [width * height for width, height in sizes]
-    spaces = [_workspace(size) for size in sizes]
-    for cases in zip(*map(_cases, spaces), strict=True):
-        found = [_timed(w, case) for w, case in zip(spaces, cases, strict=True)]
-        yield growth(cases[0][0], "pixels", pixels, found)
-    for cases in zip(*(_cases(workspace, n) for n in TEAMS), strict=True):
-        if cases[0][0] in PLACING:
-            found = [_timed(workspace, case) for case in cases]
-            yield growth(cases[0][0], "robots", TEAMS, found)
+    yield from _growth("pixels", pixels, [_with_plan(_with_targets(size)) for size in sizes])
+    yield from _growth("robots", TEAMS, [_with_plan(context, n) for n in TEAMS], PLACING)
 
 
-def _timed(workspace: Workspace, case: Case) -> float:
+def _growth(
+    what: str, numbers: Sequence[int], contexts: list[Context], names: Sequence[str] | None = None
+) -> Iterator[str]:
+    for cases in zip(*map(_cases, contexts), strict=True):
+        if names is None or cases[0][0] in names:
+            found = [_timed(c, case) for c, case in zip(contexts, cases, strict=True)]
+            yield growth(cases[0][0], what, numbers, found)
+
+
+def _timed(context: Context, case: Case) -> float:
     name, arguments, _ = case
     tool = next(t for t in TOOLS if t.name == name.partition(" ")[0])
-    return best(lambda: asyncio.run(tool.call(_anew(workspace), arguments)), REPEATS)
+    return best(lambda: asyncio.run(tool.call(_anew(context), arguments)), REPEATS)
 
 
-def _anew(workspace: Workspace) -> Workspace:
-    """The workspace with outlines that have nothing computed and kept from an earlier call."""
-    targets = (replace(t, outline=outline_of(t.outline.polygon)) for t in workspace.scene.targets)
-    scene = replace(workspace.scene, targets=tuple(targets))
-    return replace(workspace, scene=scene, found=None)
+def _anew(context: Context) -> Context:
+    """The context with nothing in it that was computed and cached by an earlier call."""
+    targets = tuple(
+        t.model_copy(update={"outline": outline_of(t.outline.polygon)})
+        for t in context.world.targets
+    )
+    services = Services(pictures=context.services.pictures)
+    return replace(context, world=context.world.having(targets=targets), services=services)
 
 
-def _workspace(size: tuple[int, int]) -> Workspace:
+def _with_targets(size: tuple[int, int]) -> Context:
     """The two cars at a width and height, px, the red one segmented as t1, the other as t2."""
     task = next(t for t in load_tasks() if t.image.stem == "cars_two" and t.other)
     photo = load_picture(task.image)
     scale = np.array(size) / (photo.width, photo.height)
-    workspace = Workspace(
-        Scene(picture_from_array(np.asarray(cv2.resize(photo.pixels, size), dtype=np.uint8)))
+    context = Context.of(
+        picture_from_array(np.asarray(cv2.resize(photo.pixels, size), dtype=np.uint8))
     )
-    segment = next(t for t in TOOLS if t.name == "segment")
     assert task.other is not None
     for name, thing in (("t1", task.target), ("t2", task.other)):
         box = np.asarray(thing.outline.bounds) * np.tile(scale, 2)
-        asyncio.run(segment.call(workspace, {"id": name, "box": box.tolist()}))
-    box = workspace.scene.target("t1").box
-    return replace(workspace, pointed=(TargetPrompt(id="t3", box=box),))  # for locate_object
+        context = _after(context, "segment", {"id": name, "box": box.tolist()})
+    pointed = TargetPrompt(id="t3", box=context.world.target("t1").box)  # for locate_object
+    return context.at(context.world.having(pointed=(pointed,)))
 
 
-def _cases(workspace: Workspace, robots: int = ROBOTS) -> list[Case]:
-    size = workspace.scene.picture.width, workspace.scene.picture.height
-    box = [round(v) for v in workspace.scene.target("t1").box]
+def _after(context: Context, name: str, arguments: dict[str, Any]) -> Context:
+    """The context after a call of a tool."""
+    tool = next(t for t in TOOLS if t.name == name)
+    world = asyncio.run(tool.call(context, arguments)).world
+    return context if world is None else context.at(world)
+
+
+def _with_plan(context: Context, robots: int = ROBOTS) -> Context:
+    """The context with a plan around the red car."""
+    group = {"relation": "around", "targets": ["t1"], "robots": robots}
+    return _after(context, "propose_formation", {"contract": {"groups": [group]}})
+
+
+def _cases(context: Context) -> list[Case]:
+    size = context.picture.width, context.picture.height
+    box = [round(v) for v in context.world.target("t1").box]
+    plan = context.world.plan().plan
+    robots = plan.formation.contract.robots
     group = {"relation": "around", "targets": ["t1"], "robots": robots}
     probes = np.random.default_rng(0).uniform((0, 0), size, (PROBES, 2))
-    propose = next(t for t in TOOLS if t.name == "propose_formation")
-    plan = asyncio.run(propose.call(workspace, {"contract": {"groups": [group]}})).data["plan_id"]
-    points = workspace.plans[plan].formation.points
+    points = plan.formation.points
     return [
-        *_seeing_cases(workspace, box),
+        *_seeing_cases(context, box),
         (
             "describe_shape",
             {"target": "t1"},
-            ("findContours, approxPolyDP, minAreaRect", _bare_describe(workspace)),
+            ("findContours, approxPolyDP, minAreaRect", _bare_describe(context)),
         ),
         (
             "check_point",
             {"target": "t1", "points": probes.tolist()},
-            ("shapely contains, distance", _bare_check(workspace, probes)),
+            ("shapely contains, distance", _bare_check(context, probes)),
         ),
         (
             "sample_along_edges",
             {"target": "t1", "n": robots},
-            ("shapely buffer, interpolate", _bare_ring(workspace)),
+            ("shapely buffer, interpolate", _bare_ring(context)),
         ),
         (
             "sample_inside",
             {"target": "t1", "n": robots},
-            ("4 x 40 cKDTree queries of 6000 cells", _bare_inside(workspace)),
+            ("4 x 40 cKDTree queries of 6000 cells", _bare_inside(context)),
         ),
         (
             "sample_shape",
             {"kind": "between", "n": robots // 3, "targets": ["t1", "t2"]},
-            ("shapely difference, interpolate", _bare_between(workspace)),
+            ("shapely difference, interpolate", _bare_between(context)),
         ),
-        ("measure", {"a": "t1", "b": "t2"}, ("shapely distance", _bare_measure(workspace))),
+        ("measure", {"a": "t1", "b": "t2"}, ("shapely distance", _bare_measure(context))),
         (
             "propose_formation",
             {"contract": {"groups": [group]}},
-            ("shapely buffer, distance; cKDTree", _bare_propose(workspace)),
+            ("shapely buffer, distance; cKDTree", _bare_propose(context)),
         ),
         (
             "deploy",
-            {"plan_id": plan},
-            ("scipy assignment, shapely intersects", _bare_deploy(workspace, points)),
+            {"plan_id": plan.id},
+            ("scipy assignment, shapely intersects", _bare_deploy(context, points)),
         ),
     ]
 
 
-def _seeing_cases(workspace: Workspace, box: list[int]) -> list[Case]:
-    cut = ("bilateral, 5 x GrabCut at 160 px", lambda: _bare_segment(workspace, box))
+def _seeing_cases(context: Context, box: list[int]) -> list[Case]:
+    cut = ("bilateral, 5 x GrabCut at 160 px", lambda: _bare_segment(context, box))
     return [
-        ("look", {}, ("Pillow resize, PNG", lambda: _bare_look(workspace))),
+        ("look", {}, ("Pillow resize, PNG", lambda: _bare_look(context))),
         ("locate_object", {}, cut),
         (
             "locate_object query",
             {"query": {"colours": ["red"], "picks": [{"by": "largest"}]}},
-            ("k-means, 150 thresholds at 384 px, contours", lambda: _bare_candidates(workspace)),
+            ("k-means, 150 thresholds at 384 px, contours", lambda: _bare_candidates(context)),
         ),
         ("segment", {"id": "t1", "box": box}, cut),
     ]
 
 
-def _bare_look(workspace: Workspace) -> bytes:
+def _bare_look(context: Context) -> bytes:
     buffer = io.BytesIO()
-    image = Image.fromarray(workspace.scene.picture.pixels)
+    image = Image.fromarray(context.picture.pixels)
     image.resize((1500, 844)).save(buffer, "PNG")
     return buffer.getvalue()
 
 
-def _bare_segment(workspace: Workspace, box: list[int]) -> object:
+def _bare_segment(context: Context, box: list[int]) -> object:
     x0, y0, x1, y1 = box
     reach_x, reach_y = (x1 - x0) // 4, (y1 - y0) // 4
-    crop = workspace.scene.picture.pixels[
+    crop = context.picture.pixels[
         max(y0 - reach_y, 0) : y1 + reach_y, max(x0 - reach_x, 0) : x1 + reach_x
     ]
     scale = 160 / max(crop.shape[:2])
@@ -187,9 +204,9 @@ def _bare_segment(workspace: Workspace, box: list[int]) -> object:
     return labels
 
 
-def _bare_candidates(workspace: Workspace) -> int:
+def _bare_candidates(context: Context) -> int:
     """The regions of every threshold of three channels and of the distances to nine colours."""
-    small = cv2.resize(workspace.scene.picture.pixels[::2, ::2], (384, 216))
+    small = cv2.resize(context.picture.pixels[::2, ::2], (384, 216))
     smooth = np.asarray(cv2.bilateralFilter(small, 7, 40, 5), dtype=np.float32)
     lab = np.asarray(cv2.cvtColor(smooth / 255, cv2.COLOR_RGB2LAB), dtype=np.float32)
     cues: list[NDArray[np.float32]] = [lab[..., k] for k in range(3)]
@@ -209,9 +226,9 @@ def _bare_candidates(workspace: Workspace) -> int:
     return found
 
 
-def _bare_describe(workspace: Workspace) -> Work:
-    picture = workspace.scene.picture
-    mask = mask_of_outline(workspace.scene.target("t1").outline, picture.width, picture.height)
+def _bare_describe(context: Context) -> Work:
+    picture = context.picture
+    mask = mask_of_outline(context.world.target("t1").outline, picture.width, picture.height)
     raster = mask.astype(np.uint8)
 
     def work() -> object:
@@ -221,14 +238,14 @@ def _bare_describe(workspace: Workspace) -> Work:
     return work
 
 
-def _bare_check(workspace: Workspace, probes: FloatArray) -> Work:
-    polygon = workspace.scene.target("t1").outline.polygon
+def _bare_check(context: Context, probes: FloatArray) -> Work:
+    polygon = context.world.target("t1").outline.polygon
     edge = polygon.boundary
     return lambda: (shapely.contains_xy(polygon, probes), distances(edge, probes))
 
 
-def _bare_ring(workspace: Workspace) -> Callable[[], FloatArray]:
-    filled = workspace.scene.target("t1").outline.filled
+def _bare_ring(context: Context) -> Callable[[], FloatArray]:
+    filled = context.world.target("t1").outline.filled
 
     def work() -> FloatArray:
         loop = shapely.LineString(shapely.get_coordinates(filled.buffer(80)))
@@ -238,8 +255,8 @@ def _bare_ring(workspace: Workspace) -> Callable[[], FloatArray]:
     return work
 
 
-def _bare_inside(workspace: Workspace) -> Work:
-    x0, y0, x1, y1 = workspace.scene.target("t1").outline.bounds
+def _bare_inside(context: Context) -> Work:
+    x0, y0, x1, y1 = context.world.target("t1").outline.bounds
     random = np.random.default_rng(0)
     cells = random.uniform((x0, y0), (x1, y1), (6000, 2))
     robots = random.uniform((x0, y0), (x1, y1), (ROBOTS, 2))
@@ -250,8 +267,8 @@ def _bare_inside(workspace: Workspace) -> Work:
     return work
 
 
-def _bare_between(workspace: Workspace) -> Work:
-    a, b = (workspace.scene.target(t).outline.filled for t in ("t1", "t2"))
+def _bare_between(context: Context) -> Work:
+    a, b = (context.world.target(t).outline.filled for t in ("t1", "t2"))
 
     def work() -> object:
         line = shapely.LineString([a.centroid, b.centroid]).difference(shapely.union(a, b))
@@ -261,14 +278,14 @@ def _bare_between(workspace: Workspace) -> Work:
     return work
 
 
-def _bare_measure(workspace: Workspace) -> Work:
-    a, b = (workspace.scene.target(t).outline.polygon for t in ("t1", "t2"))
+def _bare_measure(context: Context) -> Work:
+    a, b = (context.world.target(t).outline.polygon for t in ("t1", "t2"))
     return lambda: shapely.distance(a, b)
 
 
-def _bare_propose(workspace: Workspace) -> Work:
-    filled = workspace.scene.target("t1").outline.filled
-    ring = _bare_ring(workspace)
+def _bare_propose(context: Context) -> Work:
+    filled = context.world.target("t1").outline.filled
+    ring = _bare_ring(context)
 
     def work() -> object:
         points = ring()
@@ -277,8 +294,8 @@ def _bare_propose(workspace: Workspace) -> Work:
     return work
 
 
-def _bare_deploy(workspace: Workspace, goals: FloatArray) -> Work:
-    filled = workspace.scene.target("t1").outline.filled
+def _bare_deploy(context: Context, goals: FloatArray) -> Work:
+    filled = context.world.target("t1").outline.filled
     starts = np.random.default_rng(0).uniform((0, 0), SIZE, goals.shape)
 
     def work() -> object:

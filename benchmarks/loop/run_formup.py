@@ -7,15 +7,14 @@ from formup.agent.messages import User
 from formup.agent.model import Model
 from formup.agent.outcomes import Answered
 from formup.agent.providers.registry import model_named
+from formup.tools.context import Context
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene
 from formup.tools.tool import ToolResult, tool
-from formup.tools.world import Workspace
 from pydantic import BaseModel
 from task import SYSTEM, USER, compute
 
 UNLIMITED = Limits(requests=None, tool_calls=None)
-WORKSPACE = Workspace(Scene(picture_from_array(np.full((20, 20, 3), 60, np.uint8))))
+CONTEXT = Context.of(picture_from_array(np.full((20, 20, 3), 60, np.uint8)))
 _models: dict[tuple[str, bool], Model] = {}
 
 
@@ -28,7 +27,7 @@ class Point(BaseModel):
 
 
 @tool("read")
-async def check_points(workspace: Workspace, points: list[Point]) -> ToolResult:
+async def check_points(context: Context, points: list[Point]) -> ToolResult:
     """Count the points that lie inside the unit circle.
 
     Args:
@@ -51,7 +50,7 @@ def _model(base_url: str, streams: bool) -> Model:
 async def _run(model: Model) -> str:
     first = (User(text=USER),)
     tools = (check_points,)
-    outcome = await converse(model, tools, WORKSPACE, first, system=SYSTEM, limits=UNLIMITED)
+    outcome = await converse(model, tools, CONTEXT, first, system=SYSTEM, limits=UNLIMITED)
     assert isinstance(outcome, Answered), outcome
     return outcome.text
 
