@@ -6,7 +6,7 @@ first robot to and fro by `way` px along x, so there has to be room for that.
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing, suppress
 from typing import TypeVar
 
@@ -96,9 +96,7 @@ async def check_stop(fleet: Fleet, way: float, tolerance: float) -> None:
     async with aclosing(fleet.drive(await _motion(fleet, way))) as moving:
         await anext(moving)
         await fleet.stop()
-        with suppress(FleetStoppedError):
-            async for _ in moving:
-                pass
+        await _refused(_rest(moving), FleetStoppedError, "going on after a stop")
     assert fleet.stopped, "the fleet does not say that it is stopped"
     held = await _held_on_the_way(fleet, start, way, tolerance)
     for _ in range(2):
@@ -107,6 +105,18 @@ async def check_stop(fleet: Fleet, way: float, tolerance: float) -> None:
     await _stands(fleet, held, tolerance)
     await fleet.release()
     assert not fleet.stopped, "the fleet does not say that it is released"
+    await check_arrival(fleet, way, tolerance)
+
+
+async def check_release(fleet: Fleet, way: float, tolerance: float) -> None:
+    """Robots that were stopped do not go on because the stop is released."""
+    start = _places(await fleet.observe())
+    async with aclosing(fleet.drive(await _motion(fleet, way))) as moving:
+        await anext(moving)
+        await fleet.stop()
+        await fleet.release()
+        await _refused(_rest(moving), FleetStoppedError, "going on after a release")
+    await _held_on_the_way(fleet, start, way, tolerance)
     await check_arrival(fleet, way, tolerance)
 
 
@@ -145,8 +155,7 @@ async def check_one_drive(fleet: Fleet, way: float, tolerance: float) -> None:
     async with aclosing(fleet.drive(motion)) as moving:
         await anext(moving)
         await _refused(anext(fleet.drive(motion)), FleetBusyError, "a second drive")
-        async for _ in moving:
-            pass
+        await _rest(moving)
     (robot, path), *_ = motion.paths.items()
     poses = {pose.id: (pose.x, pose.y) for pose in await fleet.observe()}
     assert math.dist(poses[robot], path[-1]) <= tolerance, "the first drive did not go on"
@@ -177,6 +186,7 @@ CHECKS: tuple[Check, ...] = (
     check_times,
     check_arrival,
     check_stop,
+    check_release,
     check_closed_drive,
     check_cancelled_drive,
     check_one_drive,
@@ -197,6 +207,11 @@ async def _motion(fleet: Fleet, way: float) -> Motion:
 
 async def _driven(fleet: Fleet, way: float) -> list[Poses]:
     return [poses async for poses in fleet.drive(await _motion(fleet, way))]
+
+
+async def _rest(moving: AsyncIterator[Poses]) -> None:
+    async for _ in moving:
+        pass
 
 
 async def _stands(fleet: Fleet, places: FloatArray, tolerance: float) -> None:

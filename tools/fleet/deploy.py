@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict
 
 from ..errors import FleetError, ToolError
 from ..formation.checking.check import certify
-from ..formation.contract import Contract, with_defaults
+from ..formation.contract import MIN_SPACING, Contract, with_defaults
 from ..formation.placement.place import Site
 from ..formation.plan import Plan, Point
 from ..geometry.assignment import assign
@@ -200,6 +200,7 @@ class _Drive:
     ) -> None:
         self._goals, self._contract, self._site = goals, contract, site
         self._fleet, self._robots, self._watch = fleet, tuple(robots), watch
+        self._radius = max(contract.robot_radius, fleet.radius or 0.0)
         self._tolerance = max(ARRIVED_PX, ARRIVED_SHARE * float(np.hypot(*site.room)))
         self._poses: dict[str, Pose] = {}
         self._frames: list[FloatArray] = []
@@ -276,7 +277,7 @@ class _Drive:
         """Refuse a plan with a place that a robot stands on which is not to be driven."""
         for pose in self._idle():
             away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
-            if away.min() < self._contract.spacing_floor:
+            if away.min() < max(2 * self._radius, MIN_SPACING):
                 raise PlaceTakenError(
                     f"Robot {pose.id}, which has no place in the plan, stands {away.min():.1f} px "
                     f"from place {int(away.argmin()) + 1}; propose the formation again.",
@@ -288,8 +289,8 @@ class _Drive:
             self._points(),
             self._goals,
             obstacles(self._contract, self._site),
-            self._contract.robot_radius,
-            self._site.frame(self._contract.robot_radius),
+            self._radius,
+            self._site.frame(self._radius),
             idle=_positions(self._idle()),
         )
         return Motion(dict(zip(self._robots, paths, strict=True)))
@@ -302,7 +303,7 @@ class _Drive:
 
     def _report(self, corrections: int, error: FleetError | None = None) -> Deployment:
         reason = str(error) if error else None
-        if self._fleet.stopped:
+        if self._fleet.stopped or isinstance(error, FleetStoppedError):
             ended: Ended = "stopped"
             reason = reason or f"The fleet {self._fleet.name} was stopped."
         elif error:

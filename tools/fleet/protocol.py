@@ -125,12 +125,12 @@ class Fleet(Protocol):
     def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
         """Drive, and yield the poses of all robots as they go, as they are really seen.
 
-        Ends when all robots stand: because they have come to the ends of their paths, or because
-        of `stop`. Closing the generator, or cancelling the task that awaits it, stops the robots
-        where they are, without latching.
+        Ends when the robots have come to the ends of their paths. Closing the generator, or
+        cancelling the task that awaits it, stops the robots where they are, without latching.
+        However it ends, all robots stand.
 
         Raises:
-            FleetStoppedError: the stop was in force when it began.
+            FleetStoppedError: the stop is in force, or came on the way, even if released since.
             FleetBusyError: another drive has not ended.
             RobotsFailedError: robots that do not exist, or that cannot go on.
         """

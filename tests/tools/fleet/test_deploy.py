@@ -253,7 +253,7 @@ def test_a_stop_ends_a_deployment_where_the_robots_are_and_lasts_until_released(
     )
     arrival = deployment.arrival
     assert (arrival.arrived, arrival.ended, arrival.corrections) == (False, "stopped", 0)
-    assert arrival.reason == "The fleet simulated was stopped."
+    assert arrival.reason == "The simulated fleet was stopped on the way."
     assert len(frames) <= 10 + 1 + 1  # one more period, and the last observation
     assert frames[-1] == deployment.poses
     assert max(arrival.residual_px) > 10 * arrival.tolerance_px
@@ -268,6 +268,35 @@ def test_a_stop_ends_a_deployment_where_the_robots_are_and_lasts_until_released(
         return await deploy(plan, SITE, fleet, robots)
 
     assert asyncio.run(again()).arrival.arrived
+
+
+def test_robots_that_were_stopped_do_not_go_on_when_the_stop_is_released_at_once() -> None:
+    async def brake(fleet: SimulatedFleet) -> None:
+        await fleet.stop()
+        await fleet.release()
+
+    deployment, frames = interrupted(10, lambda fleet: asyncio.ensure_future(brake(fleet)))
+    assert (deployment.arrival.arrived, deployment.arrival.ended) == (False, "stopped")
+    assert len(frames) <= 10 + 1 + 1
+
+
+def test_robots_stand_when_whoever_watches_them_fails() -> None:
+    plan, fleet = planned(GROUPS[0]), opened(planned(GROUPS[0]))
+    seen: list[float] = []
+
+    def watch(poses: tuple[Pose, ...]) -> None:
+        seen.append(poses[0].seen)
+        if len(seen) == 10:
+            raise OSError("the disk is full")
+
+    async def go() -> None:
+        robots = await assigned(plan, fleet)
+        with pytest.raises(OSError, match="disk"):
+            await deploy(plan, SITE, fleet, robots, watch=watch)
+        assert (await fleet.observe())[0].seen == seen[-1]
+        assert (await deploy(plan, SITE, fleet, robots)).arrival.arrived, "nothing is held"
+
+    asyncio.run(go())
 
 
 def test_a_cancelled_deployment_leaves_the_robots_where_they_are_and_says_where() -> None:
