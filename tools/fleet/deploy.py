@@ -26,6 +26,7 @@ from .protocol import (
     PlaceTakenError,
     Pose,
     RobotsFailedError,
+    points_of,
 )
 
 CORRECTIONS = 5
@@ -122,7 +123,7 @@ def assign_robots(poses: Sequence[Pose], places: FloatArray) -> Assigned:
             available=len(poses),
             needed=len(places),
         )
-    points = _positions(poses)
+    points = points_of(poses)
     chosen = np.arange(len(poses))
     if len(poses) > len(places):
         chosen = _least_squares_choice(points, places)
@@ -267,7 +268,7 @@ class _Drive:
         self._watch(tuple(self._poses.values()))
 
     def _points(self) -> FloatArray:
-        return _positions([self._poses[robot] for robot in self._robots])
+        return points_of([self._poses[robot] for robot in self._robots])
 
     def _idle(self) -> list[Pose]:
         taking_part = set(self._robots)
@@ -291,7 +292,7 @@ class _Drive:
             obstacles(self._contract, self._site),
             self._radius,
             self._site.frame(self._radius),
-            idle=_positions(self._idle()),
+            idle=points_of(self._idle()),
         )
         return Motion(dict(zip(self._robots, paths, strict=True)))
 
@@ -324,8 +325,3 @@ class _Drive:
         )
         track = Track(self._robots, np.stack([*self._frames, points]))
         return Deployment(arrival, tuple(self._poses.values()), track)
-
-
-def _positions(poses: Sequence[Pose]) -> FloatArray:
-    """Positions, (n, 2) px."""
-    return np.array([(pose.x, pose.y) for pose in poses], dtype=float).reshape(-1, 2)

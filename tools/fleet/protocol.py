@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -178,6 +179,11 @@ class FleetRequest:
 
 
 FleetFactory = Callable[[FleetRequest], Fleet]
+
+
+def points_of(poses: Sequence[Pose]) -> FloatArray:
+    """Positions, (n, 2) px."""
+    return np.array([(pose.x, pose.y) for pose in poses], dtype=float).reshape(-1, 2)
 
 
 def check_ages(poses: Sequence[Pose], now: float, max_age: float | None) -> None:

@@ -26,6 +26,7 @@ from .protocol import (
     Pose,
     RobotsFailedError,
     check_ages,
+    points_of,
 )
 
 MAX_ROBOTS = 1_000
@@ -59,7 +60,7 @@ class SimulatedFleet:
     ) -> None:
         self.radius, self.stopped = radius, False
         self._ids = tuple(pose.id for pose in poses)
-        self._points = np.array([(p.x, p.y) for p in poses], dtype=float).reshape(-1, 2)
+        self._points = points_of(poses)
         self._headings = tuple(pose.heading for pose in poses)
         self._now = max((pose.seen for pose in poses), default=0.0)
         self._step = speed * PERIOD
@@ -182,7 +183,7 @@ def _staying(request: FleetRequest) -> dict[str, Pose]:
     known, solid, radius = request.known, request.solid, request.radius
     if request.driven or not known or solid.is_empty:
         return {pose.id: pose for pose in known}
-    points = np.array([(pose.x, pose.y) for pose in known], dtype=float)
+    points = points_of(known)
     if request.starts is not None:
         checked_starts(points, len(points), Frame(*request.size), solid, radius)
     free = distances(solid, points) > radius

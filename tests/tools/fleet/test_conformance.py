@@ -176,14 +176,14 @@ class OpenAfterClosing(SimulatedFleet):
 
 BROKEN = [
     (Reorders, "ids or their order"),
-    (IgnoresAge, "too old"),
+    (IgnoresAge, "that are too old must be refused"),
     (Silent, "not seen on its way"),
     (DrivesOn, "as if it had not been stopped"),
     (NeverLatches, "does not say that it is stopped"),
     (NeverStops, "going on after a stop must be refused"),
     (EndsQuietly, "going on after a stop must be refused"),
-    (GoesOnWhenReleased, "going on after a release must be refused"),
-    (LatchesOnClosing, "has latched the stop"),
+    (GoesOnWhenReleased, "going on after a stop must be refused"),
+    (LatchesOnClosing, "early has latched the stop"),
     (DrivesTwice, "a second drive must be refused"),
     (ForgivesUnknownRobots, "a robot that does not exist must be refused"),
     (SendsEverybody, "moved that was not sent"),
