@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict
 
 from ..errors import FleetError, ToolError
 from ..formation.checking.check import certify
-from ..formation.contract import Contract, with_defaults
+from ..formation.contract import MIN_SPACING, Contract, with_defaults
 from ..formation.placement.place import Site
 from ..formation.plan import Plan, Point
 from ..geometry.assignment import assign
@@ -26,6 +26,7 @@ from .protocol import (
     PlaceTakenError,
     Pose,
     RobotsFailedError,
+    points_of,
 )
 
 CORRECTIONS = 5
@@ -124,7 +125,7 @@ def assign_robots(poses: Sequence[Pose], places: FloatArray) -> Assigned:
             available=len(poses),
             needed=len(places),
         )
-    points = _positions(poses)
+    points = points_of(poses)
     chosen = np.arange(len(poses))
     if len(poses) > len(places):
         chosen = _least_squares_choice(points, places)
@@ -202,6 +203,7 @@ class _Drive:
     ) -> None:
         self._goals, self._contract, self._site = goals, contract, site
         self._fleet, self._robots, self._watch = fleet, tuple(robots), watch
+        self._radius = max(contract.robot_radius, fleet.radius or 0.0)
         self._tolerance = max(ARRIVED_PX, ARRIVED_SHARE * float(np.hypot(*site.room)))
         self._poses: dict[str, Pose] = {}
         self._frames: list[FloatArray] = []
@@ -268,7 +270,7 @@ class _Drive:
         self._watch(tuple(self._poses.values()))
 
     def _points(self) -> FloatArray:
-        return _positions([self._poses[robot] for robot in self._robots])
+        return points_of([self._poses[robot] for robot in self._robots])
 
     def _idle(self) -> list[Pose]:
         taking_part = set(self._robots)
@@ -278,7 +280,7 @@ class _Drive:
         """Refuse a plan with a place that a robot stands on which is not to be driven."""
         for pose in self._idle():
             away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
-            if away.min() < self._contract.spacing_floor:
+            if away.min() < max(2 * self._radius, MIN_SPACING):
                 raise PlaceTakenError(
                     f"Robot {pose.id}, which has no place in the plan, stands {away.min():.1f} px "
                     f"from place {int(away.argmin()) + 1}; propose the formation again.",
@@ -290,9 +292,9 @@ class _Drive:
             self._points(),
             self._goals,
             obstacles(self._contract, self._site),
-            self._contract.robot_radius,
-            self._site.frame(self._contract.robot_radius),
-            idle=_positions(self._idle()),
+            self._radius,
+            self._site.frame(self._radius),
+            idle=points_of(self._idle()),
         )
         return Motion(dict(zip(self._robots, paths, strict=True)))
 
@@ -304,7 +306,7 @@ class _Drive:
 
     def _report(self, corrections: int, error: FleetError | None = None) -> Deployment:
         reason = str(error) if error else None
-        if self._fleet.stopped:
+        if self._fleet.stopped or isinstance(error, FleetStoppedError):
             ended: Ended = "stopped"
             reason = reason or f"The fleet {self._fleet.name} was stopped."
         elif error:
@@ -325,8 +327,3 @@ class _Drive:
         )
         track = Track(self._robots, np.stack([*self._frames, points]))
         return Deployment(arrival, tuple(self._poses.values()), track)
-
-
-def _positions(poses: Sequence[Pose]) -> FloatArray:
-    """Positions, (n, 2) px."""
-    return np.array([(pose.x, pose.y) for pose in poses], dtype=float).reshape(-1, 2)

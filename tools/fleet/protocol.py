@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -125,12 +126,12 @@ class Fleet(Protocol):
     def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
         """Drive, and yield the poses of all robots as they go, as they are really seen.
 
-        Ends when all robots stand: because they have come to the ends of their paths, or because
-        of `stop`. Closing the generator, or cancelling the task that awaits it, stops the robots
-        where they are, without latching.
+        Ends when the robots have come to the ends of their paths. Closing the generator, or
+        cancelling the task that awaits it, stops the robots where they are, without latching.
+        However it ends, all robots stand.
 
         Raises:
-            FleetStoppedError: the stop was in force when it began.
+            FleetStoppedError: the stop is in force, or came on the way, even if released since.
             FleetBusyError: another drive has not ended.
             RobotsFailedError: robots that do not exist, or that cannot go on.
         """
@@ -178,6 +179,11 @@ class FleetRequest:
 
 
 FleetFactory = Callable[[FleetRequest], Fleet]
+
+
+def points_of(poses: Sequence[Pose]) -> FloatArray:
+    """Positions, (n, 2) px."""
+    return np.array([(pose.x, pose.y) for pose in poses], dtype=float).reshape(-1, 2)
 
 
 def check_ages(poses: Sequence[Pose], now: float, max_age: float | None) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import math
 from collections.abc import AsyncGenerator, Sequence
+from itertools import count, islice
 
 import numpy as np
 import shapely
@@ -25,6 +26,7 @@ from .protocol import (
     Pose,
     RobotsFailedError,
     check_ages,
+    points_of,
 )
 
 MAX_ROBOTS = 1_000
@@ -58,12 +60,13 @@ class SimulatedFleet:
     ) -> None:
         self.radius, self.stopped = radius, False
         self._ids = tuple(pose.id for pose in poses)
-        self._points = np.array([(p.x, p.y) for p in poses], dtype=float).reshape(-1, 2)
+        self._points = points_of(poses)
         self._headings = tuple(pose.heading for pose in poses)
         self._now = max((pose.seen for pose in poses), default=0.0)
         self._step = speed * PERIOD
         self._random = np.random.default_rng(seed)
         self._driving = self._closed = False
+        self._stops = 0
 
     async def observe(self, *, max_age: float | None = None) -> tuple[Pose, ...]:
         """Exact poses now."""
@@ -82,21 +85,23 @@ class SimulatedFleet:
         covered = 1 - SLIP * self._random.random(len(paths))
         longest = max(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in paths)
         steps = max(math.ceil(longest / self._step), 1)
-        self._driving = True
+        self._driving, stops = True, self._stops
         try:
             for step in range(1, steps + 1):
-                if self.stopped or self._closed:
-                    return
                 self._points[moving] = along(paths, step / steps * covered)
                 self._now += PERIOD
                 yield self._seen()
                 await asyncio.sleep(0)  # unpaced, but whoever wants to stop it gets a turn
+                self._check_open()
+                if self._stops != stops:
+                    raise FleetStoppedError("The simulated fleet was stopped on the way.")
         finally:
             self._driving = False
 
     async def stop(self) -> None:
         """Hold all robots where they are, until `release`."""
         self.stopped = True
+        self._stops += 1
 
     async def release(self) -> None:
         """Lift the stop."""
@@ -149,35 +154,40 @@ def open_fleet(request: FleetRequest) -> SimulatedFleet:
 
 
 def _set_down(request: FleetRequest) -> list[Pose]:
-    """Poses of at least as many robots as are wanted."""
-    frame, solid, radius = Frame(*request.size), request.solid, request.radius
+    """Poses of at least as many robots as are wanted: those that stay, others spread out."""
+    frame, radius = Frame(*request.size), request.radius
     if not request.known and request.starts is not None:
-        starts = checked_starts(request.starts, request.robots, frame, solid, radius)
-        return [Pose(str(i), float(x), float(y)) for i, (x, y) in enumerate(starts, start=1)]
-    standing = {pose.id: pose for pose in request.known}
-    points = np.array([(p.x, p.y) for p in request.known], dtype=float).reshape(-1, 2)
-    order = list(standing)
-    if standing and not request.driven:
-        if request.starts is not None:
-            checked_starts(points, len(points), frame, solid, radius)
-        elif not solid.is_empty:
-            off = distances(solid, points) > radius
-            standing = {p.id: p for p, free in zip(request.known, off, strict=True) if free}
-    number = 1
-    while len(order) < request.robots:
-        if str(number) not in order:
-            order.append(str(number))
-        number += 1
-    missing = [robot for robot in order if robot not in standing]
+        points = checked_starts(request.starts, request.robots, frame, request.solid, radius)
+        return [Pose(str(i), float(x), float(y)) for i, (x, y) in enumerate(points, start=1)]
+    ids = [pose.id for pose in request.known]
+    unused = (name for i in count(1) if (name := str(i)) not in ids)
+    ids = [*ids, *islice(unused, max(request.robots - len(ids), 0))]
+    placed = _staying(request)
+    missing = [robot for robot in ids if robot not in placed]
     if missing:
-        bodies = [shapely.Point(p.x, p.y).buffer(radius + START_GAP) for p in standing.values()]
-        taken = shapely.union_all([solid, *bodies]) if bodies else solid
-        now = max((p.seen for p in request.known), default=0.0)
-        for robot, (x, y) in zip(
-            missing, spread_starts(len(missing), frame, taken, radius), strict=True
-        ):
-            standing[robot] = Pose(robot, float(x), float(y), None, now)
-    return [standing[robot] for robot in order]
+        bodies = [shapely.Point(p.x, p.y).buffer(radius + START_GAP) for p in placed.values()]
+        taken = shapely.union_all([request.solid, *bodies]) if bodies else request.solid
+        now = max((pose.seen for pose in request.known), default=0.0)
+        points = spread_starts(len(missing), frame, taken, radius)
+        for robot, (x, y) in zip(missing, points, strict=True):
+            placed[robot] = Pose(robot, float(x), float(y), None, now)
+    return [placed[robot] for robot in ids]
+
+
+def _staying(request: FleetRequest) -> dict[str, Pose]:
+    """Known robots by id, without those never driven that would stand on something solid.
+
+    Raises:
+        InputError: such a robot stands where a person wanted it.
+    """
+    known, solid, radius = request.known, request.solid, request.radius
+    if request.driven or not known or solid.is_empty:
+        return {pose.id: pose for pose in known}
+    points = points_of(known)
+    if request.starts is not None:
+        checked_starts(points, len(points), Frame(*request.size), solid, radius)
+    free = distances(solid, points) > radius
+    return {pose.id: pose for pose, is_free in zip(known, free, strict=True) if is_free}
 
 
 def spread_starts(n: int, frame: Frame, solid: BaseGeometry, radius: float) -> FloatArray:

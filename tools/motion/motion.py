@@ -76,17 +76,17 @@ def routes(
         NoRouteError: a goal is walled off.
     """
     ends = np.concatenate([starts, goals])
-    exits = _exits(starts, goals, solid, radius, frame, _bodies(idle, ends, radius))
+    exits = _exit_points(starts, goals, solid, radius, frame, _bodies(idle, ends, radius))
     bodies = _bodies(idle, np.concatenate([ends, exits]), radius)
-    paths = _past(exits, goals, solid, radius, frame, bodies)
+    paths = _paths_past(exits, goals, solid, radius, frame, bodies)
     leaving = np.flatnonzero((exits != starts).any(axis=1))
-    ways_out = _past(starts[leaving], exits[leaving], Polygon(), radius, frame, bodies)
+    ways_out = _paths_past(starts[leaving], exits[leaving], Polygon(), radius, frame, bodies)
     for i, way_out in zip(leaving, ways_out, strict=True):
         paths[i] = np.concatenate([way_out[:-1], paths[i]])
     return paths
 
 
-def _exits(
+def _exit_points(
     starts: FloatArray,
     goals: FloatArray,
     solid: BaseGeometry,
@@ -118,7 +118,7 @@ def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
     return np.asarray(discs, dtype=object)
 
 
-def _past(
+def _paths_past(
     starts: FloatArray,
     goals: FloatArray,
     solid: BaseGeometry,
@@ -127,7 +127,7 @@ def _past(
     bodies: Bodies,
 ) -> list[FloatArray]:
     """Shortest paths past the obstacles and those bodies that would be in the way."""
-    paths = _around(starts, goals, solid, radius, frame, bodies[:0])
+    paths = _paths_around(starts, goals, solid, radius, frame, bodies[:0])
     if not len(bodies) or not len(paths):
         return paths
     tree, cluster = shapely.STRtree(bodies), _clusters(bodies)
@@ -139,7 +139,7 @@ def _past(
             return paths
         again = np.unique(blocked)
         in_the_way |= np.isin(cluster, cluster[hit])
-        found = _around(starts[again], goals[again], solid, radius, frame, bodies[in_the_way])
+        found = _paths_around(starts[again], goals[again], solid, radius, frame, bodies[in_the_way])
         for i, path in zip(again, found, strict=True):
             paths[i] = path
 
@@ -154,7 +154,7 @@ def _clusters(bodies: Bodies) -> NDArray[np.intp]:
     return np.asarray(connected_components(graph)[1], dtype=np.intp)
 
 
-def _around(
+def _paths_around(
     starts: FloatArray,
     goals: FloatArray,
     solid: BaseGeometry,

@@ -56,6 +56,8 @@ class Carts:
             while not going.done():
                 yield await self.observe()
                 await asyncio.sleep(PERIOD_S)
+            if going.cancelled():
+                raise FleetStoppedError("The carts were stopped on the way.")
             yield await self.observe()
         finally:
             self._hold()

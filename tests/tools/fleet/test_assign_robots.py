@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 from formup.tools.fleet.deploy import assign_robots
-from formup.tools.fleet.protocol import FleetSizeError, Pose
+from formup.tools.fleet.protocol import FleetSizeError, Pose, points_of
 from formup.tools.geometry.outline import FloatArray
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,7 +24,7 @@ def test_no_other_choice_of_robots_has_shorter_squared_ways(n: int, more: int, s
     assigned = assign_robots(poses, places)
     assert len(set(assigned.robots)) == n
     assert assigned.gap is None
-    points = np.array([(pose.x, pose.y) for pose in poses])
+    points = points_of(poses)
     cost = ((points[:, None] - places) ** 2).sum(axis=2)
     least = min(cost[list(some), range(n)].sum() for some in permutations(range(n + more), n))
     taken = [int(robot[1:]) for robot in assigned.robots]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from formup.tools.errors import InputError
 from formup.tools.fleet.conformance import check_fleet
-from formup.tools.fleet.protocol import FleetRequest, Motion, Pose
+from formup.tools.fleet.protocol import FleetRequest, FleetStoppedError, Motion, Pose
 from formup.tools.fleet.registry import FLEETS
 from formup.tools.fleet.simulated import SimulatedFleet
 
@@ -108,17 +108,32 @@ class DrivesOn(SimulatedFleet):
 
 
 class NeverLatches(SimulatedFleet):
+    async def stop(self) -> None:
+        await super().stop()
+        self.stopped = False
+
+
+class EndsQuietly(SimulatedFleet):
     async def drive(self, motion: Motion) -> AsyncGenerator[Poses, None]:
-        async for poses in super().drive(motion):
-            yield poses
-            if self.stopped:
-                self.stopped = False
-                return
+        moved = False
+        try:
+            async for poses in super().drive(motion):
+                yield poses
+                moved = True
+        except FleetStoppedError:
+            if not moved:
+                raise
+
+
+class GoesOnWhenReleased(SimulatedFleet):
+    async def release(self) -> None:
+        await super().release()
+        self._stops = 0
 
 
 class NeverStops(SimulatedFleet):
     async def stop(self) -> None:
-        pass
+        self.stopped = True
 
 
 class LatchesOnClosing(SimulatedFleet):
@@ -161,12 +176,14 @@ class OpenAfterClosing(SimulatedFleet):
 
 BROKEN = [
     (Reorders, "ids or their order"),
-    (IgnoresAge, "too old"),
+    (IgnoresAge, "that are too old must be refused"),
     (Silent, "not seen on its way"),
     (DrivesOn, "as if it had not been stopped"),
     (NeverLatches, "does not say that it is stopped"),
-    (NeverStops, "does not say that it is stopped"),
-    (LatchesOnClosing, "has latched the stop"),
+    (NeverStops, "going on after a stop must be refused"),
+    (EndsQuietly, "going on after a stop must be refused"),
+    (GoesOnWhenReleased, "going on after a stop must be refused"),
+    (LatchesOnClosing, "early has latched the stop"),
     (DrivesTwice, "a second drive must be refused"),
     (ForgivesUnknownRobots, "a robot that does not exist must be refused"),
     (SendsEverybody, "moved that was not sent"),

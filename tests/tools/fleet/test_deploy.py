@@ -24,6 +24,7 @@ from formup.tools.fleet.protocol import (
     PlaceTakenError,
     Pose,
     RobotsFailedError,
+    points_of,
 )
 from formup.tools.fleet.simulated import PERIOD, SimulatedFleet, open_fleet
 from formup.tools.formation.contract import Contract, Group
@@ -95,10 +96,6 @@ def driven(plan: Plan, fleet: Fleet) -> tuple[Deployment, Frames]:
     return asyncio.run(go()), frames
 
 
-def places(poses: tuple[Pose, ...]) -> FloatArray:
-    return np.array([(pose.x, pose.y) for pose in poses])
-
-
 @pytest.mark.parametrize("group", GROUPS, ids=lambda g: str(g["relation"]))
 def test_everyone_arrives_and_no_body_is_ever_on_a_target(group: dict[str, object]) -> None:
     plan = planned(group)
@@ -117,7 +114,7 @@ def test_everyone_arrives_and_no_body_is_ever_on_a_target(group: dict[str, objec
     )
     assert frames[-1] == deployment.poses
     for frame in frames:
-        assert shapely.distance(solid_of(plan), shapely.points(places(frame))).min() > RADIUS
+        assert shapely.distance(solid_of(plan), shapely.points(points_of(frame))).min() > RADIUS
 
 
 def test_the_track_shows_the_way_from_the_start_to_the_last_observation() -> None:
@@ -186,12 +183,12 @@ def test_another_number_of_robots_is_refused(robots: str) -> None:
 @pytest.mark.parametrize("place", [(300, 300), (203, 160), (201, 329), (198, 200), (530, 240)])
 def test_a_robot_that_stands_on_a_target_leaves_it_first(place: tuple[float, float]) -> None:
     plan = planned(GROUPS[0])
-    starts = places(asyncio.run(opened(plan).observe()))
+    starts = points_of(asyncio.run(opened(plan).observe()))
     starts[4] = place
     deployment, frames = driven(plan, standing(starts))
     assert deployment.arrival.arrived
     for robot in range(9):
-        path = np.array([places(frame)[robot] for frame in frames])
+        path = np.array([points_of(frame)[robot] for frame in frames])
         free = distances(solid_of(plan), path) > RADIUS
         assert free.all() or robot == 4
         assert free[np.argmax(free) :].all(), "once off the target, it stays off"
@@ -203,7 +200,7 @@ def test_robots_inside_a_target_come_out_to_surround_it() -> None:
     assert driven(inside, fleet)[0].arrival.arrived
     deployment, frames = driven(around, fleet)
     assert deployment.arrival.arrived
-    first, last = (distances(solid_of(around), places(frames[i])) for i in (0, -1))
+    first, last = (distances(solid_of(around), points_of(frames[i])) for i in (0, -1))
     assert first.max() <= RADIUS < last.min()
 
 
@@ -218,8 +215,8 @@ def test_idle_robots_stay_and_are_driven_around() -> None:
     deployment = asyncio.run(deployed)
     assert deployment.arrival.arrived
     for frame in frames:
-        assert np.array_equal(places(frame)[4:], starts[4:])
-        apart = np.linalg.norm(places(frame)[:4, None] - starts[4:], axis=2)
+        assert np.array_equal(points_of(frame)[4:], starts[4:])
+        apart = np.linalg.norm(points_of(frame)[:4, None] - starts[4:], axis=2)
         assert apart.min() >= 2 * RADIUS
 
 
@@ -253,7 +250,7 @@ def test_a_stop_ends_a_deployment_where_the_robots_are_and_lasts_until_released(
     )
     arrival = deployment.arrival
     assert (arrival.arrived, arrival.ended, arrival.corrections) == (False, "stopped", 0)
-    assert arrival.reason == "The fleet simulated was stopped."
+    assert arrival.reason == "The simulated fleet was stopped on the way."
     assert len(frames) <= 10 + 1 + 1  # one more period, and the last observation
     assert frames[-1] == deployment.poses
     assert max(arrival.residual_px) > 10 * arrival.tolerance_px
@@ -268,6 +265,35 @@ def test_a_stop_ends_a_deployment_where_the_robots_are_and_lasts_until_released(
         return await deploy(plan, SITE, fleet, robots)
 
     assert asyncio.run(again()).arrival.arrived
+
+
+def test_robots_that_were_stopped_do_not_go_on_when_the_stop_is_released_at_once() -> None:
+    async def brake(fleet: SimulatedFleet) -> None:
+        await fleet.stop()
+        await fleet.release()
+
+    deployment, frames = interrupted(10, lambda fleet: asyncio.ensure_future(brake(fleet)))
+    assert (deployment.arrival.arrived, deployment.arrival.ended) == (False, "stopped")
+    assert len(frames) <= 10 + 1 + 1
+
+
+def test_robots_stand_when_whoever_watches_them_fails() -> None:
+    plan, fleet = planned(GROUPS[0]), opened(planned(GROUPS[0]))
+    seen: list[float] = []
+
+    def watch(poses: tuple[Pose, ...]) -> None:
+        seen.append(poses[0].seen)
+        if len(seen) == 10:
+            raise OSError("the disk is full")
+
+    async def go() -> None:
+        robots = await assigned(plan, fleet)
+        with pytest.raises(OSError, match="disk"):
+            await deploy(plan, SITE, fleet, robots, watch=watch)
+        assert (await fleet.observe())[0].seen == seen[-1]
+        assert (await deploy(plan, SITE, fleet, robots)).arrival.arrived, "nothing is held"
+
+    asyncio.run(go())
 
 
 def test_a_cancelled_deployment_leaves_the_robots_where_they_are_and_says_where() -> None:

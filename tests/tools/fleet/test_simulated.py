@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from formup.tools.errors import InputError
-from formup.tools.fleet.protocol import FleetRequest, FleetSizeError, Motion, Pose
+from formup.tools.fleet.protocol import FleetRequest, FleetSizeError, Motion, Pose, points_of
 from formup.tools.fleet.simulated import (
     MAX_ROBOTS,
     PERIOD,
@@ -37,10 +37,6 @@ SOLID = shapely.union(
 
 def poses_of(fleet: SimulatedFleet) -> tuple[Pose, ...]:
     return asyncio.run(fleet.observe())
-
-
-def places(poses: tuple[Pose, ...]) -> FloatArray:
-    return np.array([(pose.x, pose.y) for pose in poses]).reshape(-1, 2)
 
 
 def request(robots: int, **more: object) -> FleetRequest:
@@ -81,7 +77,7 @@ def test_spread_starts_are_free_apart_and_in_the_picture(n: int) -> None:
         assert min_spacing(starts) >= 2 * RADIUS
     assert np.array_equal(checked_starts(starts, n, FRAME, SOLID, RADIUS), starts)
     opened = poses_of(open_fleet(request(n)))
-    assert np.array_equal(places(opened), starts)
+    assert np.array_equal(points_of(opened), starts)
     assert [pose.id for pose in opened] == [str(i) for i in range(1, n + 1)]
 
 
@@ -115,8 +111,8 @@ def test_known_robots_stay_and_the_missing_are_set_down_beside_them(
     assert opened[: len(known)] == known
     assert [pose.id for pose in opened] == [str(i) for i in range(1, max(len(known), want) + 1)]
     if len(opened) > 1:
-        assert min_spacing(places(opened)) > 2 * RADIUS
-    assert shapely.distance(SOLID, shapely.points(places(opened))).min() > RADIUS
+        assert min_spacing(points_of(opened)) > 2 * RADIUS
+    assert shapely.distance(SOLID, shapely.points(points_of(opened))).min() > RADIUS
 
 
 def test_only_robots_never_driven_are_set_down_anew_off_a_new_target() -> None:
@@ -126,14 +122,14 @@ def test_only_robots_never_driven_are_set_down_anew_off_a_new_target() -> None:
     assert (moved[0], moved[2]) == (known[0], known[2])
     assert solid.distance(shapely.Point(moved[1].x, moved[1].y)) > RADIUS
     assert poses_of(open_fleet(request(3, known=known, solid=solid, driven=True))) == known
-    starts = places(known)
+    starts = points_of(known)
     with pytest.raises(InputError, match="Robot 2 starts"):
         open_fleet(request(3, known=known, solid=solid, starts=starts))
 
 
 def test_robots_drive_in_step_at_a_finite_speed_and_slip() -> None:
     fleet = open_fleet(request(3, seed=4))
-    before = places(poses_of(fleet))
+    before = points_of(poses_of(fleet))
     ends = before + np.array([(300.0, 0), (100, 0), (0, 0)])
     paths = np.stack([before, ends], axis=1)
 
@@ -147,7 +143,7 @@ def test_robots_drive_in_step_at_a_finite_speed_and_slip() -> None:
     assert [frame[0].seen for frame in frames] == pytest.approx(
         PERIOD * np.arange(1, len(frames) + 1)
     )
-    moved = np.array([places(frame) for frame in frames]) - before
+    moved = np.array([points_of(frame) for frame in frames]) - before
     covered = moved[-1, :2, 0] / (300, 100)
     assert ((covered >= 1 - SLIP) & (covered <= 1)).all()
     assert covered[0] != covered[1]

@@ -165,7 +165,7 @@ def test_idle_robots_are_driven_around(name: str, radius: float, count: int, see
             for p in (path, other)
         )
         assert nearest >= body - 1e-9
-        if without > 1.01 * body:
+        if without > 1.01 * body and not solid.contains(shapely.Point(start)):
             assert path == pytest.approx(other), "nobody is in the way"
 
 
