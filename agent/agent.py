@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from ..prompts import PromptLibrary
 from ..tools.builtin import TOOLS
@@ -42,6 +42,21 @@ from .wrappers.two_stages import offered, prompt_named, staged
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
+
+
+class SayOptions(TypedDict, total=False):
+    """What may be given with words; see `Agent.asay`."""
+
+    pointed: Sequence[TargetPrompt]
+    settings: Settings | None
+    show: Show | None
+
+
+class RunOptions(SayOptions, total=False):
+    """What may be given with the first words; see `Agent.arun`."""
+
+    targets: Sequence[Target]
+    trace: Path | None
 
 
 class Agent:
@@ -103,32 +118,13 @@ class Agent:
             self.tools = tuple(traced_tool(tool, tracer) for tool in tools)
         self.offered = offered(self.tools, None if planner else self.prompt)
 
-    def run(
-        self,
-        picture: Picture,
-        instruction: str,
-        *,
-        pointed: Sequence[TargetPrompt] = (),
-        targets: Sequence[Target] = (),
-        settings: Settings | None = None,
-        trace: Path | None = None,
-        show: Show | None = None,
-    ) -> Run:
+    def run(self, picture: Picture, instruction: str, **options: Unpack[RunOptions]) -> Run:
         """Carry out one instruction; the synchronous door to `arun`.
 
         Raises:
             InputError: something given cannot be used.
         """
-        made = self.arun(
-            picture,
-            instruction,
-            pointed=pointed,
-            targets=targets,
-            settings=settings,
-            trace=trace,
-            show=show,
-        )
-        return self._sync(made)
+        return self._sync(self.arun(picture, instruction, **options))
 
     async def arun(
         self,
@@ -166,21 +162,13 @@ class Agent:
             recorder.event("session", self._facts(picture, context) if log else {})
             return await self._turn(context, (), instruction, pointed, recorder, trace)
 
-    def say(
-        self,
-        run: Run,
-        words: str,
-        *,
-        pointed: Sequence[TargetPrompt] = (),
-        settings: Settings | None = None,
-        show: Show | None = None,
-    ) -> Run:
+    def say(self, run: Run, words: str, **options: Unpack[SayOptions]) -> Run:
         """The next turn of a session; the synchronous door to `asay`.
 
         Raises:
             InputError: something given cannot be used.
         """
-        return self._sync(self.asay(run, words, pointed=pointed, settings=settings, show=show))
+        return self._sync(self.asay(run, words, **options))
 
     async def asay(
         self,

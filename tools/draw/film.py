@@ -40,7 +40,8 @@ from .captions import (
     left_text,
     make_page,
 )
-from .marks import draw_outline, draw_robots, robot_size
+from .marks import draw_idle_robots, draw_outline, draw_robots, robot_size
+from .overlay import idle_robots
 
 SIDE = 640
 """Greatest side of a frame, page px."""
@@ -93,7 +94,8 @@ def draw_deployment(
     for name in plan.formation.contract.target_ids:
         draw_outline(page.canvas, world.target(name).outline)
     radius = robot_size(page.canvas, goals)
-    _draw_goals(page.canvas, goals, radius)
+    _draw_goals(page.canvas, plan, radius)
+    draw_idle_robots(page.canvas, idle_robots(world, plan), radius)
     draw_bars(page)
     return [
         _frame(page.canvas, frames[max(i - TRAIL, 0) : i + 1], goals, radius, (i, len(frames)))
@@ -130,13 +132,14 @@ def _long(picture: Picture) -> int:
     return int(factor * max(picture.size))
 
 
-def _draw_goals(canvas: Canvas, goals: FloatArray, radius: float) -> None:
+def _draw_goals(canvas: Canvas, plan: Plan, radius: float) -> None:
+    goals = plan.formation.points
     for goal in goals:
         canvas.circle(goal, radius, WHITE, max(0.15 * radius, 0.7))
     if not _numbered(len(goals), radius):
         return
-    for robot, goal in enumerate(canvas.at(goals), start=1):
-        canvas.text(goal, str(robot), 1.2 * radius, WHITE)
+    for robot, goal in zip(plan.formation.robot_of_place, canvas.at(goals), strict=True):
+        canvas.text(goal, robot, 1.2 * radius, WHITE)
 
 
 def _numbered(count: int, radius: float) -> bool:
@@ -155,7 +158,7 @@ def _frame(
     last = step[0] == step[1] - 1
     if not last and len(recent) > 1 and len(now) <= TRAILED:
         canvas.trails(np.stack(recent), ALLOWED, 0.5 * radius)
-    draw_robots(canvas, dict(enumerate(now, start=1)), radius)
+    draw_robots(canvas, {str(i): point for i, point in enumerate(now)}, radius)
     if _numbered(len(now), radius):
         for robot, centre in enumerate(canvas.at(now), start=1):
             canvas.text(centre, str(robot), 1.25 * radius, WHITE, ROBOT)

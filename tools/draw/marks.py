@@ -22,6 +22,7 @@ from .canvas import (
     ALLOWED,
     FINDING,
     FORBIDDEN,
+    IDLE,
     INK,
     PAPER,
     ROBOT,
@@ -141,13 +142,13 @@ def target_room(contract: Contract, site: Site, points: FloatArray) -> float:
 
 
 def draw_robots(
-    canvas: Canvas, points: Mapping[int, FloatArray], radius: float, flagged: Collection[int] = ()
+    canvas: Canvas, points: Mapping[str, FloatArray], radius: float, flagged: Collection[str] = ()
 ) -> None:
     """Discs on the robots' exact places.
 
     Args:
         canvas: what to draw on.
-        points: robot, from 1, to its place, (2,), image pixels.
+        points: robot to its place, (2,), image pixels.
         radius: of the discs, units of the page.
         flagged: robots to draw in red with a cross, above the others.
     """
@@ -162,11 +163,11 @@ def draw_robots(
 
 def number_robots(
     canvas: Canvas,
-    points: Mapping[int, FloatArray],
+    points: Mapping[str, FloatArray],
     radius: float,
     labels: Labels,
-    away: Mapping[int, FloatArray],
-    flagged: Collection[int] = (),
+    away: Mapping[str, FloatArray],
+    flagged: Collection[str] = (),
 ) -> None:
     """Numbers in the discs where they fit and no cross is, else beside them.
 
@@ -184,21 +185,27 @@ def number_robots(
         return
     for robot, centre in on_page.items():
         if radius >= NUMBER_RADIUS and robot not in flagged:
-            canvas.text(centre, str(robot), 1.25 * radius, WHITE, ROBOT)
+            canvas.text(centre, robot, 1.25 * radius, WHITE, ROBOT)
         else:
-            size = canvas.text_size(str(robot), LABEL)
+            size = canvas.text_size(robot, LABEL)
             where = labels.place(centre, size, away[robot], reach)
-            canvas.text(where, str(robot), LABEL, WHITE, INK)
+            canvas.text(where, robot, LABEL, WHITE, INK)
 
 
-def directions(contract: Contract, site: Site, points: FloatArray) -> dict[int, FloatArray]:
-    """Robot, from 1, to the way off its target, (2,), zero where there is none such."""
-    ways: dict[int, FloatArray] = {}
+def draw_idle_robots(canvas: Canvas, points: Mapping[str, FloatArray], radius: float) -> None:
+    """Grey discs where robots stand that have no place in a plan."""
+    for point in points.values():
+        canvas.disc(point, radius, IDLE, float(np.clip(0.17 * radius, 0.6, 1.9)))
+
+
+def directions(contract: Contract, site: Site, points: FloatArray) -> list[FloatArray]:
+    """For each place the way off its target, (2,), zero where there is none such."""
+    ways: list[FloatArray] = []
     for part in parts_of(contract, points, site):
         off = part.group.relation in OUTSIDE
-        for k, point in enumerate(part.points):
+        for point in part.points:
             way = point - np.asarray(part.outline.centre) if off else np.zeros(2)
-            ways[part.first + k + 1] = way
+            ways.append(way)
     return ways
 
 

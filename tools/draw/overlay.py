@@ -25,6 +25,7 @@ from .marks import (
     directions,
     draw_areas,
     draw_guides,
+    draw_idle_robots,
     draw_outline,
     draw_robots,
     label_openings,
@@ -94,7 +95,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
     if plan.verdict.escape is not None:
         draw_escape(canvas, plan.verdict.escape, site)
     labels = Labels(canvas.photo)
-    _draw_robots(canvas, plan, site, labels)
+    _draw_robots(canvas, world, plan, labels)
     if drivable:
         label_openings(canvas, contract, site, points, labels)
     draw_bars(page)
@@ -150,7 +151,7 @@ def draw_world(
     for target, colour in zip(world.targets, colours[:count], strict=True):
         draw_outline(canvas, target.outline, colour)
     if plan is not None:
-        _draw_robots(canvas, plan, world.site(plan.formation.contract), labels)
+        _draw_robots(canvas, world, plan, labels)
     draw_numbered(canvas, candidates, colours[count:], labels)
     for target, colour in zip(world.targets, colours[:count], strict=True):
         _draw_tag(canvas, target.id, target.box, colour, labels)
@@ -166,22 +167,31 @@ def _near(points: FloatArray, site: Site) -> NDArray[np.bool_]:
     return np.all(np.abs(points) <= NEAR * max(site.room), axis=1)
 
 
-def _draw_robots(canvas: Canvas, plan: Plan, site: Site, labels: Labels) -> None:
-    """Discs and numbers; the labels learn where they are."""
+def _draw_robots(canvas: Canvas, world: World, plan: Plan, labels: Labels) -> None:
+    """Discs and the robots' numbers; the labels learn where they are."""
     contract, points = plan.formation.contract, plan.formation.points
+    site, names = world.site(contract), plan.formation.robot_of_place
     near = _near(points, site)
     if not near.any():
         return
-    shown = {int(i) + 1: points[i] for i in np.flatnonzero(near)}
-    flagged = {f.robot for f in plan.verdict.findings if f.robot is not None}
+    shown = {names[i]: points[i] for i in np.flatnonzero(near)}
+    flagged = {str(f.robot) for f in plan.verdict.findings if f.robot is not None}
     room = target_room(contract, site, points) if near.all() else np.inf
-    sound = near & ~np.isin(np.arange(1, len(points) + 1), list(flagged))
+    sound = near & ~np.isin(names, list(flagged))
     radius = robot_size(canvas, points[sound if sound.any() else near], room)
     for point in shown.values() if contract.robot_radius > 0 else ():
         canvas.body(point, contract.robot_radius)
+    draw_idle_robots(canvas, idle_robots(world, plan), radius)
     draw_robots(canvas, shown, radius, flagged)
-    away = directions(contract, site, points)
+    away = dict(zip(names, directions(contract, site, points), strict=True))
     number_robots(canvas, shown, radius, labels, away, flagged)
+
+
+def idle_robots(world: World, plan: Plan) -> dict[str, FloatArray]:
+    """Robots without a place in a plan that has robots, and where they stand, (2,) px."""
+    busy = set(plan.formation.robots)
+    idle = [pose for pose in world.robots if busy and pose.id not in busy]
+    return {pose.id: np.array([pose.x, pose.y]) for pose in idle}
 
 
 def _badge(plan: Plan, scale: float | None) -> tuple[str, Colour]:
