@@ -7,7 +7,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import ApprovalError, FleetError, StorageError, ToolError
-from ..fleet.deploy import MAX_AGE, Arrival, Track, assign_robots, deploy
+from ..fleet.deploy import MAX_AGE, Arrival, Assigned, Track, assign_robots, deploy
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
 from ..fleet.registry import FLEETS
 from ..formation.contract import Contract
@@ -15,6 +15,10 @@ from ..formation.plan import Plan
 from ..motion.motion import obstacles
 from ..tool import in_thread
 from ..world import PlanNode, World
+
+
+MOST_NAMED = 12
+"""Idle robots that a note names."""
 
 
 async def with_robots(context: Context, node: PlanNode) -> World:
@@ -38,14 +42,25 @@ async def with_robots(context: Context, node: PlanNode) -> World:
             raise ToolError(str(error), "too_many_robots") from None
         return world.with_plan(node)  # more than are simulated can be planned
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
+    if notes := _notes(found, poses):
+        verdict = plan.verdict.model_copy(update={"notes": (*plan.verdict.notes, *notes)})
+        plan = plan.model_copy(update={"verdict": verdict})
+    return world.having(robots=poses).with_plan(node.model_copy(update={"plan": plan}))
+
+
+def _notes(found: Assigned, poses: tuple[Pose, ...]) -> list[str]:
+    """What is to be said of who takes which place."""
+    notes: list[str] = []
     if found.gap is not None:
-        note = (
+        notes.append(
             "Which robot takes which place is approximate: another assignment could save "
             f"{found.gap:.2%} of the summed squared ways at most."
         )
-        verdict = plan.verdict.model_copy(update={"notes": (*plan.verdict.notes, note)})
-        plan = plan.model_copy(update={"verdict": verdict})
-    return world.having(robots=poses).with_plan(node.model_copy(update={"plan": plan}))
+    idle = [pose.id for pose in poses if pose.id not in set(found.robots)]
+    if idle:
+        shown = ", ".join(idle[:MOST_NAMED]) + (", ..." if len(idle) > MOST_NAMED else "")
+        notes.append(f"Without a place, staying where they are: {len(idle)} robots ({shown}).")
+    return notes
 
 
 async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World]:
