@@ -16,7 +16,6 @@ from ..motion.motion import obstacles
 from ..tool import in_thread
 from ..world import PlanNode, World
 
-
 MOST_NAMED = 12
 """Idle robots that a note names."""
 
