@@ -341,6 +341,15 @@ def test_edits_that_make_no_sense_say_why(name: str, edit: Edit, said: str) -> N
         after(PLANS[name], edit)
 
 
+def test_a_clearance_that_an_edit_would_leave_none_of_is_refused() -> None:
+    group = {"relation": "shape", "targets": ["t3"], "robots": 6, "clearance": [1, 2]}
+    drawn = {"shape": {"kind": "circle", "where": "inside"}}
+    contract = Contract(groups=(Group.model_validate(group | drawn),))
+    plan = make_plan(contract, SITE, "s")
+    with pytest.raises(ToolError, match=r"cannot be changed so: clearance \(0\.0, 0\.0\)"):
+        after(plan, Offset(kind="out", px=2.1))
+
+
 def test_with_several_groups_it_has_to_be_said_which_is_meant() -> None:
     for edit in (Add(n=1), Remove(n=1), SideOnly(side="left")):
         with pytest.raises(ToolError, match="Say which of the groups 1 to 2"):
