@@ -253,9 +253,9 @@ def _after_proposal(task: Task, result: Result, history: History) -> Reply:
         return _impossible(history, reason, result.facts.get("partial_plan"))
     plan = json.loads(result.text)
     if not plan["certified"]:
-        partial = plan.get("partial", {"plan_id": plan["plan_id"]})
-        reason = [*plan["findings"], *([partial["sentence"]] if "sentence" in partial else [])]
-        return _impossible(history, " ".join(reason), partial["plan_id"])
+        partial = plan.get("partial")
+        reason = [*plan["findings"], *([partial["sentence"]] if partial else [])]
+        return _impossible(history, " ".join(reason), (partial or plan)["plan_id"])
     if task.deploy:
         return _call(history, "deploy", {"plan_id": plan["plan_id"]})
     return Reply(text=f"{_planned(plan, history)} Nothing was moved.")

@@ -10,8 +10,9 @@ from ..fleet.deploy import deploy as drive
 from ..fleet.simulated import SimulatedFleet
 from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
-from ..formation.placement.partial import REFUSALS, Refusal, best_partial
+from ..formation.placement.partial import best_partial
 from ..formation.plan import Plan, make_plan
+from ..formation.site import PlacementError
 from ..formation.units import contract_in_pixels, length_text, with_metres
 from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
@@ -96,7 +97,7 @@ def _planned(workspace: Workspace, held: Contract, places: Any) -> Plan:
     scene = workspace.scene
     try:
         return make_plan(held, scene.site(held), scene.version, places)
-    except REFUSALS as error:
+    except PlacementError as error:
         partial = _partial(workspace, held, error)
         if partial is None:
             raise
@@ -199,7 +200,7 @@ def _keep(workspace: Workspace, plan: Plan) -> None:
 
 
 def _partial(
-    workspace: Workspace, held: Contract, refusal: Refusal | None
+    workspace: Workspace, held: Contract, refusal: PlacementError | None
 ) -> dict[str, str] | None:
     """Keep the best partial plan: its id and what there is to say of it; None where none is."""
     plan = best_partial(held, workspace.scene.site(held), workspace.scene.version, refusal)

@@ -16,37 +16,8 @@ from ...errors import ToolError
 from ...geometry.outline import FloatArray
 from ..placement.place import Site
 from ..plan import Plan, make_plan
-from .edit_kinds import (
-    Add,
-    Edit,
-    Mirror,
-    Offset,
-    Remove,
-    Rotate,
-    Scale,
-    Shift,
-    SideOnly,
-    Skip,
-    Swap,
-)
+from .edit_kinds import Add, Edit, Offset, Remove, SideOnly, Skip, Swap
 from .edit_rules import RULES, Part, closed_up, skipped
-
-__all__ = [
-    "Add",
-    "Diff",
-    "Edit",
-    "Edited",
-    "Mirror",
-    "Offset",
-    "Remove",
-    "Rotate",
-    "Scale",
-    "Shift",
-    "SideOnly",
-    "Skip",
-    "Swap",
-    "edited",
-]
 
 IntArray = NDArray[np.intp]
 
