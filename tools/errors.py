@@ -28,13 +28,12 @@ Kind = Literal[
     "void_plan",
     "too_many_robots",
 ]
-"""capacity: a group has more robots than fit (`robots_that_fit`); cage: they cannot be placed
-escape-proof (`robots_that_fit`, `robots_needed` where it is known); crowded: two groups stand in
-each other's way (`groups`, from 1); no_room_beside: a form has no room on a side of a target;
-low_confidence: a mask is below the threshold (`confidence`, `threshold`); count: another number of
-robots than the person gave; unknown_target, unknown_plan: no such id; void_plan: the world has
-changed since; too_many_robots: more than can be driven. The first three may have
-`partial_plan`, the id of a plan that is certified for less."""
+"""capacity: more robots than fit (`robots_that_fit`); cage: none that is escape-proof
+(`robots_that_fit`, `robots_needed`); crowded: two groups in each other's way (`groups`, from 1);
+each may have `partial_plan`, the id of a plan certified for less. no_room_beside: a form has no
+room on that side of a target; low_confidence: no mask that is sure enough (`confidence`,
+`threshold`); count: another number of robots than the person gave; unknown_target, unknown_plan:
+no such id; void_plan: the world has changed since; too_many_robots: more than can be driven."""
 
 
 class FormupError(Exception):

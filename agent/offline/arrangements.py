@@ -58,7 +58,7 @@ def understand(instruction: str, metres_per_pixel: float | None = None) -> Readi
     """Read an instruction in English about a picture of a scale, if it has one."""
     lengths = _Lengths(instruction, metres_per_pixel)
     spoken = lengths.cut("apart", "across", "radius")
-    words = _without_ignored(_words(ASIDE.sub(" ", QUESTION.sub(" ", spoken))))
+    words = _without_ignored(_stems(ASIDE.sub(" ", QUESTION.sub(" ", spoken))))
     side = next(iter(_matches("sides", words)), None)
     relations = _unbeaten(_matches("relations", words))
     if not relations:
@@ -132,7 +132,7 @@ def _vocabulary() -> dict[str, Any]:
     return yaml.safe_load(text)
 
 
-def _words(text: str) -> Words:
+def _stems(text: str) -> Words:
     return [_stem(word) for word in re.findall(r"[a-z']+|[0-9.]+|[;!?]", text.lower())]
 
 

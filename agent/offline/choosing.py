@@ -66,7 +66,7 @@ def _find(things: Sequence[Reference], needed: int, history: History) -> list[Fo
         return _ask_all(f"Which thing is the arrangement about: {named}?", history)
     found: list[Found] = []
     for thing in things[: needed - len(chosen)] if not chosen else ():
-        one = _one(thing, history)
+        one = _choose_one(thing, history)
         if isinstance(one, Step):
             return one
         found.append(one)
@@ -102,7 +102,7 @@ def _answers(message: User | Reply | Result, call: Call) -> bool:
     return isinstance(message, Result) and message.call_id == call.id
 
 
-def _one(thing: Reference, history: History) -> Found | Step:
+def _choose_one(thing: Reference, history: History) -> Found | Step:
     """The one candidate a description means, or what to do to learn it."""
     trouble = _trouble(thing)
     if trouble:

@@ -19,9 +19,9 @@ MIDDLE_OF_PICTURE = {
 
 def difference(words: Words, at: int) -> tuple[str, int] | None:
     """The kind of oddness that a run of words speaks of, a pick, and the run's length."""
-    end = _run(words, at, _difference_words())
+    end = _run_end(words, at, _difference_words())
     while end > at:
-        pick = _difference(set(words[at:end]), words[end - 1])
+        pick = _spoken_difference(set(words[at:end]), words[end - 1])
         if pick is not None:
             return pick, end - at
         end -= 1
@@ -30,7 +30,7 @@ def difference(words: Words, at: int) -> tuple[str, int] | None:
 
 def position(words: Words, at: int) -> tuple[str, int] | None:
     """The place in the picture that a run of words speaks of, a pick, and the run's length."""
-    end = _run(words, at, _position_words())
+    end = _run_end(words, at, _position_words())
     lists = table()["positions"]
     while end > at:
         exactly = words[at] == "right" and end > at + 1  # right at the top
@@ -61,14 +61,14 @@ def comparison(words: Words, at: int) -> int:
     return end - at if everything else 0
 
 
-def _run(words: Words, at: int, known: frozenset[str]) -> int:
+def _run_end(words: Words, at: int, known: frozenset[str]) -> int:
     end = at
     while end < min(len(words), at + LONGEST) and words[end] in known:
         end += 1
     return end
 
 
-def _difference(here: set[str], last: str) -> str | None:
+def _spoken_difference(here: set[str], last: str) -> str | None:
     """What a set of words says, if they say a difference."""
     lists = {name: set(words) for name, words in table()["differences"].items()}
     if last in lists["open"]:

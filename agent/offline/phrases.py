@@ -49,7 +49,7 @@ def several(words: Words, at: int) -> bool:
 
 def phrase(words: Words, at: int) -> Phrase | None:
     """The longest phrase that stands at a place."""
-    for length in range(min(_longest(), len(words) - at), 0, -1):
+    for length in range(min(_longest_phrase(), len(words) - at), 0, -1):
         *first, last = words[at : at + length]
         owns = last.endswith("'s")
         whole = _phrases().get((*first, last))
@@ -83,7 +83,7 @@ def _phrases() -> dict[tuple[str, ...], tuple[str, str]]:
 
 
 @cache
-def _longest() -> int:
+def _longest_phrase() -> int:
     return max(map(len, _phrases()))
 
 

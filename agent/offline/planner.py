@@ -78,11 +78,14 @@ def _begin(task: Task, history: History) -> Reply:
             for i, f in enumerate(found, start=1)
         ]
     ids = list(dict.fromkeys([*task.targets, *(p["id"] for p in prompts)]))[:things]
-    contract: dict[str, Any] = {"groups": [_group(reading, robots, ids)]}
+    contract: dict[str, Any] = {"groups": [_group_by_relation(reading, robots, ids)]}
     if faced:
-        contract["groups"] = [_facing(reading, robots, ids)]
+        contract["groups"] = [_group_facing(reading, robots, ids)]
     elif form:
-        contract = {"groups": [_drawn(reading, form, robots, ids, history)], "reading": READING}
+        contract = {
+            "groups": [_group_drawn(reading, form, robots, ids, history)],
+            "reading": READING,
+        }
     if reading.robot_radius is not None:
         contract["robot_radius"] = reading.robot_radius
     if task.metres_per_pixel is not None:
@@ -124,19 +127,19 @@ def _unfit(reading: Reading, form: Form | None, faced: bool, robots: int | None)
     return None
 
 
-def _drawn(
+def _group_drawn(
     reading: Reading, form: Form, robots: int, targets: list[str], history: History
 ) -> dict[str, Any]:
     where = form.where(reading.relations, reading.side, _refusals(history))
-    group = _plain(reading, robots, targets) | {
+    group = _group_basics(reading, robots, targets) | {
         "relation": "shape",
         "shape": form.shape | {"where": where},
     }
     return group | _distance(reading, deep=where == "inside")
 
 
-def _facing(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
-    group = _plain(reading, robots, targets[:1])
+def _group_facing(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
+    group = _group_basics(reading, robots, targets[:1])
     return group | {"relation": "along", "facing": targets[1]} | _distance(reading, deep=False)
 
 
@@ -210,9 +213,9 @@ def _which_things(task: Task, used: int) -> str | None:
     return None
 
 
-def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
+def _group_by_relation(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
     (relation,) = reading.relations
-    group = _plain(reading, robots, targets) | {"relation": relation}
+    group = _group_basics(reading, robots, targets) | {"relation": relation}
     if relation == "cage":
         group["spacing"] = "even"
     if relation == "along":
@@ -226,7 +229,7 @@ def _group(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
     return group | _distance(reading, deep=relation == "inside")
 
 
-def _plain(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
+def _group_basics(reading: Reading, robots: int, targets: list[str]) -> dict[str, Any]:
     group: dict[str, Any] = {
         "targets": targets,
         "robots": robots,
@@ -258,9 +261,9 @@ def _after_proposal(task: Task, result: Result, history: History) -> Reply:
         return _impossible(history, reason, result.facts.get("partial_plan"))
     plan = json.loads(result.text)
     if not plan["certified"]:
-        partial = plan.get("partial", {"plan_id": plan["plan_id"]})
-        reason = [*plan["findings"], *([partial["sentence"]] if "sentence" in partial else [])]
-        return _impossible(history, " ".join(reason), partial["plan_id"])
+        partial = plan.get("partial")
+        reason = [*plan["findings"], *([partial["sentence"]] if partial else [])]
+        return _impossible(history, " ".join(reason), (partial or plan)["plan_id"])
     if task.deploy:
         return _call("deploy", {"plan_id": plan["plan_id"]})
     return Reply(text=f"{_planned(plan, history)} Nothing was moved.")

@@ -30,12 +30,12 @@ class Reading:
 def references(instruction: str) -> Reading:
     """Read the noun phrases of an instruction in English."""
     made = CAGED.findall(instruction)
-    words = _words(CAGED.sub(" ", instruction))
+    words = _split_words(CAGED.sub(" ", instruction))
     found: list[Reference] = []
     rest: list[str] = []
     at = 0
     while at < len(words):
-        read = _read(words, at)
+        read = _read_reference(words, at)
         if read is None or (found and read[0].strange):
             rest.append(words[at])
             at += 1
@@ -47,12 +47,12 @@ def references(instruction: str) -> Reading:
     return Reading(_without_echoes(found), " ".join([*rest, *made]))
 
 
-def _words(text: str) -> list[str]:
+def _split_words(text: str) -> list[str]:
     plain = text.lower().replace("-", " ").replace("\N{RIGHT SINGLE QUOTATION MARK}", "'")
     return re.findall(r"[0-9]+(?:[.,][0-9]+)+[a-z]*|[a-z0-9]+(?:'[a-z0-9]+)*|[,.;:!?+*%]", plain)
 
 
-def _read(words: Words, at: int) -> tuple[Reference, int] | None:
+def _read_reference(words: Words, at: int) -> tuple[Reference, int] | None:
     """The thing that is spoken of from a place on, known or not, and where it ends."""
     if words[at] not in table()["determiners"] or words[at + 1 : at + 2] == []:
         return None

@@ -9,8 +9,9 @@ from ..errors import ToolError
 from ..fleet.deploy import Arrival
 from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
-from ..formation.placement.partial import REFUSALS, best_partial
+from ..formation.placement.partial import best_partial
 from ..formation.plan import Plan, make_plan
+from ..formation.site import PlacementError
 from ..formation.units import contract_in_pixels, length_text, with_metres
 from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
@@ -101,7 +102,7 @@ def _planned(context: Context, held: Contract, places: Any) -> tuple[PlanNode, P
     site = world.site(held)
     try:
         plan = make_plan(held, site, world.version, places)
-    except REFUSALS as error:
+    except PlacementError as error:
         partial = best_partial(held, site, world.version, error)
         if partial is None:
             raise

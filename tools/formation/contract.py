@@ -10,11 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import (
-    Field,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import Field, ValidationError, WithJsonSchema, model_validator
 
 from ..errors import InputError
 from ..geometry.figures.letters import letter_strokes
@@ -291,6 +287,11 @@ class Contract(Value):
     def spacing_floor(self) -> float:
         """Least distance of any two robots' centres, px: bodies must not overlap."""
         return max(2 * self.robot_radius, MIN_SPACING)
+
+
+def broken_rules(error: ValidationError) -> str:
+    """What is wrong with the fields of a contract or group, in the words of its rules."""
+    return "; ".join(e["msg"].removeprefix("Value error, ") for e in error.errors())
 
 
 def with_defaults(

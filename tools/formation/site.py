@@ -69,7 +69,11 @@ def most_that_fit(fits: Callable[[int], bool], estimate: int, too_many: int) -> 
     return next((n for n in tried if fits(n)), 0)
 
 
-class CapacityError(ToolError):
+class PlacementError(ToolError):
+    """The robots of a contract cannot all be placed; fewer, or nearer, may be."""
+
+
+class CapacityError(PlacementError):
     """A group has more robots than its place holds."""
 
     def __init__(self, group: Group, fits: int, why: str) -> None:

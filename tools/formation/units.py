@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..errors import InputError, ToolError
-from .contract import MAX_LENGTH, Contract, Group, Unit
+from .contract import MAX_LENGTH, Contract, Group, Unit, broken_rules
 
 FINEST, COARSEST = 1e-6, 1e3
 """Least and greatest metres per pixel: from a microscope's picture to a satellite's."""
@@ -86,7 +86,7 @@ def contract_in_pixels(contract: Contract, metres_per_pixel: float | None) -> Co
     try:
         return Contract.model_validate(converted.model_dump())
     except ValidationError as error:
-        found = "; ".join(e["msg"].removeprefix("Value error, ") for e in error.errors())
+        found = broken_rules(error)
         raise ToolError(f"The lengths cannot be used at this scale: {found} (in px).") from None
 
 

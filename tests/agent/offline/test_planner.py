@@ -1,5 +1,6 @@
 """The offline planner: which arrangement the words mean, and what it asks when they do not say."""
 
+import asyncio
 import json
 import re
 from pathlib import Path
@@ -8,9 +9,11 @@ from typing import Any
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.first_message import read_task, task_text
-from formup.agent.messages import Reply
+from formup.agent.messages import Call, Reply, Result, User
+from formup.agent.model import Request
 from formup.agent.offline.arrangements import understand
 from formup.agent.offline.drawn_forms import form_in
+from formup.agent.offline.planner import OfflinePlanner
 from formup.agent.offline.references import references
 from formup.agent.outcomes import Answered, Paused
 from formup.agent.providers.registry import model_named
@@ -331,6 +334,30 @@ def test_a_cage_of_two_is_impossible_and_it_says_why() -> None:
     report = run("Cage it", pointed=[COIN], settings=Settings(robots=2))
     assert report.status == "impossible"
     assert report.message == "a cage takes 3 or more robots, got 2."
+
+
+LOOKS_LIKE = "Insufficient segmentation accuracy, no room above p-0123456789"
+PARTIAL = {"plain": "y", "partial_plan": "p-1"}
+
+
+@pytest.mark.parametrize(
+    ("result", "name", "arguments"),
+    [
+        ({"text": "x", "cause": "low_confidence"}, "ask_user", {"question": "x"}),
+        ({"text": LOOKS_LIKE}, "report_impossible", {"reason": LOOKS_LIKE}),
+        ({"text": "x", "facts": PARTIAL}, "report_impossible", {"reason": "y", "plan_id": "p-1"}),
+    ],
+)
+def test_it_acts_on_what_an_error_is_not_on_how_it_reads(
+    result: dict[str, Any], name: str, arguments: dict[str, Any]
+) -> None:
+    scene = Scene(load_picture(PHOTOS / "us_coins.jpg"))
+    words = "6 robots in a 2 by 3 grid above it"
+    first = User(text=task_text(Workspace(scene, pointed=(COIN,), instruction=words)))
+    asked = Reply(calls=(Call(id="a", name="propose_formation", arguments={}),))
+    failed = Result(call_id="a", name="propose_formation", error="tool", **result)
+    reply = asyncio.run(OfflinePlanner().reply(Request("", (first, asked, failed), ())))
+    assert [(c.name, c.arguments) for c in reply.calls] == [(name, arguments)]
 
 
 def test_an_answer_resumes_where_it_asked() -> None:

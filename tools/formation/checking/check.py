@@ -134,11 +134,7 @@ def _check_around(part: Part, audit: Audit) -> None:
     if _nowhere(curve, "the ring", audit):
         return
     if not curve.closed:
-        share = curve.length / curve.whole_length
-        audit.least("ring_in_picture", share)
-        audit.notes.append(
-            f"Only {share:.0%} of the ring lies inside the picture; the robots spread over that."
-        )
+        audit.least("ring_in_picture", _note_cut(curve, "the ring", audit))
     if part.group.relation == "cage":
         spacing.enclosure(part, curve, audit)
         judge(part, curve, audit)
@@ -154,16 +150,22 @@ def _nowhere(curve: Curve, name: str, audit: Audit) -> bool:
     return True
 
 
+def _note_cut(curve: Curve, name: str, audit: Audit) -> float:
+    """Note which share of a curve the picture leaves."""
+    share = curve.length / curve.whole_length
+    audit.notes.append(
+        f"Only {share:.0%} of {name} lies inside the picture; the robots spread over that."
+    )
+    return share
+
+
 def _check_along(part: Part, audit: Audit) -> None:
     _check_outside(part, audit)
     curve = reference_curve(part.group, part.site, part.radius)
     if _nowhere(curve, "that side", audit):
         return
     if curve.length < 0.995 * curve.whole_length:
-        share = curve.length / curve.whole_length
-        audit.notes.append(
-            f"Only {share:.0%} of that side lies inside the picture; the robots spread over that."
-        )
+        _note_cut(curve, "that side", audit)
     if part.group.edges is not None:
         spacing.on_edges(part, part.group.edges, audit)
     else:
@@ -206,7 +208,8 @@ def _check_line(part: Part, audit: Audit) -> None:
     curve = reference_curve(part.group, part.site, part.radius)
     if _nowhere(curve, "the line", audit):
         return
-    spacing.on_curve(part, curve, max(LINE_SHARE * curve.whole_length, 2.0), "the line", audit)
+    reach = max(LINE_SHARE * curve.whole_length, 2.0)
+    spacing.on_curve(part, curve.geometry(), reach, "the line", audit)
     if part.group.spacing == "even":
         spacing.evenness(part, curve, audit)
 

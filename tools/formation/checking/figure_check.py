@@ -3,15 +3,14 @@
 The yardstick is the placement that `figure` itself would make on the same lines.
 """
 
-import numpy as np
 from shapely.geometry import LineString, MultiLineString
 
 from ...geometry.figures.shapes import Sketch
-from ...geometry.figures.strokes import Stretch, stretches
-from ...geometry.outline import FloatArray, distances
+from ...geometry.figures.strokes import stretches
+from ...geometry.outline import FloatArray
 from ...geometry.sampling import min_spacing, nearest
 from ..placement.figure import robots_on
-from ..placement.spacing import NARROWEST, WIDEST
+from ..placement.spacing import NARROWEST, WIDEST, on_curve
 from .verdict import TOLERANCE, Audit, Part
 
 LINE_SHARE = 0.03
@@ -32,35 +31,24 @@ def on_figure(part: Part, figure: Sketch, audit: Audit) -> None:
     width, height = figure.size
     share = LINE_SHARE * (min(width, height) or max(width, height))
     reach = max(min(share, apart / 2), LEAST_REACH)
-    _on_lines(part, figure, reach, audit)
+    lines = MultiLineString([LineString(line) for line in figure.lines])
+    assert part.group.shape is not None
+    on_curve(part, lines, reach, f"the {part.group.shape.name}", audit)
     if part.group.spacing == "free":
         return
     allowed = WIDEST * max(s.length for s in stretches(figure.lines, ideal, LEAST_REACH))
-    _not_bare(part, stretches(figure.lines, part.points, reach + TOLERANCE), allowed, audit)
+    found = stretches(figure.lines, part.points, reach + TOLERANCE)
+    audit.greatest("worst_gap_px", max(s.length for s in found))
+    for bare in (s for s in found if s.length > allowed + TOLERANCE):
+        if bare.robot is None:
+            audit.find("bare_stretch", bare.length, allowed)
+        else:
+            audit.find("bare_end", bare.length, allowed, robot=part.first + bare.robot)
     if len(part.points) > 1:
         closest = min_spacing(part.points)
         audit.least("spacing_ratio", closest / apart)
         if closest < NARROWEST * apart - TOLERANCE:
             audit.find("crowded_figure", closest, NARROWEST * apart)
-
-
-def _on_lines(part: Part, figure: Sketch, reach: float, audit: Audit) -> None:
-    distance = distances(MultiLineString([LineString(x) for x in figure.lines]), part.points)
-    assert part.group.shape is not None
-    name = f"the {part.group.shape.name}"
-    for i in np.flatnonzero(distance > reach + TOLERANCE):
-        audit.find("off_curve", distance[i], reach, robot=part.first + i, about=name)
-
-
-def _not_bare(part: Part, found: list[Stretch], allowed: float, audit: Audit) -> None:
-    audit.greatest("worst_gap_px", max(s.length for s in found))
-    for stretch in found:
-        if stretch.length <= allowed + TOLERANCE:
-            continue
-        if stretch.robot is None:
-            audit.find("bare_stretch", stretch.length, allowed)
-        else:
-            audit.find("bare_end", stretch.length, allowed, robot=part.first + stretch.robot)
 
 
 def _in_grid(part: Part, places: FloatArray, pitch: float, audit: Audit) -> None:

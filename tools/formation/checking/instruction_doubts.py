@@ -30,8 +30,6 @@ PLAIN: tuple[tuple[str, str, frozenset[Relation]], ...] = (
 )
 """A pattern, the word to quote, and the relations that can be meant by it."""
 COUNT = re.compile(rf"\b(\d+|{'|'.join(NUMBERS)})\W+(?:\w+\W+)?(?:robots?|bots?|agents?|drones?)\b")
-
-
 SAME = 0.05
 """Share by which a length of the contract may differ from the one named."""
 

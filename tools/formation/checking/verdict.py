@@ -108,14 +108,11 @@ class Audit:
         others: Sequence[SupportsInt] = (),
         **more: Any,
     ) -> None:
-        """Record a violation, by the formation as a whole where no robot is named.
+        """Record a violation, its numbers rounded to a thousandth.
 
         Args:
-            kind: see `Finding`.
-            value, limit: rounded to a thousandth.
-            robot: its index, from 0.
-            others: indices of other robots that the finding is about.
-            more: further fields of the finding.
+            robot, others: indices, from 0; no robot where it is the formation as a whole.
+            more: further fields of the `Finding`.
         """
         self.findings.append(
             Finding(

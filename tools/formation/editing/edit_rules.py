@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from pydantic import ValidationError
 from shapely.geometry import LineString, Point
 
 from ...errors import ToolError
 from ...geometry.assignment import EXACT, assign
 from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import along_curve, corner_points, nearest
-from ..contract import OUTSIDE, Contract, Group, SideName
+from ..contract import OUTSIDE, Contract, Group, SideName, broken_rules
 from ..placement.figure import figure_of
 from ..placement.place import Site, place, reference_curve
 from .edit_forms import DECIMALS, Affine, form_after
@@ -68,9 +69,22 @@ class Part:
         group = self.group.model_copy(update={"robots": count})
         return Track(Point(), 0.0, reference_curve(group, self.site, self.radius))
 
+    def valid_group(self, **update: object) -> Group:
+        """The group with other demands.
+
+        Raises:
+            ToolError: there is no such group.
+        """
+        group = self.group.model_copy(update=update)
+        try:
+            return Group.model_validate(group.model_dump())
+        except ValidationError as error:
+            why = broken_rules(error)
+            raise ToolError(f"The {group.relation} group cannot be changed so: {why}.") from None
+
     def placed(self, count: int, **update: object) -> FloatArray:
         """Places for `count` robots, computed anew, (count, 2)."""
-        group = self.group.model_copy(update={**update, "robots": count})
+        group = self.valid_group(**update, robots=count)
         return place(Contract(groups=(group,), robot_radius=self.radius), self.site)
 
 

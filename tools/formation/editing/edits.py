@@ -10,44 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from ...errors import ToolError
 from ...geometry.outline import FloatArray
-from ..contract import Group
 from ..placement.place import Site
 from ..plan import Plan, make_plan
-from .edit_kinds import (
-    Add,
-    Edit,
-    Mirror,
-    Offset,
-    Remove,
-    Rotate,
-    Scale,
-    Shift,
-    SideOnly,
-    Skip,
-    Swap,
-)
+from .edit_kinds import Add, Edit, Offset, Remove, SideOnly, Skip, Swap
 from .edit_rules import RULES, Part, closed_up, skipped
-
-__all__ = [
-    "Add",
-    "Diff",
-    "Edit",
-    "Edited",
-    "Mirror",
-    "Offset",
-    "Remove",
-    "Rotate",
-    "Scale",
-    "Shift",
-    "SideOnly",
-    "Skip",
-    "Swap",
-    "edited",
-]
 
 IntArray = NDArray[np.intp]
 
@@ -102,7 +72,7 @@ def edited(plan: Plan, edit: Edit, site: Site) -> Edited:
     else:
         chosen = set(_chosen(edit, parts))
         parts = [RULES[edit.kind](p, edit) if k in chosen else p for k, p in enumerate(parts)]
-    groups = tuple(_valid(part) for part in parts)
+    groups = tuple(part.valid_group(robots=len(part.points)) for part in parts)
     contract = formation.contract.model_copy(update={"groups": groups})
     points = np.concatenate([part.points for part in parts])
     after = make_plan(contract, site, formation.scene_version, points)
@@ -130,20 +100,6 @@ def _parts(plan: Plan, site: Site) -> list[Part]:
         Part(group, points[mine], mine, site, radius)
         for group, mine in zip(contract.groups, numbers, strict=True)
     ]
-
-
-def _valid(part: Part) -> Group:
-    """The group with as many robots as there are now.
-
-    Raises:
-        ToolError: there is no such group.
-    """
-    group = part.group.model_copy(update={"robots": len(part.points)})
-    try:
-        return Group.model_validate(group.model_dump())
-    except ValidationError as error:
-        why = "; ".join(e["msg"].removeprefix("Value error, ") for e in error.errors())
-        raise ToolError(f"The {group.relation} group cannot be changed so: {why}.") from None
 
 
 def _diff(before: Plan, after: Plan, was: IntArray) -> Diff:

@@ -6,15 +6,14 @@ Frame: image pixels, x right, y down; a target's holes do not matter to what sur
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...errors import ToolError
 from ...geometry.cages.cage_places import Demand, caging_places, fewest_cage
 from ...geometry.curves import Curve
 from ...geometry.outline import FloatArray
 from ..contract import Group
-from ..site import Site
+from ..site import PlacementError, Site
 
 
-class CageError(ToolError):
+class CageError(PlacementError):
     """A group's robots cannot be placed so that they certainly cage its target.
 
     Attributes:

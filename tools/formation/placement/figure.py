@@ -144,7 +144,7 @@ def _figure_placed(
     gap = nominal(group.clearance) + radius
     if shape.where == "around":
         return _figure_around(sketch, outline, gap)
-    return _figure_beside(sketch, group, outline, site, shape.where, gap, radius)
+    return _figure_beside(sketch, group, site, shape.where, gap, radius)
 
 
 def _figure_inside(sketch: Sketch, group: Group, site: Site, margin: float) -> Sketch:
@@ -188,17 +188,11 @@ def _figure_around(sketch: Sketch, outline: Outline, gap: float) -> Sketch:
 
 
 def _figure_beside(
-    sketch: Sketch,
-    group: Group,
-    outline: Outline,
-    site: Site,
-    where: str,
-    gap: float,
-    radius: float,
+    sketch: Sketch, group: Group, site: Site, where: str, gap: float, radius: float
 ) -> Sketch:
     """As high (as wide) as the target or as the spacing takes, beside it, inside the picture."""
     dx, dy = BESIDE[where]
-    x0, y0, x1, y1 = outline.bounds
+    x0, y0, x1, y1 = site.outlines[group.targets[0]].bounds
     free = site.frame(radius).box
     if free.is_empty:
         raise ToolError("The robots are too large for the picture.")

@@ -10,11 +10,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ...errors import InputError, ToolError
+from ...errors import InputError
 from ...geometry.curves import Curve, interpolate
 from ...geometry.outline import FloatArray, Outline, outline_of
 from ...geometry.sampling import nearest, split
 from ..contract import Group
+from ..site import PlacementError
 
 PHASES = 24
 """Places along a gap that the first robot of a curve is tried at."""
@@ -31,7 +32,7 @@ class Stand:
     points: FloatArray
 
 
-class CrowdedError(ToolError):
+class CrowdedError(PlacementError):
     """Two groups would stand in each other's way.
 
     Attributes:

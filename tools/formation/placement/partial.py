@@ -4,12 +4,13 @@ Whatever comes of it is certified by the same checker, and says of itself what i
 """
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from ..contract import Contract, Group, with_defaults
 from ..plan import Plan, Shortfall, make_plan
+from ..site import CapacityError, PlacementError, Site
 from .caging import CageError, escape_proof
 from .group_conflicts import CrowdedError
-from .place import CapacityError, Site
 
 ROUNDS = 60
 """Times that robots are taken out of one group or another."""
@@ -25,15 +26,12 @@ OPEN = 1000.0
 """A greatest clearance from here on, px, only says that there is none."""
 
 
-Refusal = CapacityError | CageError | CrowdedError
-REFUSALS = (CapacityError, CageError, CrowdedError)
-"""What is raised where a contract cannot be met in full, to catch."""
 Attempt = Callable[[Contract], Plan]
 Counts = tuple[int, int]
 
 
 def best_partial(
-    contract: Contract, site: Site, scene_version: str, refusal: Refusal | None
+    contract: Contract, site: Site, scene_version: str, refusal: PlacementError | None
 ) -> Plan | None:
     """A certified plan that falls as little short of a contract as is known, marked as partial.
 
@@ -76,7 +74,8 @@ def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
             fewer = _with_counts(smaller, {smaller.groups.index(error.group): error.fits})
         else:
             short = plan.verdict.certified and smaller != full
-            return _marked(plan, _shortfall(full, smaller, names)) if short else None
+            partial = {"partial": _shortfall(full, smaller, names)}
+            return plan.model_copy(update=partial) if short else None
         if fewer is None:
             return None
         smaller = fewer
@@ -85,12 +84,16 @@ def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
 
 def _with_counts(contract: Contract, robots: Mapping[int, int]) -> Contract | None:
     """The contract with other numbers of robots in some groups; None where one has too few."""
-    groups = list(contract.groups)
-    for index, count in robots.items():
-        if count < (3 if groups[index].relation == "cage" else 1):
-            return None
-        groups[index] = groups[index].model_copy(update={"robots": count})
-    return contract.model_copy(update={"groups": tuple(groups)})
+    if any(n < (3 if contract.groups[k].relation == "cage" else 1) for k, n in robots.items()):
+        return None
+    return _changed(contract, {index: {"robots": count} for index, count in robots.items()})
+
+
+def _changed(contract: Contract, updates: Mapping[int, Mapping[str, Any]]) -> Contract:
+    """The contract with other values in some groups, by their index."""
+    groups = enumerate(contract.groups)
+    changed = tuple(g.model_copy(update=updates.get(index, {})) for index, g in groups)
+    return contract.model_copy(update={"groups": changed})
 
 
 def _parted(contract: Contract, pair: tuple[int, int], attempt: Attempt) -> Contract | None:
@@ -177,7 +180,7 @@ def _nearer(stated: Contract, full: Contract, attempt: Attempt, site: Site) -> P
             clearance=held.clearance,
             sentence=sentence,
         )
-        return _marked(plan, short)
+        return plan.model_copy(update={"partial": short})
     return None
 
 
@@ -198,7 +201,8 @@ def _greatest(
         if fails - works < 2:
             break
         middle = (works + fails) // 2 if best or fails < 4 else max(fails // 2, 1)
-        plan = _tried(attempt, _with_group(full, index, _at_share(group, middle / TENTH / aim)))
+        clearance = _at_share(group, middle / TENTH / aim)
+        plan = _tried(attempt, _changed(full, {index: {"clearance": clearance}}))
         if plan is None or not suits(plan):
             fails = middle
         else:
@@ -210,30 +214,20 @@ def _uncut(plan: Plan) -> bool:
     return "ring_in_picture" not in plan.verdict.measures
 
 
-def _at_share(group: Group, share: float) -> Group:
-    """The group at a share of its clearance; inside only the least one is in the way."""
+def _at_share(group: Group, share: float) -> tuple[float, float]:
+    """A share of the group's clearance; inside only the least one is in the way."""
     assert group.clearance is not None
     least, greatest = group.clearance
     deep = greatest >= OPEN or group.relation == "inside"
-    far = greatest if deep else max(round(greatest * share, 3), 0.1)
-    return group.model_copy(update={"clearance": (round(least * share, 3), far)})
+    return round(least * share, 3), greatest if deep else max(round(greatest * share, 3), 0.1)
 
 
 def _tried(attempt: Attempt, contract: Contract) -> Plan | None:
     try:
         plan = attempt(contract)
-    except REFUSALS:
+    except PlacementError:
         return None
     return plan if plan.verdict.certified else None
-
-
-def _with_group(contract: Contract, index: int, group: Group) -> Contract:
-    groups = (*contract.groups[:index], group, *contract.groups[index + 1 :])
-    return contract.model_copy(update={"groups": groups})
-
-
-def _marked(plan: Plan, short: Shortfall) -> Plan:
-    return plan.model_copy(update={"partial": short})
 
 
 def _clearance_text(group: Group, site: Site) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from ...geometry.curves import FACING, Curve, locate
 from ...geometry.outline import FloatArray, distances
@@ -56,9 +57,9 @@ def _pieces(spread: "_Spread", mean: float, audit: Audit) -> None:
             audit.find("bare_stretch", stretch, mean)
 
 
-def on_curve(part: Part, curve: Curve, reach: float, name: str, audit: Audit) -> None:
+def on_curve(part: Part, curve: BaseGeometry, reach: float, name: str, audit: Audit) -> None:
     """Every robot within `reach` px of the curve."""
-    distance = distances(curve.geometry(), part.points)
+    distance = distances(curve, part.points)
     for i in np.flatnonzero(~(distance <= reach + TOLERANCE)):
         audit.find("off_curve", distance[i], reach, robot=part.first + i, about=name)
 
@@ -91,7 +92,8 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
 
     What is to be escape-proof is judged by its certificate, openings only where one is named.
     """
-    points = part.points[_order(part.points, curve)]
+    order = _order(part.points, curve)
+    points = part.points[order]
     opening = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) - 2 * part.radius
     allowed = part.group.max_gap
     if allowed is None:
@@ -102,14 +104,13 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
     encloses = len(points) > 2 and shapely.make_valid(Polygon(points)).contains(
         shapely.Point(part.outline.centre)
     )
-    name = part.group.targets[0]
     if not encloses and not escape_proof(part.group):
-        audit.find("not_enclosed", len(points), 3, about=name, unit="robots")
-    order = _order(part.points, curve) + part.first
+        about = part.group.targets[0]
+        audit.find("not_enclosed", len(points), 3, about=about, unit="robots")
     kind, needed = "opening" if curve.closed else "opening_at_border", _enough(part, curve)
     for k in np.flatnonzero(opening > allowed + TOLERANCE):
-        other = order[(k + 1) % len(order)]
-        audit.find(kind, opening[k], allowed, robot=order[k], others=(other,), needed=needed)
+        robot, other = part.first + order[k], part.first + order[(k + 1) % len(order)]
+        audit.find(kind, opening[k], allowed, robot=robot, others=(other,), needed=needed)
 
 
 def _enough(part: Part, curve: Curve) -> int | None:

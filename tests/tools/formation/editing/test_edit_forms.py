@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from formup.tools.errors import ToolError
 from formup.tools.formation.contract import Contract, Group, ShapeSpec
-from formup.tools.formation.editing.edits import (
+from formup.tools.formation.editing.edit_kinds import (
     Add,
     Edit,
-    Edited,
     Mirror,
     Offset,
     Remove,
@@ -18,8 +17,8 @@ from formup.tools.formation.editing.edits import (
     Shift,
     SideOnly,
     Skip,
-    edited,
 )
+from formup.tools.formation.editing.edits import Edited, edited
 from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import make_outline

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from formup.tools.errors import ToolError
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.editing.edits import (
+from formup.tools.formation.editing.edit_kinds import (
     Add,
     Edit,
-    Edited,
     Mirror,
     Offset,
     Remove,
@@ -17,8 +16,8 @@ from formup.tools.formation.editing.edits import (
     SideOnly,
     Skip,
     Swap,
-    edited,
 )
+from formup.tools.formation.editing.edits import Edited, edited
 from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import FloatArray, distances, make_outline
@@ -339,6 +338,15 @@ def test_by_the_picture_s_border_the_robots_keep_to_what_is_left_of_the_ring() -
 def test_edits_that_make_no_sense_say_why(name: str, edit: Edit, said: str) -> None:
     with pytest.raises(ToolError, match=said):
         after(PLANS[name], edit)
+
+
+def test_a_clearance_that_an_edit_would_leave_none_of_is_refused() -> None:
+    group = {"relation": "shape", "targets": ["t3"], "robots": 6, "clearance": [1, 2]}
+    drawn = {"shape": {"kind": "circle", "where": "inside"}}
+    contract = Contract(groups=(Group.model_validate(group | drawn),))
+    plan = make_plan(contract, SITE, "s")
+    with pytest.raises(ToolError, match=r"cannot be changed so: clearance \(0\.0, 0\.0\)"):
+        after(plan, Offset(kind="out", px=2.1))
 
 
 def test_with_several_groups_it_has_to_be_said_which_is_meant() -> None:
