@@ -10,29 +10,23 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-import numpy as np
-
 from .errors import InputError, ToolError
 from .fleet.deploy import Arrival, Fleet
 from .fleet.simulated import MAX_ROBOTS, SimulatedFleet, checked_starts, spread_starts
 from .formation.contract import Contract
 from .formation.placement.place import Site
 from .formation.plan import Plan
-from .geometry.outline import FloatArray, Outline, distances
+from .geometry.outline import FloatArray, Outline
 from .motion.motion import obstacles
-from .perception.contours import outline_of_mask
-from .perception.detectors.candidates import find_candidates, segment_candidate
+from .perception.detectors.candidates import find_candidates
+from .perception.measure import measure_outline, missed_vertices
 from .perception.referring.attributes import Candidate
-from .perception.segmenters.drawn_outline import straightened, within
-from .perception.segmenters.grabcut_segmenter import visible_vertices
 from .perception.segmenters.registry import segmenter_named
-from .perception.target_prompt import MAX_POINTS, Point, TargetPrompt
+from .perception.target_prompt import MAX_POINTS, TargetPrompt
 from .scene import Scene, Target
 
 Descriptor = Literal["edges", "edges+vertices", "matrix"]
 FLEETS = ("simulated",)
-MISSED = 0.06
-"""Rough outlines are off by up to this share of the thing's size."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +132,6 @@ class Workspace:
         problems = prompt.problems(picture.width, picture.height)
         if problems:
             raise ToolError(" ".join(problems))
-        threshold = self.threshold(prompt.how)
         try:
             outline, confidence, parts = self._measured(prompt)
         except InputError as error:
@@ -152,9 +145,10 @@ class Workspace:
             outline=outline,
             prompt=prompt.how,
             parts=tuple((name, round(value, 3)) for name, value in parts.items()),
-            missed=_missed(outline, prompt),
+            missed=missed_vertices(outline, prompt),
             source=None if prompt.outline is None else prompt,
         )
+        threshold = self.threshold(prompt.how)
         if confidence < threshold:
             self.doubted = target
             raise ToolError(_insufficient(confidence, threshold, prompt.how))
@@ -165,7 +159,7 @@ class Workspace:
         """The prompt, with the outline that its points correct if it has no way of its own."""
         known = next((t.source for t in self.scene.targets if t.id == prompt.id), None)
         if prompt.how == "point" and known is not None:
-            mended = known.mended_by(prompt)
+            mended = known.corrected_by(prompt)
             most = max(len(mended.points or ()), len(mended.negative))
             if most > MAX_POINTS:
                 raise ToolError(
@@ -207,16 +201,10 @@ class Workspace:
 
     def _measured(self, prompt: TargetPrompt) -> tuple[Outline, float, Mapping[str, float]]:
         """Outline, confidence and its parts."""
-        segmenter, pixels = segmenter_named(self.settings.segmenter), self.scene.picture.pixels
-        if prompt.candidate is None:
-            found = segmenter.segment(pixels, prompt)
-            outline = outline_of_mask(found.mask)
-            if prompt.straight and prompt.outline is not None:
-                seen = visible_vertices(prompt.outline, *self.scene.picture.size)
-                outline = within(straightened(outline, seen), *self.scene.picture.size)
-            return outline, found.confidence, found.parts
-        candidate = self.candidate(prompt.candidate)
-        return segment_candidate(lambda p: segmenter.segment(pixels, p), candidate)
+        segmenter = segmenter_named(self.settings.segmenter)
+        candidate = None if prompt.candidate is None else self.candidate(prompt.candidate)
+        found = measure_outline(self.scene.picture, prompt, segmenter, candidate)
+        return found.outline, found.confidence, found.parts
 
     def keep_sample(self, points: FloatArray) -> str:
         """Store sampled positions, (n, 2), and name them."""
@@ -282,10 +270,3 @@ def _insufficient(confidence: float, threshold: float, how: str) -> str:
         f"Insufficient segmentation accuracy. The mask's confidence is {shown:.2f}, below the "
         f"threshold {threshold:.2f}. {ADVICE[how]}"
     )
-
-
-def _missed(outline: Outline, prompt: TargetPrompt) -> tuple[Point, ...]:
-    """Vertices drawn that what was measured leaves out by more than a rough outline is off."""
-    drawn = np.asarray(prompt.outline or (), dtype=float).reshape(-1, 2)
-    away = distances(outline.filled, drawn) > MISSED * outline.size
-    return tuple((float(x), float(y)) for x, y in drawn[away])

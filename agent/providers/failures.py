@@ -92,7 +92,7 @@ def empty() -> AskError:
     return AskError("gave an empty reply", "try again, or use another model", "unless-same")
 
 
-def foreign(what: str) -> AskError:
+def unexpected(what: str) -> AskError:
     """Not what the interface promises."""
     return AskError(
         f"answered with {what}", "is the base URL right? It usually ends in /v1", "unless-same"

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from ..draw import draw_view, view_scale
 from ..errors import ToolError
 from ..formation.plan import Plan
-from ..perception.detectors.candidates import clear_ones
+from ..perception.detectors.candidates import salient_candidates
 from ..perception.referring.attributes import Candidate
 from ..perception.referring.relations import Query, select
 from ..perception.target_prompt import Box, Point, TargetPrompt, box_problems
@@ -130,7 +130,7 @@ def locate_object(workspace: Workspace, query: Query | None = None) -> ToolResul
                 workspace.segment(prompt)
         targets = [summary(t) for t in workspace.scene.targets]
         return ToolResult({"targets": targets, **framed(workspace.scene)})
-    clear = clear_ones(workspace.candidates())
+    clear = salient_candidates(workspace.candidates())
     if query is None:
         shown = [sighting(c) for c in clear[:MOST_SHOWN]]
         data = {"candidates": shown, **framed(workspace.scene)}

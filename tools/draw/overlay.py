@@ -66,7 +66,7 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
 
     Areas where robots' centres may stand are tinted; what a ring leaves open, a side, a line
     and the ways to corners are dashed. Robots with a finding are red with a cross. Where a target
-    was found to get out of a cage, its way is shown. Where the scale is known, lengths are told in
+    was found to get out of a cage, its way is shown. Where the scale is known, lengths are given in
     metres too and the footer has a scale bar.
 
     Args:
@@ -86,7 +86,7 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
     page = make_page(scene.picture, long, long / UNITS, title, TITLE_LINES, NARROWEST)
     canvas = page.canvas
     draw_areas(canvas, contract, site, points)
-    drivable = len(points) == contract.robots and _near(points, site).all()
+    drivable = len(points) == contract.robots and _near_picture(points, site).all()
     if drivable:
         draw_guides(canvas, contract, site, points)
     if plan.verdict.escape is not None:
@@ -99,7 +99,7 @@ def draw_plan(scene: Scene, plan: Plan, title: str) -> Image.Image:
     scale = scene.metres_per_pixel
     taken = draw_scale_bar(canvas, scale) if scale else 0.0
     badge, ground = _badge(plan)
-    draw_footer(canvas, scene.told(badge), ground, list(map(scene.told, _facts(plan))), taken)
+    draw_footer(canvas, scene.told(badge), ground, list(map(scene.told, _plan_facts(plan))), taken)
     return canvas.finish()
 
 
@@ -157,7 +157,7 @@ def _long(picture: Picture) -> int:
     return min(max(*picture.size, LEAST_LONG), MOST_LONG)
 
 
-def _near(points: FloatArray, site: Site) -> NDArray[np.bool_]:
+def _near_picture(points: FloatArray, site: Site) -> NDArray[np.bool_]:
     """Which points are in the picture or not absurdly far from it, (n,)."""
     # NaN compares false.
     return np.all(np.abs(points) <= NEAR * max(site.room), axis=1)
@@ -166,7 +166,7 @@ def _near(points: FloatArray, site: Site) -> NDArray[np.bool_]:
 def _draw_robots(canvas: Canvas, plan: Plan, site: Site, labels: Labels) -> None:
     """Discs and numbers; the labels learn where they are."""
     contract, points = plan.formation.contract, plan.formation.points
-    near = _near(points, site)
+    near = _near_picture(points, site)
     if not near.any():
         return
     shown = {int(i) + 1: points[i] for i in np.flatnonzero(near)}
@@ -190,16 +190,16 @@ def _badge(plan: Plan) -> tuple[str, Colour]:
     return f"NOT certified: {count} finding{'s' * (count != 1)}", FINDING
 
 
-def _facts(plan: Plan) -> list[str]:
+def _plan_facts(plan: Plan) -> list[str]:
     """Plan id, robots and what was measured, most important first."""
     measured = plan.verdict.measures
     count = len(plan.formation.positions)
-    told = [form.format(measured[key]) for key, form in MEASURES if key in measured]
+    facts = [form.format(measured[key]) for key, form in MEASURES if key in measured]
     if "escape_proof" in measured:
-        told.insert(0, CAGED[str(measured["escape_proof"])])
+        facts.insert(0, CAGED[str(measured["escape_proof"])])
     if "widest_opening_px" in measured:
-        told = [fact for fact in told if not fact.startswith("widest gap")]
-    return [plan.id, f"{count} robot{'s' * (count != 1)}", *told[:3]]
+        facts = [fact for fact in facts if not fact.startswith("widest gap")]
+    return [plan.id, f"{count} robot{'s' * (count != 1)}", *facts[:3]]
 
 
 def _draw_tag(canvas: Canvas, name: str, box: Box, colour: Colour, labels: Labels) -> None:

@@ -95,20 +95,20 @@ def _substitute(char: str) -> str:
     if category[0] == "P":
         return " "
     name = unicodedata.name(char, "unknown character")
-    return f"[{name.lower()}]" if category[0] == "S" else f"[{_script(name)}]"
+    return f"[{name.lower()}]" if category[0] == "S" else f"[{_script_name(name)}]"
 
 
-def _script(name: str) -> str:
+def _script_name(name: str) -> str:
     word = name.split()[0]
     return "Han" if word == "CJK" else word.capitalize()
 
 
 def _has(char: str) -> bool:
     """Whether the font has a glyph of its own for a character."""
-    return _glyph(char) != _glyph(_MISSING)
+    return _glyph_bitmap(char) != _glyph_bitmap(_MISSING)
 
 
-def _glyph(char: str) -> bytes:
+def _glyph_bitmap(char: str) -> bytes:
     image = Image.new("L", (40, 40))
     ImageDraw.Draw(image).text((10, 5), char, 255, font(20))
     return image.tobytes()

@@ -159,7 +159,7 @@ class _Slides:
         rings = [
             c for c in demand.curves if c.closed or (demand.walls is not None and c.length > 0)
         ]
-        self._rings = [_stations(curve) for curve in rings]
+        self._rings = [_ring_stations(curve) for curve in rings]
         body = body_of(demand.outline.filled)
         every = np.concatenate(self._rings) if self._rings else np.empty((0, 2))
         self._grid: Grid = first_grid(body, Obstacles(every, demand.radius))
@@ -227,7 +227,7 @@ class _Slides:
         return bool(away.min() >= max(self._demand.spacing, 1e-9))
 
 
-def _stations(curve: Curve) -> FloatArray:
+def _ring_stations(curve: Curve) -> FloatArray:
     """Points evenly along the pieces of a curve, (k, 2)."""
     pieces: list[FloatArray] = []
     for line in map(LineString, curve.lines):

@@ -73,14 +73,14 @@ def letter_strokes(text: str) -> tuple[FloatArray, ...]:
         if character == " ":
             x += SPACE
             continue
-        drawn = _glyph(character)
+        drawn = _glyph_strokes(character)
         strokes += [stroke + np.array([x, 0.0]) for stroke in drawn]
         x += max(float(stroke[:, 0].max()) for stroke in drawn) + GAP
     return tuple(strokes)
 
 
 @cache
-def _glyph(character: str) -> tuple[FloatArray, ...]:
+def _glyph_strokes(character: str) -> tuple[FloatArray, ...]:
     return tuple(_stroke(text) for text in GLYPHS[character].split(";"))
 
 

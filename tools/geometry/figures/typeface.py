@@ -55,12 +55,15 @@ def _glyphs() -> dict[str, tuple[float, tuple[FloatArray, ...]]]:
     """Advance width and rings of every character."""
     font = json.loads((files(__package__ or "") / "typeface.json").read_text("utf-8"))
     return {
-        character: (float(glyph["width"]), tuple(map(_ring, glyph["path"].split("Z")[:-1])))
+        character: (
+            float(glyph["width"]),
+            tuple(map(_contour_polyline, glyph["path"].split("Z")[:-1])),
+        )
         for character, glyph in font["glyphs"].items()
     }
 
 
-def _ring(contour: str) -> FloatArray:
+def _contour_polyline(contour: str) -> FloatArray:
     """A closed contour of path data as a polyline, y down."""
     points: list[tuple[float, float]] = []
     for command, written in re.findall(r"([MLHVQ])([^MLHVQ]*)", contour):

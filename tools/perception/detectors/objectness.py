@@ -94,7 +94,7 @@ class Region:
         return self if known else replace(self, gaps=(*self.gaps, gaps))
 
 
-def judged(found: Iterable[Proposal], features: Bytes) -> list[Region]:
+def scored_regions(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     """The proposals as regions of `features` (h, w, 3), the best first."""
     traced = [(p, t) for p in found if (t := _traced(p.ring)) is not None]
     if not traced:
@@ -103,8 +103,8 @@ def judged(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     normals = np.stack([t[1] for _, t in traced])
     blurred = cv2.GaussianBlur(features.astype(np.float32), (0, 0), 1.0)
     colours = np.asarray(blurred, dtype=np.float32)
-    inner, _ = _at(colours, points - INSIDE * normals)
-    outer, seen = _at(colours, points + OUTSIDE * normals)
+    inner, _ = _sampled_colours(colours, points - INSIDE * normals)
+    outer, seen = _sampled_colours(colours, points + OUTSIDE * normals)
     contrast = np.where(seen, np.linalg.norm(outer - inner, axis=2), np.inf)
     weak = (WEAK * seen.sum(axis=1)).astype(np.int64)
     clear = np.sort(contrast, axis=1)[np.arange(len(weak)), weak]
@@ -114,7 +114,7 @@ def judged(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     plain = clear / (clear + CLEAR) * UNEVEN / (UNEVEN + uneven)
     regions: list[Region] = []
     for k, (proposal, _) in enumerate(traced):
-        borders = _borders(proposal, features.shape)
+        borders = _borders_reached(proposal, features.shape)
         shape = _solidity(proposal) ** 0.5 * proposal.area**SIZE_POWER * _breadth(proposal)
         score = float(plain[k]) * shape * CUT**borders
         regions.append(Region(proposal, score, points[k], normals[k], borders))
@@ -150,7 +150,7 @@ def _breadth(proposal: Proposal) -> float:
     return min(1.0, 2 * proposal.area / (len(proposal.ring) * BROAD))
 
 
-def _at(colours: Floats, points: Coordinates) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _sampled_colours(colours: Floats, points: Coordinates) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Colours (k, n, 3) at points (k, n, 2), the nearest ones beyond the picture; which are in."""
     far = np.array([colours.shape[1] - 1, colours.shape[0] - 1])
     x, y = np.moveaxis(np.rint(points.clip(0, far)).astype(np.int64), 2, 0)
@@ -158,7 +158,7 @@ def _at(colours: Floats, points: Coordinates) -> tuple[Floats, npt.NDArray[np.bo
     return colours[y, x], np.asarray(seen.all(axis=2))
 
 
-def _borders(proposal: Proposal, shape: tuple[int, ...]) -> int:
+def _borders_reached(proposal: Proposal, shape: tuple[int, ...]) -> int:
     """How many borders of the picture the region reaches."""
     (x, y), (height, width) = proposal.origin, proposal.mask.shape
     reached = (x <= 1, y <= 1, x + width >= shape[1] - 1, y + height >= shape[0] - 1)

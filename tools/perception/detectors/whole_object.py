@@ -34,9 +34,9 @@ PLAIN_SHARE, PLAIN_DISTANCE = 0.8, 14.0
 SURROUNDINGS = 0.1
 
 
-def propose_wholes(pixels: Bytes, points: Sequence[Point], count: int) -> list[Region]:
+def propose_whole(pixels: Bytes, points: Sequence[Point], count: int) -> list[Region]:
     """Up to `count` clearly different regions (H, W, 3) that hold the points and are not ground."""
-    return distinct(_standing_off(pixels, points), count)
+    return distinct(_regions_off_ground(pixels, points), count)
 
 
 def on_plain_ground(window: Window, mask: Mask) -> bool:
@@ -62,7 +62,7 @@ def solidity(mask: Mask) -> float:
     return points.shape[0] / (cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1)
 
 
-def _standing_off(pixels: Bytes, points: Sequence[Point]) -> Iterator[Region]:
+def _regions_off_ground(pixels: Bytes, points: Sequence[Point]) -> Iterator[Region]:
     kernel = np.ones((3, 3), np.uint8)
     for window in windows(pixels, points):
         seeds = seeds_of(window, points)

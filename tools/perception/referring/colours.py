@@ -39,7 +39,7 @@ def colour_shares(rgb: Bytes) -> tuple[tuple[ColourName, float], ...]:
     """Colour names of pixels (n, 3) with their shares, the largest first."""
     levels = (rgb >> (8 - BITS)).astype(np.int64)
     index = (levels[:, 0] << 2 * BITS) | (levels[:, 1] << BITS) | levels[:, 2]
-    shares = _table()[index].mean(axis=0)
+    shares = _name_table()[index].mean(axis=0)
     named = zip(NAMES, shares.tolist(), strict=True)
     return tuple(sorted(named, key=lambda name_share: -name_share[1]))
 
@@ -51,7 +51,7 @@ def lab_of(rgb: Bytes) -> Floats:
 
 
 @cache
-def _table() -> Floats:
+def _name_table() -> Floats:
     """The share of each name (8 ** BITS, names) for every coarse RGB colour."""
     step = 2 ** (8 - BITS)
     axis = np.arange(2**BITS) * step + step // 2

@@ -102,16 +102,16 @@ def pin(image: Bytes, labels: Bytes, positive: Points, negative: Points) -> Byte
         np.round(p).astype(np.int64).clip(0, (width - 1, height - 1)) for p in (positive, negative)
     )
     for seed in on:
-        pinned[_alike(image, seed) & (labels == cv2.GC_PR_BGD)] = cv2.GC_PR_FGD
+        pinned[_like_coloured(image, seed) & (labels == cv2.GC_PR_BGD)] = cv2.GC_PR_FGD
     for seed in off:
-        pinned[_alike(image, seed) & (labels != cv2.GC_BGD)] = cv2.GC_PR_BGD
+        pinned[_like_coloured(image, seed) & (labels != cv2.GC_BGD)] = cv2.GC_PR_BGD
     for seeds, label in ((on, cv2.GC_FGD), (off, cv2.GC_BGD)):
         for x, y in seeds:
             cv2.circle(pinned, (int(x), int(y)), radius, (int(label),), -1)
     return pinned
 
 
-def _alike(image: Bytes, seed: npt.NDArray[np.int64]) -> Mask:
+def _like_coloured(image: Bytes, seed: npt.NDArray[np.int64]) -> Mask:
     """The connected pixels (h, w) of the seed's colour."""
     return _pieces_at(_colour_distance(image, seed[None]) <= PIN_TOLERANCE, seed[None])
 
