@@ -80,7 +80,7 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
 def yardstick(
     outline: Outline, n: int, margin: float, depth: float, spacing: float
 ) -> tuple[float, FloatArray]:
-    """What to judge N points inside a region by: how near they may be, and places as even.
+    """A reference for judging N points inside a region: their closest pair, and an even spread.
 
     Up to MANY the points of `inside` themselves. Past it the lattice they would be relaxed from,
     which leaves less bare than it does, and the share of its pitch that relaxing leaves.

@@ -53,7 +53,7 @@ def lattice_points(region: BaseGeometry, pitch: float, placement: Lattice) -> Fl
 def densest_lattice(
     region: BaseGeometry, pitch: float, placements: Sequence[Lattice]
 ) -> FloatArray:
-    """As many points as a lattice of a pitch has in a region, lying the best of some ways."""
+    """The points of a lattice of a pitch in a region, in the placement that has the most."""
     shapely.prepare(region)
     best = max((lattice_points(region, pitch, placement) for placement in placements), key=len)
     return best if len(best) else shapely.get_coordinates(region.representative_point())
@@ -62,7 +62,7 @@ def densest_lattice(
 def widest_lattice(
     region: BaseGeometry, n: int, placements: Sequence[Lattice], least: float = 0.0
 ) -> FloatArray:
-    """Exactly n points of the widest lattice that has n in a region; none is missing inside.
+    """Exactly n points of the widest lattice that has n in a region, without gaps inside.
 
     Args:
         region: a polygon or several.
@@ -87,9 +87,9 @@ def widest_lattice(
 def _widest_pitch(
     region: BaseGeometry, n: int, placement: Lattice, low: float
 ) -> tuple[FloatArray, float]:
-    """The widest pitch with n points or more, by halving between one that has and one that has not.
+    """The points of the widest pitch that gives n or more, found by bisection, and that pitch.
 
-    The count does not fall steadily with the pitch; the points kept are those of the last that had.
+    The count does not fall steadily with the pitch; the last pitch that gave enough is taken.
     """
     kept = lattice_points(region, low, placement)
     for _ in range(20):

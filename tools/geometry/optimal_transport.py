@@ -1,4 +1,4 @@
-"""Who takes which place, for more robots than an exact assignment has time for.
+"""Approximate assignment of robots to places, for teams too large for an exact one.
 
 A multilevel scheme with prices: blocks of robots are assigned first, then the robots within.
 Prices (the linear program's dual) bound what a better assignment could save. Memory is linear.

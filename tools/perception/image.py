@@ -1,8 +1,7 @@
-"""Pictures come from strangers: any path, any bytes.
+"""Loads picture files safely, whatever they hold.
 
-This module is the one door they pass: either plain RGB pixels come out, as a person would
-see them, or one ImageError whose sentence says what is wrong and what would do. Everything
-is judged from file size and header before a decoder may spend memory on it.
+The result is plain RGB pixels as a person would see them, or one ImageError that says what is
+wrong and what to do. File size and header are checked before a decoder may spend memory.
 """
 
 import hashlib

@@ -1,8 +1,8 @@
-"""Is a rigid object caged, so that it cannot get out between robots that stand still?
+"""Decides whether robots that stand still cage a rigid object.
 
-Two sufficient tests, a disc inside it and a flood of its configuration space, and one that shows
-the contrary: a way out checked move by move. Between them the answer is "not certified". No rule
-that compares gaps with the object's least width is used: it is wrong for shapes with recesses.
+Two tests are sufficient for a cage: a disc inside the object and a flood of its configuration
+space. A third shows an escape, checked move by move. Between them the answer is "not certified".
+Comparing gaps with the object's least width is no test: it is wrong for shapes with recesses.
 """
 
 import math

@@ -1,8 +1,8 @@
-"""Can a body get out between robots? A flood over its configuration space (x, y, theta).
+"""Floods a body's configuration space (x, y, theta) to see whether it can get out between robots.
 
 A cell is blocked only if every configuration in it collides, so what the flood does not reach
-nobody reaches (after Varava et al. 2018, who cover slices of it). The other way round nothing
-follows from a flood: a way out counts only once its moves are checked continuously.
+cannot be reached (after Varava et al. 2018, who cover slices of it). The converse does not hold:
+a way out counts only once its moves are checked continuously.
 """
 
 from dataclasses import dataclass

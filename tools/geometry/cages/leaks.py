@@ -1,7 +1,7 @@
-"""Does a flood of the finest grid come to the border? Followed along one way, before all of it.
+"""Checks along one path whether a flood of the finest grid would reach the border.
 
-Where it does, the finest grid certifies nothing, and the work on all its cells is saved. The cells
-looked at are some of those that the whole flood reaches, so that no verdict depends on it.
+If it would, the finest grid certifies nothing and the work on its other cells is saved. The cells
+checked are a subset of those that the whole flood reaches, so that no verdict depends on it.
 """
 
 from collections.abc import Callable

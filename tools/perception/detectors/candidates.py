@@ -1,7 +1,7 @@
-"""The things in a picture that words may mean, found without weights and without names.
+"""Finds the things that stand out in a picture, without trained weights or labels.
 
-Of many proposals those are kept that look most like a thing; a part of a thing, or several
-things run together, gives way to the thing.
+Of many proposals those that look most like a thing are kept; a part of a thing, or several things
+run together, give way to the thing itself.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""How much a region looks like a thing: an edge all round, and one plain ground around it."""
+"""Scores how much a region looks like a thing: an edge all round, and plain ground around it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..segmenters.grabcut import Bytes, Floats, Mask
+from ..segmenters.region_growing import solidity
 from .proposals import Proposal
 
 Coordinates = npt.NDArray[np.floating]
@@ -28,7 +29,8 @@ CUT = 0.6
 SIZE_POWER = 0.1
 # Thinner regions than this, px, are lines and cracks rather than things.
 BROAD = 4.0
-# Gaps that are told apart, and from which share of the region they are any.
+# Different gaps that are kept, the least share of the region that is a gap, and the share by which
+# two gaps differ.
 MOST_GAPS, LEAST_GAP, SAME_GAPS = 6, 0.03, 0.02
 
 
@@ -115,7 +117,11 @@ def scored_regions(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     regions: list[Region] = []
     for k, (proposal, _) in enumerate(traced):
         borders = _borders_reached(proposal, features.shape)
-        shape = _solidity(proposal) ** 0.5 * proposal.area**SIZE_POWER * _breadth(proposal)
+        shape = (
+            solidity(proposal.ring, proposal.area) ** 0.5
+            * proposal.area**SIZE_POWER
+            * _breadth(proposal)
+        )
         score = float(plain[k]) * shape * CUT**borders
         regions.append(Region(proposal, score, points[k], normals[k], borders))
     return sorted(regions, key=lambda r: -r.score)
@@ -137,12 +143,6 @@ def _traced(outermost: npt.NDArray[np.int32]) -> tuple[Floats, Floats] | None:
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-6)
     # OpenCV runs anticlockwise around what it traces, as seen with y down.
     return ring[at], np.stack([-along[:, 1], along[:, 0]], axis=1)
-
-
-def _solidity(proposal: Proposal) -> float:
-    """Share of its convex hull that a region fills; pixels reach half a pixel off their centres."""
-    hull = cv2.convexHull(proposal.ring)
-    return proposal.area / (cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1)
 
 
 def _breadth(proposal: Proposal) -> float:

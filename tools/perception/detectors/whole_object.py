@@ -1,4 +1,4 @@
-"""The whole thing around the part that a point hit: what stands out from the ground around it.
+"""Proposes the whole object around the part that a point hit, as what stands out from the ground.
 
 A click on a car's roof grows the roof. Where a region is not surrounded by one plain ground, the
 piece of the picture that differs from the ground further out is proposed as the whole.
@@ -52,14 +52,6 @@ def on_plain_ground(window: Window, mask: Mask) -> bool:
     colours: Floats = window.features[around].astype(np.float32)
     distance = np.linalg.norm(colours - np.median(colours, axis=0), axis=1)
     return int(np.count_nonzero(distance < PLAIN_DISTANCE)) > PLAIN_SHARE * len(distance)
-
-
-def solidity(mask: Mask) -> float:
-    """Share of its convex hull that a mask fills."""
-    points = np.argwhere(mask).astype(np.int32)
-    hull = cv2.convexHull(points)
-    # Pixels reach half a pixel beyond their centres.
-    return points.shape[0] / (cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1)
 
 
 def _regions_off_ground(pixels: Bytes, points: Sequence[Point]) -> Iterator[Region]:

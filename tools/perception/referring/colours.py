@@ -1,7 +1,7 @@
 """Colour names of pixels: the eleven basic colour terms, with doubt where two of them meet.
 
-A pixel is named by the exemplars nearest to it in CIE Lab, so that a colour between red and
-orange is partly both and nobody decides on a hair's breadth.
+A pixel is named by the exemplars nearest to it in CIE Lab: a colour between red and orange counts
+as partly both.
 """
 
 from functools import cache

@@ -1,7 +1,7 @@
 """The odd one out: what differs in one way from things that are alike in the others.
 
-The picture may hold anything besides; so each thing is held against those it resembles, and
-what is odd must lie well outside the spread of its group.
+The picture may hold other things as well, so each thing is compared with those it resembles; an
+odd one must lie well outside the spread of its group.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Aspect = Literal["colour", "size", "shape", "orientation"]
 
 @dataclass(frozen=True)
 class Limits:
-    """When things differ in an aspect, in its unit.
+    """When things count as different in an aspect, in its unit.
 
     Attributes:
         differs: least distance that is a difference at all.
@@ -148,7 +148,7 @@ def _oddity_reason(things: Things, members: IntArray, odd: Odd) -> str:
 
 
 def _comparable(apart: dict[Aspect, FloatArray], aspect: Aspect) -> list[BoolArray]:
-    """Who may be compared in an aspect, since they agree in the others; several ways to see it."""
+    """Which pairs may be compared in an aspect as they agree in others; one matrix per reading."""
     colour = apart["colour"] < LIMITS["colour"].differs
     size = apart["size"] <= ALIKE_SIZE
     shape = apart["shape"] < LIMITS["shape"].differs

@@ -1,4 +1,4 @@
-"""Superlatives as numbers: who wins, by how much, and who comes too close to be told apart."""
+"""Ranks things by a superlative: the winner, the numbers, and those too close to call."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Which thing is meant: a description decided on numbers, or what stands between it and an answer.
+"""Resolves a description to the candidate it means, or says why it is ambiguous.
 
 An answer is settled only where every doubtful measure, read either way, gives the same thing;
 else a person is to choose from the matches.

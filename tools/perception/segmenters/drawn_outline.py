@@ -1,6 +1,6 @@
-"""What somebody who draws an outline knows better than its measuring: where it is right.
+"""Combines a drawn outline with the measured one where the drawing is known to be right.
 
-Points name such places, and of a thing with straight sides each side is measured as a whole.
+That is beside points that say so, and along the sides of a thing with straight sides.
 """
 
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,4 @@
-"""From a point to the regions it may mean: colour growing at many tolerances and scales.
+"""Proposes regions that a point may mean, grown by colour at many tolerances and scales.
 
 A click says where a thing is but not how large it is. The few regions with contrast all along
 their edge are the proposals that the segmentation proper then has to confirm.
@@ -206,14 +206,22 @@ def ends_inside(mask: Mask, window: Window) -> bool:
 def region_score(mask: Mask, window: Window) -> float:
     """How much a region looks like a thing: edge contrast, compactness and, weakly, size."""
     contrast = _edge_contrast(window.features.astype(np.float32), mask)
-    points = np.argwhere(mask).astype(np.int32)
-    hull = cv2.convexHull(points)
-    # Pixels reach half a pixel beyond their centres.
-    hull_area = cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1
-    compact = len(points) / hull_area
+    compact = solidity(np.argwhere(mask), int(np.count_nonzero(mask)))
     inside = BORDER_DISCOUNT ** int(touches_border(mask).sum())
     clear = contrast / (contrast + CLEAR_CONTRAST)
     return clear * compact * inside * window.picture_area(mask) ** SIZE_PREFERENCE
+
+
+def solidity(pixels: npt.NDArray[np.integer], area: int) -> float:
+    """Share of its convex hull that a region fills.
+
+    Args:
+        pixels: (n, 2), all or the outermost ones.
+        area: how many there are.
+    """
+    hull = cv2.convexHull(pixels.astype(np.int32))
+    # Pixels reach half a pixel beyond their centres.
+    return area / (cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1)
 
 
 def _edge_contrast(colours: Floats, mask: Mask) -> float:

@@ -1,4 +1,4 @@
-"""The outline of the thing a person points at, without any trained weights.
+"""Segments the thing a person points at, without trained weights.
 
 Pointing with a box, points or a rough outline is enough for classical segmentation to work on
 real photographs, so formup runs with no download and no GPU.
@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..detectors.whole_object import on_plain_ground, propose_whole, solidity
+from ..detectors.whole_object import on_plain_ground, propose_whole
 from . import grabcut as gc
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
 from .mask_openings import cut_openings
 from .protocol import Segmentation
-from .region_growing import Region, box_iou, edge_support, pin, propose
+from .region_growing import Region, box_iou, edge_support, pin, propose, solidity
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
 RING = 0.1
@@ -137,7 +137,11 @@ def segment_points(
     whole_objects = _tried_regions(pixels, propose_whole(pixels, points, PROPOSALS), points, off)
     if best is not None:
         whole_objects = [tried for tried in whole_objects if _is_whole_of(tried, best)]
-    solid = [tried for tried in whole_objects if solidity(tried.mask) >= SOLID]
+    solid = [
+        tried
+        for tried in whole_objects
+        if solidity(np.argwhere(tried.mask), int(np.count_nonzero(tried.mask))) >= SOLID
+    ]
     chosen = max(solid, key=lambda tried: tried.distinctness, default=best)
     if chosen is None:
         return _empty_segmentation((pixels.shape[0], pixels.shape[1]), _bounding_box(points))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from formup.tools.errors import InputError
-from formup.tools.geometry.figures.letters import GLYPHS, letter_strokes
+from formup.tools.geometry.figures.letters import letter_strokes, stroke_glyphs
 from formup.tools.geometry.figures.shapes import (
     Sketch,
     arc_sketch,
@@ -48,7 +48,7 @@ def lines_of(sketch: Sketch) -> shapely.MultiLineString:
     return shapely.MultiLineString([shapely.LineString(line) for line in sketch.lines])
 
 
-@pytest.mark.parametrize("glyph", GLYPHS)
+@pytest.mark.parametrize("glyph", stroke_glyphs())
 @pytest.mark.parametrize("height", [3.0, 97.3, 4000.0])
 def test_a_letter_is_in_one_piece_wherever_it_lies(glyph: str, height: float) -> None:
     drawn = fitted(letters_sketch(glyph), (11.3, 7.7, 11.3 + height, 7.7 + height))
@@ -63,7 +63,7 @@ def test_a_letter_is_in_one_piece_wherever_it_lies(glyph: str, height: float) ->
 
 def test_every_letter_looks_like_itself_alone() -> None:
     """No two glyphs lie within a fifth of the height of each other's lines all along."""
-    drawn = {g: lines_of(fitted(letters_sketch(g), (0, 0, 100, 100))) for g in GLYPHS}
+    drawn = {g: lines_of(fitted(letters_sketch(g), (0, 0, 100, 100))) for g in stroke_glyphs()}
     alike = {
         (a, b)
         for a, one in drawn.items()
