@@ -1,6 +1,6 @@
-"""How a target gets out of a cage: the way of its centre, and where it is on that way.
+"""Draws how a target gets out of a cage: the path of its centre, and outlines along it.
 
-Only drawing: the way was found and checked elsewhere.
+The path was found and checked elsewhere.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ STEPS = 25
 
 
 def draw_escape(canvas: Canvas, escape: Escape, site: Site) -> None:
-    """Ghosts of the target on its way out, a dashed line of its centre with an arrowhead."""
+    """Draw faint outlines of the target on its way out, and its centre's path with an arrowhead."""
     outline = site.outlines[escape.target]
     poses = _densified(np.asarray(escape.poses, dtype=float))
     centre = shapely.Point(outline.centre)

@@ -225,7 +225,7 @@ def _allowed_area(part: Part) -> BaseGeometry | None:
 
 
 def _curve_of(part: Part) -> Curve | None:
-    """What the group stands on; None where nothing of it is left."""
+    """The curve that the group stands on; None where the picture leaves nothing of it."""
     try:
         curve = reference_curve(part.group, part.site, part.radius)
     except ToolError:

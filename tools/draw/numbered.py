@@ -1,7 +1,7 @@
-"""Numbered candidates: each outlined in a colour its neighbours have not, with its number.
+"""Draws numbered candidates, each outlined in a colour that differs from its neighbours'.
 
-A person must be able to answer "the third" from it: a number stands in its thing where that
-leaves most of the thing in sight, else beside it.
+A person must be able to answer "the third": a number stands inside its thing where most of the
+thing stays visible, else beside it.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Words on pictures: the built-in font, what it lacks, and lines that fit a width.
+"""Text on pictures: the built-in font, substitutes for what it lacks, and line wrapping.
 
 Pillow's own font keeps pictures the same on every machine but knows hardly more than ASCII,
 while instructions come in any language: what it lacks is folded to ASCII or named in brackets.
@@ -66,7 +66,7 @@ def wrapped(text: str, width: float, face: ImageFont.FreeTypeFont, most: int) ->
 
 
 def shortened(text: str, width: float, face: ImageFont.FreeTypeFont, mark: str = "…") -> str:
-    """As much of a drawable text as fits a width in pixels, at least one character of it."""
+    """A drawable text cut to a width in pixels, one character at least, with a mark if cut."""
     if face.getlength(text) <= width:
         return text
     low, high = 1, len(text)

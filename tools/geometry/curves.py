@@ -165,7 +165,7 @@ def side(
 
 
 def _along_loop(line: FloatArray, loop: BaseGeometry, offset: float) -> FloatArray:
-    """A polyline of points on a loop, with the loop itself where it leaps over an overhang of it.
+    """A polyline of points on a loop, with the loop's own vertices where a chord skips part of it.
 
     Rays meet only the outer end of what hangs over; a chord from there to what lies behind is at
     no certain distance from the outline.
@@ -187,7 +187,7 @@ def _along_loop(line: FloatArray, loop: BaseGeometry, offset: float) -> FloatArr
 
 
 def _stretch(loop: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """The vertices of a loop (m, 2) on the shorter way from one place of it to another."""
+    """The vertices of a loop (m, 2) on the shorter way between two points on it."""
     lengths = np.linalg.norm(np.diff(loop, axis=0), axis=1)
     whole, at = float(lengths.sum()), (np.cumsum(lengths) - lengths)
     a, b = locate(loop, np.stack([start, end]))

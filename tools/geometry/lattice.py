@@ -1,4 +1,4 @@
-"""Hexagonal lattices, the densest packings of discs, in a region: as wide as n points allow.
+"""Fits hexagonal lattices, the densest packings of discs, into a region for n points.
 
 Frame: image pixels, x right, y down; turns are radians.
 """

@@ -27,7 +27,7 @@ MAX_PIXELS = 50_000_000
 MAX_SIDE = 20_000
 MIN_SIDE = 16
 
-# A closed list: Pillow knows dozens of rare formats whose readers few people have tested.
+# A closed list: Pillow reads dozens of rare formats whose decoders are little tested.
 _FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "GIF", "TIFF") + (
     ("AVIF",) if "avif" in features.modules and features.check_module("avif") else ()
 )

@@ -1,8 +1,8 @@
-"""Where to put robots so that they cage an object: few of them, and certified.
+"""Places few robots so that they cage an object, and certifies the cage.
 
-Even rings come first. Else the robots slide along rings at two distances so that the widest way
-out, judged roughly on a coarse grid of configurations, gets narrower; what that finds is then
-put to the tests of `cage`. All of it is deterministic.
+Even rings are tried first. Otherwise robots slide along rings at two distances so that the widest
+way out, estimated on a coarse grid of configurations, gets narrower; the result is then tested by
+`cage`. All of it is deterministic.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""Cells of a configuration space (x, y, theta), and which of them hang together.
+"""Cells of a configuration space (x, y, theta): grids, connected components and paths.
 
 Arrays are (turns, rows, columns); theta is a circle, its first cell begins at 0. Frame: image
 pixels, x right, y down.

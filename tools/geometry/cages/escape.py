@@ -1,7 +1,7 @@
-"""A way out between robots: planned on a grid of configurations, then proved move by move.
+"""Finds a way out between robots: planned on a grid of configurations, then proved move by move.
 
-Moves are checked only once they are wanted (lazy planning, Bohlin and Kavraki 2000). A path that
-is given back is clear all along and ends where a line parts the body from every robot.
+Moves are checked only when a path uses them (lazy planning, Bohlin and Kavraki 2000). A returned
+path is clear throughout and ends where a line separates the body from every robot.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Letters and digits as the strokes a pen would make: robots stand on lines, not in outlines.
+"""Letters and digits as pen strokes, for robots that stand on lines instead of outlines.
 
 In `letters.json` every glyph is 6 high, y down, its left edge at x = 0. Strokes are separated by
 semicolons; each is points "x y" and arcs "@ cx cy rx ry from to" (degrees, clockwise as seen, 0 to

@@ -1,4 +1,4 @@
-"""Robots on drawn lines: at their ends, corners and crossings first, evenly between.
+"""Spreads robots over drawn lines: at ends, corners and crossings first, then evenly between.
 
 A drawing is any set of polylines; where they meet they are one. Frame: image pixels, y down.
 """

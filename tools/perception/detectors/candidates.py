@@ -107,7 +107,7 @@ def salient_candidates(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]
 def segment_candidate(
     segment: Callable[[TargetPrompt], Segmentation], candidate: Candidate, *, by_box: bool = False
 ) -> tuple[Outline, float, dict[str, float]]:
-    """The candidate's outline measured again up close, with its confidence and the parts of it.
+    """Measure a candidate's outline again up close: outline, confidence and the cues it is made of.
 
     The segmenter is pointed at the candidate's outline, or only its box. Where it finds something
     else, the candidate stays as it was found; its confidence is half how far the two agree, half
@@ -138,7 +138,7 @@ def _rough_outline(polygon: Polygon) -> tuple[tuple[float, float], ...]:
 
 
 class Thing(NamedTuple):
-    """A region, the holes in it that show the ground, the rest of it, and its score.
+    """A region with its holes (where the ground shows), what is left without them, and a score.
 
     Masks are (h, w), in the region's box.
     """

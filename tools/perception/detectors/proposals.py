@@ -1,4 +1,4 @@
-"""Regions of a picture that may be things, from many cues and no trained weights.
+"""Proposes regions of a picture that may be things, from many cues and no trained weights.
 
 Every connected piece of every threshold of every cue is a proposal, as in a component tree
 (Matas et al., 2002); what is a thing among them is for `candidates` to judge.

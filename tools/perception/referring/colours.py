@@ -1,4 +1,4 @@
-"""Colour names of pixels: the eleven basic colour terms, with doubt where two of them meet.
+"""Names pixels by the eleven basic colour terms, shared out where two of them meet.
 
 A pixel is named by the exemplars nearest to it in CIE Lab: a colour between red and orange counts
 as partly both.

@@ -48,7 +48,7 @@ SIDES = {"leftmost": (0, 1), "rightmost": (0, -1), "topmost": (1, 1), "bottommos
 
 @dataclass(frozen=True)
 class Ranked:
-    """Who won a pick.
+    """The outcome of a pick.
 
     Attributes:
         contenders: indices of things, the winner first, then all not clearly behind or ahead of
@@ -151,7 +151,7 @@ def _measure(things: Things, members: IntArray, by: str) -> Measure:
 
 
 def _ahead_by(values: FloatArray, margin: float) -> BoolArray:
-    """Ahead by a difference; a rounding error short of it counts."""
+    """Whether the row is ahead of the column by a margin, give or take rounding."""
     return values[:, None] - values[None] >= margin - 1e-9
 
 

@@ -286,7 +286,7 @@ def _with_rival(found: Segmentation, share: float) -> Segmentation:
 
 
 def _cut_short(prompt: _Prompt, mask: Mask) -> bool:
-    """Whether a mask ends at the sure background rather than at an edge of its own."""
+    """Whether a mask runs along the sure background, which then cut it off."""
     touching = np.asarray(cv2.dilate((prompt.trimaps[0] == cv2.GC_BGD).astype(np.uint8), NEXT_TO))
     return int(np.count_nonzero(mask & (touching > 0))) > CUT_SHORT * np.sqrt(
         np.count_nonzero(mask)
