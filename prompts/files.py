@@ -41,7 +41,7 @@ def write_whole(path: Path, text: str) -> None:
     Raises:
         PromptError: it cannot be written there.
     """
-    with _refusals(path), _beside(path, text) as written:
+    with _as_prompt_errors(path), _temporary_beside(path, text) as written:
         written.replace(path)
 
 
@@ -51,7 +51,7 @@ def write_new(path: Path, text: str) -> None:
     Raises:
         PromptError: there is one, or it cannot be written there.
     """
-    with _refusals(path), _beside(path, text) as written:
+    with _as_prompt_errors(path), _temporary_beside(path, text) as written:
         try:
             os.link(written, path)  # unlike a renaming it fails where there is a file
         except FileExistsError:
@@ -61,18 +61,18 @@ def write_new(path: Path, text: str) -> None:
 
 
 @contextmanager
-def alone(folder: Path) -> Generator[None]:
+def locked_folder(folder: Path) -> Generator[None]:
     """The only one to write in a folder; the system lets go of it when a process ends.
 
     Raises:
         PromptError: somebody else is still at it, or it cannot be written there.
     """
     path, until = folder / BUSY, time.monotonic() + PATIENCE
-    with _refusals(folder):
-        busy = _held(path)
+    with _as_prompt_errors(folder):
+        busy = _try_lock(path)
         while busy is None and time.monotonic() < until:
             time.sleep(0.02)
-            busy = _held(path)
+            busy = _try_lock(path)
     if busy is None:
         raise PromptError(f"Another process writes in {folder}; try again when it is done.")
     try:
@@ -93,7 +93,7 @@ def _rename_new(written: Path, path: Path) -> None:
         raise
 
 
-def _held(path: Path) -> BinaryIO | None:
+def _try_lock(path: Path) -> BinaryIO | None:
     """The file, locked; None while another has it, or has just deleted it."""
     with ExitStack() as stack:
         file = stack.enter_context(path.open("ab"))
@@ -121,7 +121,7 @@ def lock(handle: int) -> bool:
 
 
 @contextmanager
-def _beside(path: Path, text: str) -> Generator[Path]:
+def _temporary_beside(path: Path, text: str) -> Generator[Path]:
     """The text in a file of its own in the same folder, gone when done."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     written = Path(name)
@@ -136,7 +136,7 @@ def _beside(path: Path, text: str) -> Generator[Path]:
 
 
 @contextmanager
-def _refusals(path: Path) -> Generator[None]:
+def _as_prompt_errors(path: Path) -> Generator[None]:
     try:
         yield
     except FileExistsError:

@@ -18,14 +18,16 @@ from pydantic import (
 )
 
 
-def _word(name: object) -> object:
+def _quoted_name(name: object) -> object:
     if isinstance(name, bool):
         raise ValueError("YAML reads on, yes, off and no as true and false; put a name in quotes")
     return name
 
 
 Value = StrictStr | StrictBool | StrictInt | StrictFloat
-InputName = Annotated[str, BeforeValidator(_word), StringConstraints(pattern=r"^[a-z_][a-z0-9_]*$")]
+InputName = Annotated[
+    str, BeforeValidator(_quoted_name), StringConstraints(pattern=r"^[a-z_][a-z0-9_]*$")
+]
 LARGEST = 2**63
 """Whole numbers stay below it, either way."""
 
@@ -68,7 +70,7 @@ class Input(BaseModel):
 
     def problem(self, value: object) -> str | None:
         """What is wrong with a value, as the rest of a sentence; None if it will do."""
-        shown = _shown(value)
+        shown = _short_repr(value)
         if not self._is_of_type(value):
             return f"{shown} is no {self.type}"
         if isinstance(value, str) and len(value) > (self.max_chars or math.inf):
@@ -103,7 +105,7 @@ class Input(BaseModel):
         return self.type == "number" and isinstance(value, float) and math.isfinite(value)
 
 
-def _shown(value: object) -> str:
+def _short_repr(value: object) -> str:
     try:
         text = repr(value)
     except ValueError:  # Python writes no whole numbers of thousands of digits

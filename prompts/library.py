@@ -71,6 +71,17 @@ class PromptLibrary:
             )
         return name
 
+    def resolve(self, name: str) -> str:
+        """The full name of a prompt, which an id alone gives for its current version.
+
+        Raises:
+            PromptError: there is none of that name.
+        """
+        name = name if "@" in name else self.current(name)
+        if name not in self.names():
+            raise PromptError(f"Unknown prompt {name!r}. There are: {', '.join(self.names())}.")
+        return name
+
     def load(self, name: str) -> Prompt:
         """Read a prompt.
 
@@ -81,9 +92,7 @@ class PromptLibrary:
             PromptError: there is none of that name, it is no prompt, or it was released and is
                 not what it was then.
         """
-        name = name if "@" in name else self.current(name)
-        if name not in self.names():
-            raise PromptError(f"Unknown prompt {name!r}. There are: {', '.join(self.names())}.")
+        name = self.resolve(name)
         home, path = self.home(name.partition("@")[0]), self.path(name)
         lock = read_lock(home)
         released = "@draft-" not in name
@@ -95,7 +104,7 @@ class PromptLibrary:
             )
         prompt = parse_prompt(name, read_text(path), lambda ref: read_partial(home, ref, lock))
         if released:
-            _check(prompt, lock[name], path)
+            _check_unchanged(prompt, lock[name], path)
         return prompt
 
 
@@ -129,6 +138,6 @@ def read_partial(home: Path, ref: str, lock: dict[str, Locked]) -> str:
 _PUT_BACK = "put it back, and make a new version for the change"
 
 
-def _check(prompt: Prompt, locked: Locked, path: Path) -> None:
+def _check_unchanged(prompt: Prompt, locked: Locked, path: Path) -> None:
     if (locked.file_sha256, locked.sha256) != (prompt.file_sha256, prompt.sha256):
         raise PromptError(f"{path} was changed after it was released; {_PUT_BACK}.")

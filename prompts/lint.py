@@ -50,34 +50,27 @@ def lint(library: PromptLibrary, names: Iterable[str] | None = None) -> list[Fin
     Raises:
         PromptError: a name is none, or one's own folder cannot be read.
     """
-    chosen = library.names() if names is None else [_known(library, n) for n in names]
-    found = [finding for name in chosen for finding in _prompt(library, name)]
+    chosen = library.names() if names is None else [library.resolve(n) for n in names]
+    found = [finding for name in chosen for finding in _lint_prompt(library, name)]
     if names is None:
-        found += [finding for id in library.ids() for finding in _folder(library, id)]
+        found += [finding for id in library.ids() for finding in _lint_folder(library, id)]
     return found
 
 
-def _known(library: PromptLibrary, name: str) -> str:
-    name = name if "@" in name else library.current(name)
-    if name not in library.names():
-        raise PromptError(f"Unknown prompt {name!r}. There are: {', '.join(library.names())}.")
-    return name
-
-
-def _prompt(library: PromptLibrary, name: str) -> list[Finding]:
+def _lint_prompt(library: PromptLibrary, name: str) -> list[Finding]:
     """One prompt, which may be too broken to be read."""
     try:
         prompt = library.load(name)
     except PromptError as error:
         return [Finding(name, "unusable", "error", str(error))]
-    found = [*_source(prompt), *_text(prompt), *_counts(prompt)]
+    found = [*_lint_source(prompt), *_lint_text(prompt), *_lint_counts(prompt)]
     parent = prompt.front.parent
     if parent is not None and parent not in library.names():
         found.append(Finding(name, "parent", "warning", f"Its parent {parent} is not there."))
     return found
 
 
-def _folder(library: PromptLibrary, id: str) -> Iterator[Finding]:
+def _lint_folder(library: PromptLibrary, id: str) -> Iterator[Finding]:
     """What stands in the folder of an id, whatever versions it has."""
     home = library.home(id)
     names = names_in(home, id)
@@ -97,7 +90,7 @@ def _folder(library: PromptLibrary, id: str) -> Iterator[Finding]:
             yield Finding(id, "name", "warning", text)
 
 
-def _source(prompt: Prompt) -> Iterator[Finding]:
+def _lint_source(prompt: Prompt) -> Iterator[Finding]:
     """Line by line."""
     for number, line in enumerate(prompt.source.splitlines(), start=1):
         if line != line.rstrip():
@@ -115,35 +108,39 @@ def _source(prompt: Prompt) -> Iterator[Finding]:
             yield _error(prompt, "secret", text)
 
 
-def _text(prompt: Prompt) -> Iterator[Finding]:
+def _lint_text(prompt: Prompt) -> Iterator[Finding]:
     """As the model is told it, and what is said about it."""
     front, text = prompt.front, prompt.text
     odd = [braces for braces in _BRACES.findall(text) if not VARIABLE.fullmatch(braces)]
     for braces in sorted(set(odd)):
-        said = f"{braces} is no variable and stays as it is; write {{{{name}}}} with a-z, 0-9, _."
-        yield Finding(prompt.name, "braces", "warning", said)
+        sentence = (
+            f"{braces} is no variable and stays as it is; write {{{{name}}}} with a-z, 0-9, _."
+        )
+        yield Finding(prompt.name, "braces", "warning", sentence)
     for name, given in front.inputs.items():
         if given.example is None and given.default is None:
-            said = f"The input {name} has no example; give it one, or a default."
-            yield _error(prompt, "example", said)
+            sentence = f"The input {name} has no example; give it one, or a default."
+            yield _error(prompt, "example", sentence)
     if isinstance(prompt.version, str) and not (front.hypothesis or "").strip():
-        said = "The draft has no hypothesis: what should be better with it?"
-        yield Finding(prompt.name, "hypothesis", "warning", said)
+        sentence = "The draft has no hypothesis: what should be better with it?"
+        yield Finding(prompt.name, "hypothesis", "warning", sentence)
     tokens = -(-len(text) // CHARACTERS)
     if tokens > TOKENS:
-        said = f"It takes some {tokens:,} tokens in every request; {TOKENS:,} are the budget."
-        yield Finding(prompt.name, "budget", "warning", said)
+        sentence = f"It takes some {tokens:,} tokens in every request; {TOKENS:,} are the budget."
+        yield Finding(prompt.name, "budget", "warning", sentence)
     if _LENGTHS.search(text):
         missing = [what for what, way in _FRAME.items() if not way.search(text)]
         if missing:
-            said = f"It speaks of coordinates or lengths but does not say {' or '.join(missing)}."
-            yield Finding(prompt.name, "frame", "warning", said)
+            sentence = (
+                f"It speaks of coordinates or lengths but does not say {' or '.join(missing)}."
+            )
+            yield Finding(prompt.name, "frame", "warning", sentence)
 
 
 _FRAME = {"their unit": _UNIT, "which way y runs": _ORIGIN}
 
 
-def _counts(prompt: Prompt) -> Iterator[Finding]:
+def _lint_counts(prompt: Prompt) -> Iterator[Finding]:
     """Different numbers of the same thing, such as 8 to 12 vertices here and 20 vertices there."""
     found: dict[str, dict[str, str]] = {}
     for match in _COUNT.finditer(prompt.text):
@@ -152,8 +149,8 @@ def _counts(prompt: Prompt) -> Iterator[Finding]:
         noun = noun.lower().removesuffix("s")
         if noun not in _NO_NOUNS:
             found.setdefault(noun, {})[bounds] = " ".join(match[0].split())
-    for said in (list(counts.values()) for counts in found.values() if len(counts) > 1):
-        text = f"It says {', '.join(said)}: do they agree?"
+    for phrases in (list(counts.values()) for counts in found.values() if len(counts) > 1):
+        text = f"It says {', '.join(phrases)}: do they agree?"
         yield Finding(prompt.name, "counts", "warning", text)
 
 
@@ -178,10 +175,10 @@ def _confusable(line: str) -> Iterator[str]:
             yield char
     for word in re.findall(r"[^\W\d_]+", line):
         if any(c.isascii() for c in word):
-            yield from (c for c in word if _script(c) in ("CYRILLIC", "GREEK", "ARMENIAN"))
+            yield from (c for c in word if _script_of(c) in ("CYRILLIC", "GREEK", "ARMENIAN"))
 
 
-def _script(char: str) -> str:
+def _script_of(char: str) -> str:
     return unicodedata.name(char, "").partition(" ")[0]
 
 

@@ -153,13 +153,13 @@ def parse_prompt(name: str, source: str, partial: Callable[[str], str]) -> Promp
         PromptError: it is no prompt; all that is wrong with it.
     """
     head, below = split_file(name, source)
-    front = _front(name, head)
+    front = _front_matter(name, head)
     id, _, version = name.partition("@")
     texts = {ref.partition("@")[0]: partial(ref) for ref in front.include}
     body = below.strip() + "\n"
     text = VARIABLE.sub(lambda m: texts.get(m[1], m[0]), body)
     number = None if version.startswith("draft-") else int(version[1:])
-    wrong = _wrong(front, VARIABLE.findall(body), VARIABLE.findall(text))
+    wrong = _variable_problems(front, VARIABLE.findall(body), VARIABLE.findall(text))
     if front.id != id:
         wrong.append(f"its id is {front.id!r} but its folder {id!r}")
     if front.version != number:
@@ -183,7 +183,7 @@ def split_file(name: str, source: str) -> tuple[str, str]:
     return match[1], match[2]
 
 
-def _wrong(front: FrontMatter, body: list[str], expanded: list[str]) -> list[str]:
+def _variable_problems(front: FrontMatter, body: list[str], expanded: list[str]) -> list[str]:
     """Variables that are undeclared, unused or of two meanings."""
     included = [ref.partition("@")[0] for ref in front.include]
     unused = [n for n in front.inputs if n not in expanded] + [n for n in included if n not in body]
@@ -199,7 +199,7 @@ def _wrong(front: FrontMatter, body: list[str], expanded: list[str]) -> list[str
     ]
 
 
-def _front(name: str, text: str) -> FrontMatter:
+def _front_matter(name: str, text: str) -> FrontMatter:
     try:
         return FrontMatter.model_validate(yaml.safe_load(text))
     except ValidationError as error:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pydantic_core import to_json
 
-from .files import alone, read_text, write_new, write_whole
+from .files import locked_folder, read_text, write_new, write_whole
 from .library import (
     CHANGELOG,
     CURRENT,
@@ -64,7 +64,7 @@ def new_draft(library: PromptLibrary, name: str, parent: str | None = None) -> P
         raise PromptError(
             f"{name!r} is no name for a draft; give ID or ID@draft-NAME, of a-z, 0-9 and hyphens."
         )
-    folder = _own(library)
+    folder = _own_folder(library)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -72,16 +72,16 @@ def new_draft(library: PromptLibrary, name: str, parent: str | None = None) -> P
     known = id in library.ids()
     released = known and any("@v" in name for name in names_in(library.home(id), id))
     source = library.load(parent or id) if parent or released else None
-    with alone(folder):
+    with locked_folder(folder):
         if known and library.home(id) != folder:
-            _copy(id, folder)
+            _copy_shipped(id, folder)
         (folder / id).mkdir(exist_ok=True)
         there = names_in(folder, id)
         draft = draft or next(d for n in count(1) if f"{id}@{(d := f'draft-{n}')}" not in there)
         text = _TEMPLATE.format(id=id)
         if source is not None:
             _copy_partials(library.home(source.id), source.front.include, folder)
-            text = _begun(source, id)
+            text = _draft_from(source, id)
         path = folder / id / f"{draft}.prompt.md"
         write_new(path, text)
     return path
@@ -105,9 +105,9 @@ def release(
     Raises:
         PromptError: it is no draft, cannot be used as it is, or cannot be written.
     """
-    folder, reason = _own(library), _reason(why)
+    folder, reason = _own_folder(library), _required_reason(why)
     id = name.partition("@")[0]
-    with alone(folder):
+    with locked_folder(folder):
         draft = library.load(name)
         if isinstance(draft.version, int) or library.home(id) != folder:
             raise PromptError(f"{draft.name} is no draft in {folder}; only drafts are released.")
@@ -122,9 +122,9 @@ def release(
         lock[version] = Locked(
             sha256=frozen.sha256, file_sha256=frozen.file_sha256, tools=dict(tools or {})
         )
-        _put(library, frozen, lock, f"- {on} {tag(number)} released: {reason}")
+        _publish(library, frozen, lock, f"- {on} {tag(number)} released: {reason}")
         if not numbers:
-            _log(folder / id, f"- {on} {tag(number)} current: the first version")
+            _append_changelog(folder / id, f"- {on} {tag(number)} current: the first version")
             write_whole(folder / id / CURRENT, f"{tag(number)}\n")
         library.path(name).unlink()
     return version
@@ -143,7 +143,7 @@ def promote(library: PromptLibrary, name: str, because: str, on: date, after: st
     Raises:
         PromptError: it is not released, is current, or another has become current meanwhile.
     """
-    folder, reason = _own(library), _reason(because)
+    folder, reason = _own_folder(library), _required_reason(because)
     prompt = library.load(name)
     if not isinstance(prompt.version, int):
         raise PromptError(f"{prompt.name} is a draft and cannot be current; release it first.")
@@ -152,17 +152,17 @@ def promote(library: PromptLibrary, name: str, because: str, on: date, after: st
         raise PromptError(
             f"{prompt.name} is not in {folder}: `formup prompts new {prompt.id}` copies it there."
         )
-    with alone(folder):
+    with locked_folder(folder):
         now = read_text(home / CURRENT).strip() if (home / CURRENT).exists() else None
         if now == tag(prompt.version):
             raise PromptError(f"{prompt.name} is the current version already.")
         if after is not None and after != f"{prompt.id}@{now}":
             raise PromptError(f"{after} is no longer current but {now}; compare with that.")
-        _log(home, f"- {on} {tag(prompt.version)} current: {reason}")
+        _append_changelog(home, f"- {on} {tag(prompt.version)} current: {reason}")
         write_whole(home / CURRENT, f"{tag(prompt.version)}\n")
 
 
-def _own(library: PromptLibrary) -> Path:
+def _own_folder(library: PromptLibrary) -> Path:
     """The folder that may be written in."""
     if library.folder is None:
         raise PromptError(
@@ -175,7 +175,7 @@ def _own(library: PromptLibrary) -> Path:
     return library.folder
 
 
-def _copy(id: str, folder: Path) -> None:
+def _copy_shipped(id: str, folder: Path) -> None:
     """A shipped id with all that is released of it, its partials and its part of LOCK.json."""
     names = [n for n in names_in(SHIPPED, id) if "@v" in n]
     shipped, lock = read_lock(SHIPPED), read_lock(folder)
@@ -198,10 +198,10 @@ def _copy_partials(home: Path, refs: Iterable[str], folder: Path) -> None:
             write_new(folder / place, read_text(home / place))
 
 
-def _begun(source: Prompt, id: str) -> str:
+def _draft_from(source: Prompt, id: str) -> str:
     """The file of a draft that starts from a prompt."""
     front, body = split_file(source.name, source.source)
-    front = _without(front, "id", "version", "parent", "hypothesis", "created")
+    front = _drop_keys(front, "id", "version", "parent", "hypothesis", "created")
     parent = f"parent: {source.name}\n" if isinstance(source.version, int) else ""
     return f"---\nid: {id}\n{parent}hypothesis:\n{front}---\n{body}"
 
@@ -209,11 +209,11 @@ def _begun(source: Prompt, id: str) -> str:
 def _stamped(draft: Prompt, number: int, on: date) -> str:
     """A draft's file as that of a version."""
     front, body = split_file(draft.name, draft.source)
-    rest = _without(front, "id", "version", "created")
+    rest = _drop_keys(front, "id", "version", "created")
     return f"---\nid: {draft.id}\nversion: {number}\ncreated: {on}\n{rest}---\n{body}"
 
 
-def _without(front: str, *keys: str) -> str:
+def _drop_keys(front: str, *keys: str) -> str:
     """Front matter without keys and what is indented below them."""
     return re.sub(rf"^({'|'.join(keys)}):.*\n(?:[ \t].*\n|\n)*", "", front, flags=re.MULTILINE)
 
@@ -227,7 +227,7 @@ def _freeze(folder: Path, ref: str, lock: dict[str, Locked]) -> str:
     return source.strip()
 
 
-def _put(library: PromptLibrary, prompt: Prompt, lock: dict[str, Locked], entry: str) -> None:
+def _publish(library: PromptLibrary, prompt: Prompt, lock: dict[str, Locked], entry: str) -> None:
     """A version in its place, in LOCK.json and in the changelog; or none of it."""
     path, folder = library.path(prompt.name), library.home(prompt.id)
     write_new(path, prompt.source)
@@ -236,7 +236,7 @@ def _put(library: PromptLibrary, prompt: Prompt, lock: dict[str, Locked], entry:
     except BaseException:
         path.unlink()
         raise
-    _log(folder / prompt.id, entry)
+    _append_changelog(folder / prompt.id, entry)
 
 
 def _write_lock(folder: Path, lock: Mapping[str, Locked]) -> None:
@@ -244,14 +244,14 @@ def _write_lock(folder: Path, lock: Mapping[str, Locked]) -> None:
     write_whole(folder / LOCK, to_json(facts, indent=1).decode() + "\n")
 
 
-def _log(home: Path, entry: str) -> None:
+def _append_changelog(home: Path, entry: str) -> None:
     path = home / CHANGELOG
     before = read_text(path) if path.exists() else f"# {home.name}\n\n"
     gap = "\n" if "\n- " in before else "\n\n"
     write_whole(path, f"{before.rstrip()}{gap}{entry}\n")
 
 
-def _reason(text: str) -> str:
+def _required_reason(text: str) -> str:
     reason = " ".join(text.split())
     if not reason:
         raise PromptError('Say why, for the changelog: --why "...".')

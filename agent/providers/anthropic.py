@@ -9,7 +9,7 @@ from pydantic import BaseModel, ValidationError
 from ...tools.tool import Tool
 from ..messages import Reply, Result, Usage, User
 from ..model import Request
-from .failures import cut_off, empty, foreign, refused
+from .failures import cut_off, empty, refused, unexpected
 from .prices import Price
 from .wire import (
     MessageCache,
@@ -87,7 +87,7 @@ class Anthropic(Wire):
         try:
             message = _Message.model_validate(body)
         except ValidationError:
-            raise foreign("something that is no message") from None
+            raise unexpected("something that is no message") from None
         text = "".join(b.text or "" for b in message.content if b.type == "text").strip()
         if message.stop_reason == "refusal":
             raise refused(text)
@@ -133,7 +133,7 @@ class _Assembly:
         try:
             return self._take(event)
         except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
-            raise foreign("a stream of something else than messages") from None
+            raise unexpected("a stream of something else than messages") from None
 
     def whole(self) -> Any:
         content: list[dict[str, Any]] = []

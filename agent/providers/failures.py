@@ -31,7 +31,7 @@ _STATUS_OF = {
 
 
 class AskError(Exception):
-    """One try that came to nothing.
+    """One failed attempt to get a reply.
 
     Attributes:
         what: what the server did, as the rest of a sentence that begins with its address.
@@ -83,16 +83,16 @@ def cut_off(limit: int | None = None) -> AskError:
 
 
 def refused(words: str) -> AskError:
-    """The model would not."""
+    """The model refused to answer."""
     return AskError(f"refused{_quoted(words)}", "say it another way, or use another model")
 
 
 def empty() -> AskError:
-    """Neither a word nor a call."""
+    """The reply holds neither text nor a call."""
     return AskError("gave an empty reply", "try again, or use another model", "unless-same")
 
 
-def foreign(what: str) -> AskError:
+def unexpected(what: str) -> AskError:
     """Not what the interface promises."""
     return AskError(
         f"answered with {what}", "is the base URL right? It usually ends in /v1", "unless-same"

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from ...tools.tool import Tool
 from ..messages import Call, Opaque, Reply, Result, Usage, User
 from ..model import Request
-from .failures import AskError, cut_off, empty, foreign, refused
+from .failures import AskError, cut_off, empty, refused, unexpected
 from .prices import Price
 from .wire import (
     MessageCache,
@@ -124,7 +124,7 @@ class Gemini(Wire):
         try:
             response = _Response.model_validate(body)
         except ValidationError:
-            raise foreign("something that is no content of Gemini's") from None
+            raise unexpected("something that is no content of Gemini's") from None
         if not response.candidates:
             raise _without_candidates(body, response.promptFeedback)
         candidate = response.candidates[0]
@@ -206,7 +206,7 @@ class _Assembly:
         try:
             return self._add(event)
         except (TypeError, AttributeError, LookupError):
-            raise foreign("a stream of something else than Gemini's contents") from None
+            raise unexpected("a stream of something else than Gemini's contents") from None
 
     def whole(self) -> Any:
         self._close_text()
@@ -250,7 +250,7 @@ def _without_candidates(data: Any, feedback: _Feedback | None) -> AskError:
         return refused(feedback.blockReasonMessage or feedback.blockReason)
     if any(data.get(key) is not None for key in _KEYS):
         return empty()
-    return foreign("something that is no content of Gemini's")
+    return unexpected("something that is no content of Gemini's")
 
 
 def _check_finish_reason(candidate: _Candidate) -> None:

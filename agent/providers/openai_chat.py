@@ -15,7 +15,7 @@ from pydantic_core import from_json
 from ...tools.tool import Tool
 from ..messages import Reply, Result, Usage, User
 from ..model import Request
-from .failures import AskError, cut_off, empty, foreign, refused
+from .failures import AskError, cut_off, empty, refused, unexpected
 from .prices import Price
 from .wire import (
     MessageCache,
@@ -110,7 +110,7 @@ class OpenAIChat(Wire):
         try:
             completion = _Completion.model_validate(body)
         except ValidationError:
-            raise foreign("something that is no chat completion") from None
+            raise unexpected("something that is no chat completion") from None
         choice = completion.choices[0]
         message = choice.message
         if message.refusal:
@@ -146,7 +146,7 @@ class _Assembly:
             choices = event.get("choices") or ()
             return "".join([self._choice(c) for c in choices if not c.get("index")])
         except (AttributeError, TypeError):
-            raise foreign("a stream of something else than chat completions") from None
+            raise unexpected("a stream of something else than chat completions") from None
 
     def whole(self) -> Any:
         calls = [

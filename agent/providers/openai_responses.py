@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from ...tools.tool import Tool
 from ..messages import Call, Opaque, Reply, Result, User
 from ..model import Request
-from .failures import AskError, cut_off, empty, foreign, of_error_body, refused
+from .failures import AskError, cut_off, empty, of_error_body, refused, unexpected
 from .openai_chat import openai_usage
 from .prices import Price
 from .wire import (
@@ -101,7 +101,7 @@ class OpenAIResponses(Wire):
         try:
             response = _Response.model_validate(body)
         except ValidationError:
-            raise foreign("something that is no response") from None
+            raise unexpected("something that is no response") from None
         _check_status(response)
         messages = [item for item in response.output if item.type == "message"]
         parts = [part for message in messages for part in message.content or ()]
@@ -150,7 +150,7 @@ class _Assembly:
         try:
             return self._add(event["type"], event)
         except (TypeError, AttributeError, LookupError):
-            raise foreign("a stream of something else than responses") from None
+            raise unexpected("a stream of something else than responses") from None
 
     def whole(self) -> Any:
         # Some servers end with a response that repeats nothing of what they streamed.

@@ -20,7 +20,7 @@ from ...tools.errors import ModelError
 from ..messages import Reply
 from ..model import Request
 from .endpoint import Endpoint
-from .failures import AskError, foreign, of_error_body, of_status
+from .failures import AskError, of_error_body, of_status, unexpected
 from .wire import Assembly, Show, Wire
 
 TRIES = 4
@@ -239,7 +239,7 @@ def _parsed_json(body: bytes) -> Any:
     try:
         return from_json(body)
     except ValueError:
-        raise foreign("something that is not JSON") from None
+        raise unexpected("something that is not JSON") from None
 
 
 def _dropped_connection() -> AskError:

@@ -17,6 +17,7 @@ from formup.evals.experiments.simulated_model import DUTIES
 from formup.prompts import PromptLibrary, load_prompt
 from formup.tools import world as workspace
 from formup.tools.errors import InputError
+from formup.tools.perception import measure as measure_module
 from formup.tools.perception.referring.attributes import Candidate
 from numpy.typing import NDArray
 
@@ -60,7 +61,7 @@ def forgetful(tmp_path: Path) -> Path:
 @pytest.fixture
 def seen_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The one picture is searched and measured once instead of in every trial, for the time."""
-    search, measure = workspace.find_candidates, workspace.segment_candidate
+    search, measure = workspace.find_candidates, measure_module.segment_candidate
     found, measured = dict[bytes, Any](), dict[tuple[bytes, str], Any]()
 
     def searched(pixels: NDArray[np.uint8]) -> Any:
@@ -69,14 +70,14 @@ def seen_once(monkeypatch: pytest.MonkeyPatch) -> None:
             found[key] = search(pixels)
         return found[key]
 
-    def closely(segment: Callable[..., Any], candidate: Candidate) -> Any:
+    def closely(segment: Callable[..., Any], candidate: Candidate, **how: Any) -> Any:
         key = candidate.outline.polygon.wkb, candidate.id
         if key not in measured:
-            measured[key] = measure(segment, candidate)
+            measured[key] = measure(segment, candidate, **how)
         return measured[key]
 
     monkeypatch.setattr(workspace, "find_candidates", searched)
-    monkeypatch.setattr(workspace, "segment_candidate", closely)
+    monkeypatch.setattr(measure_module, "segment_candidate", closely)
 
 
 def test_rules_run_with_nothing_else(

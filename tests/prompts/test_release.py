@@ -203,7 +203,7 @@ def test_who_writes_is_waited_for(library: PromptLibrary, monkeypatch: pytest.Mo
     assert library.folder is not None
     monkeypatch.setattr(files, "PATIENCE", 0.05)
     with (
-        files.alone(library.folder),
+        files.locked_folder(library.folder),
         pytest.raises(PromptError, match=r"Another process writes in .* try again"),
     ):
         release(library, "mine@draft-x", "x", DAY)

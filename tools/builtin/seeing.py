@@ -7,7 +7,7 @@ from pydantic import ValidationError
 from ..context import Context
 from ..draw import draw_view, view_scale
 from ..errors import ToolError
-from ..perception.detectors.candidates import clear_ones
+from ..perception.detectors.candidates import salient_candidates
 from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
 from ..perception.referring.relations import Query, select
@@ -102,7 +102,7 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
         world = measured_all(context, new)
         targets = [summary(t) for t in world.targets]
         return ToolResult({"targets": targets, **framed(world)}, world=world)
-    clear = clear_ones(context.candidates())
+    clear = salient_candidates(context.candidates())
     if query is None:
         shown = [sighting(c) for c in clear[:MOST_SHOWN]]
         data = {"candidates": shown, **framed(context.world)}

@@ -90,7 +90,7 @@ def _correcting(world: World, prompt: TargetPrompt) -> TargetPrompt:
     """The prompt, with the outline that its points correct if it has no way of its own."""
     known = next((t.source for t in world.targets if t.id == prompt.id), None)
     if prompt.how == "point" and known is not None:
-        mended = known.mended_by(prompt)
+        mended = known.corrected_by(prompt)
         most = max(len(mended.points or ()), len(mended.negative))
         if most > MAX_POINTS:
             raise ToolError(

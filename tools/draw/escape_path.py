@@ -1,6 +1,6 @@
-"""How a target gets out of a cage: the way of its centre, and where it is on that way.
+"""Draws how a target gets out of a cage: the path of its centre, and outlines along it.
 
-Only drawing: the way was found and checked elsewhere.
+The path was found and checked elsewhere.
 """
 
 import numpy as np
@@ -23,17 +23,17 @@ STEPS = 25
 
 
 def draw_escape(canvas: Canvas, escape: Escape, site: Site) -> None:
-    """Ghosts of the target on its way out, a dashed line of its centre with an arrowhead."""
+    """Draw faint outlines of the target on its way out, and its centre's path with an arrowhead."""
     outline = site.outlines[escape.target]
-    poses = _dense(np.asarray(escape.poses, dtype=float))
+    poses = _densified(np.asarray(escape.poses, dtype=float))
     centre = shapely.Point(outline.centre)
-    way = np.array([shapely.get_coordinates(_moved(centre, p, poses[0]))[0] for p in poses])
+    way = np.array([shapely.get_coordinates(_in_pose(centre, p, poses[0]))[0] for p in poses])
     picture = Polygon.from_bounds(-0.5, -0.5, site.width - 0.5, site.height - 0.5)
     seen = np.flatnonzero(shapely.intersects_xy(picture, way))
     last = int(seen[-1]) if len(seen) else 0
     simple = outline.filled.simplify(0.3 / canvas.page_length(1.0))
     for share in np.arange(1, GHOSTS + 1) / GHOSTS:
-        ghost = _moved(simple, poses[_at(way[: last + 1], float(share))], poses[0])
+        ghost = _in_pose(simple, poses[_index_at_share(way[: last + 1], float(share))], poses[0])
         shown = ghost.intersection(picture)
         canvas.tint(shown, WAY, 0.1)
         canvas.strokes(rings(shown), WAY, 1.6, 0.4 + 0.6 * float(share))
@@ -45,7 +45,7 @@ def draw_escape(canvas: Canvas, escape: Escape, site: Site) -> None:
     canvas.cased(_arrowhead(shown, 9 / canvas.page_length(1.0)), WAY, 2.2)
 
 
-def _dense(poses: FloatArray) -> FloatArray:
+def _densified(poses: FloatArray) -> FloatArray:
     """Poses with others between them, (k, 3)."""
     whole = np.arange(len(poses), dtype=float)
     between: FloatArray = np.linspace(0, len(poses) - 1, (len(poses) - 1) * STEPS + 1)
@@ -53,14 +53,14 @@ def _dense(poses: FloatArray) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def _moved(thing: BaseGeometry, pose: FloatArray, start: FloatArray) -> BaseGeometry:
+def _in_pose(thing: BaseGeometry, pose: FloatArray, start: FloatArray) -> BaseGeometry:
     x, y, turn = (float(v) for v in pose)
     origin = (float(start[0]), float(start[1]))
     turned = rotate(thing, turn, origin=origin, use_radians=True)
     return translate(turned, x - origin[0], y - origin[1])
 
 
-def _at(way: FloatArray, share: float) -> int:
+def _index_at_share(way: FloatArray, share: float) -> int:
     """Index of the point after a share of a line's length."""
     steps: FloatArray = np.linalg.norm(np.diff(way, axis=0, prepend=way[:1]), axis=1)
     gone = np.cumsum(steps)

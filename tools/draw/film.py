@@ -90,7 +90,8 @@ def draw_deployment(
         ToolError: the plan names a target that the world does not have.
     """
     goals = plan.formation.points
-    page = make_page(picture, _long(picture), UNIT, title, TITLE_LINES, NARROWEST)
+    long = _photo_long_side(picture)
+    page = make_page(picture, long, UNIT, title, TITLE_LINES, NARROWEST)
     for name in plan.formation.contract.target_ids:
         draw_outline(page.canvas, world.target(name).outline)
     radius = robot_size(page.canvas, goals)
@@ -119,13 +120,13 @@ def save_gif(frames: Sequence[Image.Image], path: Path) -> None:
     kept = [frames[round(float(i))].convert("RGB") for i in chosen]
     data = b""
     for side in GIF_SIDES:
-        data = _encoded(kept, side)
+        data = _gif_bytes(kept, side)
         if len(data) <= GIF_BYTES:
             break
     write_whole(path, data)
 
 
-def _long(picture: Picture) -> int:
+def _photo_long_side(picture: Picture) -> int:
     """The photograph's long side with which a page of any title stays within SIDE."""
     bars = (TITLE_LINES * TITLE * LINE + 2 * PAD + FOOTER_HEIGHT) * UNIT + 2
     factor = min(SIDE / picture.width, (SIDE - bars) / picture.height)
@@ -193,13 +194,13 @@ def _draw_end(canvas: Canvas, now: FloatArray, goals: FloatArray) -> None:
         draw_footer(canvas, "not arrived", FINDING, [f"{there} of {len(goals)} {noun} in place"])
 
 
-def _encoded(frames: Sequence[Image.Image], side: int) -> bytes:
+def _gif_bytes(frames: Sequence[Image.Image], side: int) -> bytes:
     """The frames as GIF with no side over a length, one palette for all."""
     width, height = frames[0].size
     factor = min(side / max(width, height), 1.0)
     size = (max(round(width * factor), 1), max(round(height * factor), 1))
     sized = [f if f.size == size else f.resize(size, Image.Resampling.LANCZOS) for f in frames]
-    palette = _palette(sized)
+    palette = _shared_palette(sized)
     # Without dithering what stands still stays the same, which is most of a small file.
     flat = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in sized]
     buffer = BytesIO()
@@ -216,7 +217,7 @@ def _encoded(frames: Sequence[Image.Image], side: int) -> bytes:
     return buffer.getvalue()
 
 
-def _palette(frames: Sequence[Image.Image]) -> Image.Image:
+def _shared_palette(frames: Sequence[Image.Image]) -> Image.Image:
     """A palette for all frames: the style's colours, and the rest from first, middle and last."""
     width, height = frames[0].size
     sample = Image.new("RGB", (width, 3 * height))

@@ -57,7 +57,7 @@ def draw_areas(canvas: Canvas, contract: Contract, site: Site, points: FloatArra
     """Tint where robots may stand and where none may, then draw every target's outline."""
     picture = shapely.box(-0.5, -0.5, site.width - 0.5, site.height - 0.5)
     for part in parts_of(contract, points, site):
-        area = _allowed(part)
+        area = _allowed_area(part)
         if area is not None:
             shown = area.intersection(picture)
             canvas.tint(shown, ALLOWED, 0.26)
@@ -96,7 +96,7 @@ def label_openings(
 ) -> None:
     """The widest gap of every ring in px, or in metres if it can be, where the checker measures."""
     for part in parts_of(contract, points, site):
-        opening = _opening(part)
+        opening = _widest_opening(part)
         if opening is None:
             continue
         spec = ".0f" if opening.width >= 10 else ".1f"
@@ -209,7 +209,7 @@ def directions(contract: Contract, site: Site, points: FloatArray) -> list[Float
     return ways
 
 
-def _allowed(part: Part) -> BaseGeometry | None:
+def _allowed_area(part: Part) -> BaseGeometry | None:
     """Where the centres of a group's robots may be, image pixels, as far as it is an area."""
     group, radius = part.group, part.radius
     if group.relation == "centre":
@@ -224,14 +224,14 @@ def _allowed(part: Part) -> BaseGeometry | None:
     # What lies far outside the picture is never seen, and costs time to make.
     reach = min(greatest, part.site.width + part.site.height)
     ring = solid.buffer(reach).difference(solid.buffer(least))
-    curve = _curve(part) if group.relation == "along" else None
+    curve = _curve_of(part) if group.relation == "along" else None
     if curve is None:
         return ring
     return ring.intersection(curve.geometry().buffer(reach, cap_style="flat"))
 
 
-def _curve(part: Part) -> Curve | None:
-    """What the group stands on; None where nothing of it is left."""
+def _curve_of(part: Part) -> Curve | None:
+    """The curve that the group stands on; None where the picture leaves nothing of it."""
     try:
         curve = reference_curve(part.group, part.site, part.radius)
     except ToolError:
@@ -243,12 +243,12 @@ def _guides(part: Part) -> list[FloatArray]:
     """Polylines to dash, image pixels: straight across a cage's gaps, else the reference curve."""
     if part.group.relation == "inside" or _is_free(part):
         return []
-    curve = _curve(part)
+    curve = _curve_of(part)
     if curve is None:
         return []
     if part.group.relation != "cage":
         return list(curve.lines)
-    ordered = part.points[np.argsort(_stations(part.points, curve), kind="stable")]
+    ordered = part.points[np.argsort(_feet_on_curve(part.points, curve), kind="stable")]
     return list(np.stack([ordered, np.roll(ordered, -1, axis=0)], axis=1))
 
 
@@ -256,14 +256,14 @@ def _is_free(part: Part) -> bool:
     return part.group.relation == "shape" and part.group.line is part.group.shape is None
 
 
-def _opening(part: Part) -> Opening | None:
+def _widest_opening(part: Part) -> Opening | None:
     """A cage's straight between robots' edges, another ring's along the curve."""
     if part.group.relation not in ("around", "cage") or len(part.points) < 2:
         return None
-    curve = _curve(part)
+    curve = _curve_of(part)
     if curve is None:
         return None
-    stations = _stations(part.points, curve)
+    stations = _feet_on_curve(part.points, curve)
     order = np.argsort(stations, kind="stable")
     points, after = part.points[order], np.roll(part.points[order], -1, axis=0)
     if part.group.relation == "cage":
@@ -288,7 +288,7 @@ def _gap_along(points: FloatArray, stations: FloatArray, curve: Curve) -> Openin
     return Opening(middle, float(gaps[k]))
 
 
-def _stations(points: FloatArray, curve: Curve) -> FloatArray:
+def _feet_on_curve(points: FloatArray, curve: Curve) -> FloatArray:
     """Arc length of each point's foot on the curve, (n,), px."""
     feet = shapely.line_locate_point(curve.geometry(), shapely.points(points))
     return np.asarray(feet, dtype=float)

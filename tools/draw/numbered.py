@@ -1,7 +1,7 @@
-"""Numbered candidates: each outlined in a colour its neighbours have not, with its number.
+"""Draws numbered candidates, each outlined in a colour that differs from its neighbours'.
 
-A person must be able to answer "the third" from it: a number stands in its thing where that
-leaves most of the thing in sight, else beside it.
+A person must be able to answer "the third": a number stands inside its thing where most of the
+thing stays visible, else beside it.
 """
 
 from collections.abc import Sequence
@@ -54,7 +54,7 @@ def draw_numbered(
     sizes = [np.array(canvas.chip_size(name, text)) for name in names]
     things = [_on_page(canvas, c.outline) for c in candidates]
     places = [
-        _inside(thing, things, size, INSET * canvas.unit)
+        _place_in(thing, things, size, INSET * canvas.unit)
         for thing, size in zip(things, sizes, strict=True)
     ]
     for place, size in zip(places, sizes, strict=True):
@@ -62,7 +62,7 @@ def draw_numbered(
             labels.take(np.concatenate([place - size / 2, place + size / 2])[None])
     for k, place in enumerate(places):
         if place is None:
-            place = _beside(canvas, things[k], things, sizes[k], labels)
+            place = _place_beside(canvas, things[k], things, sizes[k], labels)
         canvas.chip(place, names[k], text, INK, colours[k], SEAM)
 
 
@@ -92,7 +92,7 @@ def _on_page(canvas: Canvas, outline: Outline) -> BaseGeometry:
     return shapely.make_valid(placed.simplify(canvas.unit))
 
 
-def _inside(
+def _place_in(
     thing: BaseGeometry, things: Sequence[BaseGeometry], size: FloatArray, inset: float
 ) -> FloatArray | None:
     """Middle of a place for a number in a thing, off the smaller things in it, (2,), page px."""
@@ -104,12 +104,12 @@ def _inside(
         return None
     deepest = shapely.get_coordinates(shapely.maximum_inscribed_circle(free))[0]
     for middle in (shapely.get_coordinates(thing.centroid)[0], deepest):
-        if free.contains(_box(middle, size / 2 + inset)):
+        if free.contains(_box_about(middle, size / 2 + inset)):
             return middle
     return None
 
 
-def _beside(
+def _place_beside(
     canvas: Canvas,
     thing: BaseGeometry,
     things: Sequence[BaseGeometry],
@@ -122,11 +122,11 @@ def _beside(
     rim = shapely.get_coordinates(thing)
     feet = rim[np.argmax(rim @ ways.T, axis=0)]
     centres = feet + ways * (GAP * canvas.unit + np.abs(ways) @ size / 2)[:, None]
-    boxes = [_box(centre, size / 2) for centre in centres]
+    boxes = [_box_about(centre, size / 2) for centre in centres]
     hidden = [sum(box.intersection(t).area for t in things if box.intersects(t)) for box in boxes]
     return labels.pick(centres, size, np.array(hidden))
 
 
-def _box(middle: FloatArray, half: FloatArray) -> Polygon:
+def _box_about(middle: FloatArray, half: FloatArray) -> Polygon:
     (x0, y0), (x1, y1) = (middle - half).tolist(), (middle + half).tolist()
     return Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])

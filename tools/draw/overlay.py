@@ -69,7 +69,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
 
     Areas where robots' centres may stand are tinted; what a ring leaves open, a side, a line
     and the ways to corners are dashed. Robots with a finding are red with a cross. Where a target
-    was found to get out of a cage, its way is shown. Where the scale is known, lengths are told in
+    was found to get out of a cage, its way is shown. Where the scale is known, lengths are given in
     metres too and the footer has a scale bar.
 
     Args:
@@ -89,7 +89,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
     page = make_page(picture, long, long / UNITS, title, TITLE_LINES, NARROWEST)
     canvas = page.canvas
     draw_areas(canvas, contract, site, points)
-    drivable = len(points) == contract.robots and _near(points, site).all()
+    drivable = len(points) == contract.robots and _near_picture(points, site).all()
     if drivable:
         draw_guides(canvas, contract, site, points)
     if plan.verdict.escape is not None:
@@ -102,7 +102,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
     scale = world.metres_per_pixel
     taken = draw_scale_bar(canvas, scale) if scale else 0.0
     badge, ground = _badge(plan, scale)
-    draw_footer(canvas, badge, ground, _facts(plan, scale), taken)
+    draw_footer(canvas, badge, ground, _plan_facts(plan, scale), taken)
     return canvas.finish()
 
 
@@ -161,7 +161,7 @@ def _long(picture: Picture) -> int:
     return min(max(*picture.size, LEAST_LONG), MOST_LONG)
 
 
-def _near(points: FloatArray, site: Site) -> NDArray[np.bool_]:
+def _near_picture(points: FloatArray, site: Site) -> NDArray[np.bool_]:
     """Which points are in the picture or not absurdly far from it, (n,)."""
     # NaN compares false.
     return np.all(np.abs(points) <= NEAR * max(site.room), axis=1)
@@ -171,7 +171,7 @@ def _draw_robots(canvas: Canvas, world: World, plan: Plan, labels: Labels) -> No
     """Discs and the robots' numbers; the labels learn where they are."""
     contract, points = plan.formation.contract, plan.formation.points
     site, names = world.site(contract), plan.formation.robot_of_place
-    near = _near(points, site)
+    near = _near_picture(points, site)
     if not near.any():
         return
     shown = {names[i]: points[i] for i in np.flatnonzero(near)}
@@ -203,19 +203,19 @@ def _badge(plan: Plan, scale: float | None) -> tuple[str, Colour]:
     return f"NOT certified: {count} finding{'s' * (count != 1)}", FINDING
 
 
-def _facts(plan: Plan, scale: float | None) -> list[str]:
+def _plan_facts(plan: Plan, scale: float | None) -> list[str]:
     """Plan id, robots and what was measured, most important first."""
     measured = plan.verdict.measures
     count = len(plan.formation.positions)
-    told = [
+    facts = [
         form.format(length_text(float(value), scale) if key.endswith("_px") else value)
         for key, form in MEASURES
         if (value := measured.get(key)) is not None
         and not (key == "worst_gap_px" and "widest_opening_px" in measured)
     ]
     if "escape_proof" in measured:
-        told.insert(0, CAGED[str(measured["escape_proof"])])
-    return [plan.id, f"{count} robot{'s' * (count != 1)}", *told[:3]]
+        facts.insert(0, CAGED[str(measured["escape_proof"])])
+    return [plan.id, f"{count} robot{'s' * (count != 1)}", *facts[:3]]
 
 
 def _draw_tag(canvas: Canvas, name: str, box: Box, colour: Colour, labels: Labels) -> None:

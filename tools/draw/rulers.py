@@ -20,7 +20,7 @@ def draw_rulers(canvas: Canvas) -> None:
         if box[2] > box[0] and box[3] > box[1]:
             canvas.box(box, PAPER)
     for axis in (0, 1):
-        step = _step(canvas, axis)
+        step = _label_step(canvas, axis)
         minor, first = max(step // 5, 1), canvas.origin[axis]
         for value in range(-(-first // minor) * minor, first + canvas.source[axis], minor):
             _draw_tick(canvas, axis, value, labelled=value % step == 0)
@@ -46,7 +46,7 @@ def _draw_tick(canvas: Canvas, axis: int, value: int, *, labelled: bool) -> None
             canvas.text(where if axis == 0 else where[::-1], str(value), TEXT, INK)
 
 
-def _step(canvas: Canvas, axis: int) -> int:
+def _label_step(canvas: Canvas, axis: int) -> int:
     """The smallest of 1, 2, 5, 10, 20, ... px whose labels are neither too many nor too tight."""
     count = canvas.source[axis]
     widest = canvas.text_size(f"{canvas.origin[axis] + count}0", TEXT)[axis]

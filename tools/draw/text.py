@@ -1,4 +1,4 @@
-"""Words on pictures: the built-in font, what it lacks, and lines that fit a width.
+"""Text on pictures: the built-in font, substitutes for what it lacks, and line wrapping.
 
 Pillow's own font keeps pictures the same on every machine but knows hardly more than ASCII,
 while instructions come in any language: what it lacks is folded to ASCII or named in brackets.
@@ -66,7 +66,7 @@ def wrapped(text: str, width: float, face: ImageFont.FreeTypeFont, most: int) ->
 
 
 def shortened(text: str, width: float, face: ImageFont.FreeTypeFont, mark: str = "…") -> str:
-    """As much of a drawable text as fits a width in pixels, at least one character of it."""
+    """A drawable text cut to a width in pixels, one character at least, with a mark if cut."""
     if face.getlength(text) <= width:
         return text
     low, high = 1, len(text)
@@ -95,20 +95,20 @@ def _substitute(char: str) -> str:
     if category[0] == "P":
         return " "
     name = unicodedata.name(char, "unknown character")
-    return f"[{name.lower()}]" if category[0] == "S" else f"[{_script(name)}]"
+    return f"[{name.lower()}]" if category[0] == "S" else f"[{_script_name(name)}]"
 
 
-def _script(name: str) -> str:
+def _script_name(name: str) -> str:
     word = name.split()[0]
     return "Han" if word == "CJK" else word.capitalize()
 
 
 def _has(char: str) -> bool:
     """Whether the font has a glyph of its own for a character."""
-    return _glyph(char) != _glyph(_MISSING)
+    return _glyph_bitmap(char) != _glyph_bitmap(_MISSING)
 
 
-def _glyph(char: str) -> bytes:
+def _glyph_bitmap(char: str) -> bytes:
     image = Image.new("L", (40, 40))
     ImageDraw.Draw(image).text((10, 5), char, 255, font(20))
     return image.tobytes()

@@ -1,4 +1,4 @@
-"""The picture as a model is shown it: what it needs to point, in as few pixels as that takes.
+"""Draws the picture a model is shown: what it needs to point, in as few pixels as possible.
 
 The photograph lies at the upper left, unscaled where it has a usual size, so that a place read
 off the image and one read off the rulers are the same. Providers bill by the pixel, and shrink

@@ -12,7 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ToolError
-from .optimal_transport import BASE, Matching, exchanged, lower_bound, matched, squares
+from .optimal_transport import (
+    BASE,
+    Matching,
+    improved_by_cycles,
+    lower_bound,
+    multilevel_matching,
+    sum_of_squares,
+)
 from .outline import FARTHEST, FloatArray
 
 IntArray = NDArray[np.intp]
@@ -55,19 +62,19 @@ def assign(starts: FloatArray, goals: FloatArray) -> Assignment:
     Raises:
         ToolError: arrays of other shapes or with no places in a picture.
     """
-    starts, goals = _checked(starts, goals)
+    starts, goals = _checked_places(starts, goals)
     if not len(goals):
         return Assignment(np.zeros(0, dtype=np.intp), "exact", 0.0)
     # The optimum does not change when all goals move together; aligned sets solve faster.
     shift = goals.mean(axis=0) - starts.mean(axis=0)
     aligned, displacement = goals - shift, len(goals) * float(shift @ shift)
-    matching = matched(aligned, starts)
+    matching = multilevel_matching(aligned, starts)
     if len(goals) <= EXACT:
         robots = _exact(aligned, starts, matching)
-        return Assignment(robots, "exact", squares(goals, starts, robots))
+        return Assignment(robots, "exact", sum_of_squares(goals, starts, robots))
     matching, bound = _improved(aligned, starts, matching, displacement)
-    unpaid = max(squares(aligned, starts, matching.robots) - bound, 0.0)
-    cost = squares(goals, starts, matching.robots)
+    unpaid = max(sum_of_squares(aligned, starts, matching.robots) - bound, 0.0)
+    cost = sum_of_squares(goals, starts, matching.robots)
     return Assignment(matching.robots, "approximate", cost, unpaid / cost if cost > 0 else 0.0)
 
 
@@ -79,7 +86,7 @@ def _exact(goals: FloatArray, starts: FloatArray, matching: Matching) -> IntArra
     if len(goals) <= BASE:
         return matching.robots  # exact as it is
     for _ in range(WARM_ROUNDS):
-        matching = exchanged(goals, starts, matching)
+        matching = improved_by_cycles(goals, starts, matching)
     cost = cdist(goals, starts, "sqeuclidean") - matching.prices
     cost -= cost.min(axis=1, keepdims=True)
     return np.asarray(linear_sum_assignment(cost)[1], dtype=np.intp)
@@ -95,15 +102,15 @@ def _improved(
     """
     bound = max(0.0, lower_bound(goals, starts, matching.prices))
     for _ in range(ROUNDS):
-        cost = squares(goals, starts, matching.robots)
+        cost = sum_of_squares(goals, starts, matching.robots)
         if cost - bound <= ENOUGH * (cost + displacement):
             break
-        matching = exchanged(goals, starts, matching)
+        matching = improved_by_cycles(goals, starts, matching)
         bound = max(bound, lower_bound(goals, starts, matching.prices))
     return matching, bound
 
 
-def _checked(starts: FloatArray, goals: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _checked_places(starts: FloatArray, goals: FloatArray) -> tuple[FloatArray, FloatArray]:
     both = [np.asarray(points, dtype=float) for points in (starts, goals)]
     shapes = [points.shape for points in both]
     if shapes[0] != shapes[1] or len(shapes[0]) != 2 or shapes[0][1] != 2:

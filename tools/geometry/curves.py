@@ -128,7 +128,7 @@ def ring(
     near = outline.filled.buffer(keep * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
     border = frame.box.exterior  # the ring's own part is as far off as it is to be
     run = inside.intersection(border).difference(near)
-    lines = _lines(shapely.union(inside.difference(border), run))
+    lines = _polylines(shapely.union(inside.difference(border), run))
     is_loop = len(lines) == 1 and bool(np.allclose(lines[0][0], lines[0][-1]))
     return Curve(lines, is_loop, float(whole.length))
 
@@ -165,7 +165,7 @@ def side(
 
 
 def _along_loop(line: FloatArray, loop: BaseGeometry, offset: float) -> FloatArray:
-    """A polyline of points on a loop, with the loop itself where it leaps over an overhang of it.
+    """A polyline of points on a loop, with the loop's own vertices where a chord skips part of it.
 
     Rays meet only the outer end of what hangs over; a chord from there to what lies behind is at
     no certain distance from the outline.
@@ -187,7 +187,7 @@ def _along_loop(line: FloatArray, loop: BaseGeometry, offset: float) -> FloatArr
 
 
 def _stretch(loop: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """The vertices of a loop (m, 2) on the shorter way from one place of it to another."""
+    """The vertices of a loop (m, 2) on the shorter way between two points on it."""
     lengths = np.linalg.norm(np.diff(loop, axis=0), axis=1)
     whole, at = float(lengths.sum()), (np.cumsum(lengths) - lengths)
     a, b = locate(loop, np.stack([start, end]))
@@ -224,7 +224,7 @@ def edge_curve(
         return _clip([dense], frame)
     start = int(np.argmin(chosen))
     rolled, flags = np.roll(dense[:-1], -start, axis=0), np.roll(chosen[:-1], -start)
-    return _clip(_runs(rolled, flags), frame)
+    return _clip(_flagged_runs(rolled, flags), frame)
 
 
 def segment(
@@ -235,7 +235,7 @@ def segment(
 ) -> Curve:
     """The straight line between two points, (2,) each, image pixels, less what is solid."""
     line = LineString([start, end])
-    free = _lines(line if solid is None else line.difference(solid))
+    free = _polylines(line if solid is None else line.difference(solid))
     return _clip(list(free), frame)
 
 
@@ -275,7 +275,7 @@ def locate(line: FloatArray, points: FloatArray) -> FloatArray:
     return (np.cumsum(lengths) - lengths)[index] + share * lengths[index]
 
 
-def _runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
+def _flagged_runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
     """Stretches of at least two successive flagged points."""
     changes = np.flatnonzero(np.diff(flags.astype(np.int8))) + 1
     pieces = np.split(line, changes)
@@ -285,12 +285,12 @@ def _runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
 
 def _clip(lines: list[FloatArray], frame: Frame | None) -> Curve:
     whole = MultiLineString([LineString(line) for line in lines])
-    kept = _lines(whole if frame is None else whole.intersection(frame.box))
+    kept = _polylines(whole if frame is None else whole.intersection(frame.box))
     closed = len(kept) == 1 and len(kept[0]) > 3 and bool(np.allclose(kept[0][0], kept[0][-1]))
     return Curve(kept, closed, float(whole.length))
 
 
-def _lines(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
+def _polylines(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
     """Polylines of any geometry, pieces that touch joined, dust under half a pixel dropped."""
     parts = [g for g in shapely.get_parts(geometry) if isinstance(g, LineString) and g.length]
     merged = shapely.line_merge(MultiLineString(parts)) if parts else MultiLineString()

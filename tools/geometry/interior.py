@@ -16,10 +16,10 @@ from .curves import interpolate, round_join_dip
 from .lattice import (
     ALL_PHASES,
     Lattice,
+    densest_lattice,
     ideal_pitch,
     lattice_points,
-    most,
-    widest,
+    widest_lattice,
 )
 from .lloyd import MAX_CELLS, cells_of, grid, relax
 from .outline import FloatArray, Outline, largest_part, rectangle_of
@@ -68,19 +68,19 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
         return _on_axis(region, n, spacing)
     reached = max(region.buffer(spacing / 2).area, region.area)  # GEOS grows nothing by 1e-200
     if n * spacing**2 * math.sqrt(3) / 2 < SURELY * reached:  # else they cannot all fit
-        even = _even(region, ground(outline, 0, depth), n)
+        even = _evenly_spread(region, ground(outline, 0, depth), n)
         if min_spacing(even) >= spacing:
             return even.copy()
     turns = (_long_angle(region), *TURNS)
     lies = [Lattice(t, p) for t in turns for p in (ALL_PHASES if n <= MANY else ALL_PHASES[:1])]
-    packed = most(region, spacing, lies)
-    return widest(region, n, lies, spacing) if len(packed) > n else packed
+    packed = densest_lattice(region, spacing, lies)
+    return widest_lattice(region, n, lies, spacing) if len(packed) > n else packed
 
 
 def yardstick(
     outline: Outline, n: int, margin: float, depth: float, spacing: float
 ) -> tuple[float, FloatArray]:
-    """What to judge N points inside a region by: how near they may be, and places as even.
+    """A reference for judging N points inside a region: their closest pair, and an even spread.
 
     Up to MANY the points of `inside` themselves. Past it the lattice they would be relaxed from,
     which leaves less bare than it does, and the share of its pitch that relaxing leaves.
@@ -93,7 +93,7 @@ def yardstick(
     """
     region = ground(outline, margin, depth)
     if n > MANY and region.area >= THIN * region.length:
-        lattice = widest(region, n, [Lattice(_long_angle(region))])
+        lattice = widest_lattice(region, n, [Lattice(_long_angle(region))])
         if len(lattice) == n:
             return max(RELAXED * min_spacing(lattice), spacing), lattice
     points = inside(outline, n, margin, depth, spacing)
@@ -130,7 +130,7 @@ def ground(outline: Outline, margin: float, depth: float) -> BaseGeometry:
 
 
 @lru_cache(maxsize=4)  # whoever places robots has them checked next
-def _even(region: BaseGeometry, covered: BaseGeometry, n: int) -> FloatArray:
+def _evenly_spread(region: BaseGeometry, covered: BaseGeometry, n: int) -> FloatArray:
     """N points of a region spread evenly over a wider one, however near to each other.
 
     What lies within the margin is to be covered like the rest, though no robot stands there.
@@ -142,7 +142,7 @@ def _even(region: BaseGeometry, covered: BaseGeometry, n: int) -> FloatArray:
         return max((relax(cells, region, s, LLOYD_STEPS) for s in starts), key=min_spacing)
     cells = cells_of(covered, n, max(BRISK_CELLS, min(CELLS_EACH * n, MAX_CELLS)))
     turns = (long, *TURNS) if n <= SOME else (long, long + math.pi / 6) if n <= MANY else (long,)
-    starts = [widest(region, n, [Lattice(turn)]) for turn in turns]
+    starts = [widest_lattice(region, n, [Lattice(turn)]) for turn in turns]
     full = [s if len(s) == n else _thinned(region, n, long) for s in starts]
     relaxed = [relax(cells, region, s, BRISK_STEPS, STRETCH) for s in full]
     return max(relaxed, key=min_spacing)

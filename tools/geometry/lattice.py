@@ -1,4 +1,4 @@
-"""Hexagonal lattices, the densest packings of discs, in a region: as wide as n points allow.
+"""Fits hexagonal lattices, the densest packings of discs, into a region for n points.
 
 Frame: image pixels, x right, y down; turns are radians.
 """
@@ -19,11 +19,11 @@ HALVINGS = 12
 NARROWEST = 0.55
 """The search for a pitch begins at this share of the one that open ground would have."""
 ALL_PHASES = tuple((i / 4, j / 4) for i in range(4) for j in range(4))
-"""Where the lattice lies, as shares of its two steps."""
+"""Phases of a lattice to try, as shares of its two steps."""
 
 
 class Lattice(NamedTuple):
-    """How a lattice lies: its turn and its phase as shares of its two steps."""
+    """How a lattice lies: its turn (radians) and its phase as shares of its two steps."""
 
     turn: float
     phase: tuple[float, float] = (0.0, 0.0)
@@ -34,36 +34,40 @@ def ideal_pitch(area: float, n: int) -> float:
     return math.sqrt(2 * area / (math.sqrt(3) * n))
 
 
-def lattice_points(region: BaseGeometry, pitch: float, lie: Lattice) -> FloatArray:
+def lattice_points(region: BaseGeometry, pitch: float, placement: Lattice) -> FloatArray:
     """The points of a lattice inside a region, row by row, (k, 2)."""
     cx, cy = region.envelope.centroid.x, region.envelope.centroid.y
     x0, y0, x1, y1 = region.bounds
-    c, s = math.cos(lie.turn), math.sin(lie.turn)
+    c, s = math.cos(placement.turn), math.sin(placement.turn)
     width, height = (x1 - x0) / 2, (y1 - y0) / 2
     along, across = width * abs(c) + height * abs(s), width * abs(s) + height * abs(c)
     columns = math.ceil(along / pitch) + 2
     rows = math.ceil(across / (pitch * math.sqrt(3) / 2)) + 1
     i, j = np.meshgrid(np.arange(-columns, columns + 1), np.arange(-rows, rows + 1))
-    x, y = i + (j % 2) / 2 + lie.phase[0] + lie.phase[1] / 2, j + lie.phase[1]
+    x, y = i + (j % 2) / 2 + placement.phase[0] + placement.phase[1] / 2, j + placement.phase[1]
     flat = np.stack([x, y * math.sqrt(3) / 2], axis=-1).reshape(-1, 2) * pitch
     points = flat @ np.array([[c, s], [-s, c]]) + (cx, cy)
     return points[shapely.intersects_xy(region, points)]
 
 
-def most(region: BaseGeometry, pitch: float, lies: Sequence[Lattice]) -> FloatArray:
-    """As many points as a lattice of a pitch has in a region, lying the best of some ways."""
+def densest_lattice(
+    region: BaseGeometry, pitch: float, placements: Sequence[Lattice]
+) -> FloatArray:
+    """The points of a lattice of a pitch in a region, in the placement that has the most."""
     shapely.prepare(region)
-    best = max((lattice_points(region, pitch, lie) for lie in lies), key=len)
+    best = max((lattice_points(region, pitch, placement) for placement in placements), key=len)
     return best if len(best) else shapely.get_coordinates(region.representative_point())
 
 
-def widest(region: BaseGeometry, n: int, lies: Sequence[Lattice], least: float = 0.0) -> FloatArray:
-    """Exactly n points of the widest lattice that has n in a region; none is missing inside.
+def widest_lattice(
+    region: BaseGeometry, n: int, placements: Sequence[Lattice], least: float = 0.0
+) -> FloatArray:
+    """Exactly n points of the widest lattice that has n in a region, without gaps inside.
 
     Args:
         region: a polygon or several.
         n: how many.
-        lies: the turns and phases tried.
+        placements: the turns and phases tried.
         least: a pitch known to give n or more, px; 0 where none is known.
 
     Returns:
@@ -72,29 +76,31 @@ def widest(region: BaseGeometry, n: int, lies: Sequence[Lattice], least: float =
     shapely.prepare(region)
     low = max(least, NARROWEST * ideal_pitch(region.area, n))
     best, pitch = np.empty((0, 2)), low
-    for lie in lies:
-        if len(best) < n or len(lattice_points(region, pitch * 1.0005, lie)) >= n:
-            points, wider = _widen(region, n, lie, low if len(best) < n else pitch)
+    for placement in placements:
+        if len(best) < n or len(lattice_points(region, pitch * 1.0005, placement)) >= n:
+            points, wider = _widest_pitch(region, n, placement, low if len(best) < n else pitch)
             if (len(best) < n) or (len(points) >= n and wider > pitch):
                 best, pitch = points, wider
-    return _without(region, best, len(best) - n, pitch) if len(best) > n else best
+    return _thinned_at_boundary(region, best, len(best) - n, pitch) if len(best) > n else best
 
 
-def _widen(region: BaseGeometry, n: int, lie: Lattice, low: float) -> tuple[FloatArray, float]:
-    """The widest pitch with n points or more, by halving between one that has and one that has not.
+def _widest_pitch(
+    region: BaseGeometry, n: int, placement: Lattice, low: float
+) -> tuple[FloatArray, float]:
+    """The points of the widest pitch that gives n or more, found by bisection, and that pitch.
 
-    The count does not fall steadily with the pitch; the points kept are those of the last that had.
+    The count does not fall steadily with the pitch; the last pitch that gave enough is taken.
     """
-    kept = lattice_points(region, low, lie)
+    kept = lattice_points(region, low, placement)
     for _ in range(20):
         if len(kept) >= n:
             break
         low *= 0.9
-        kept = lattice_points(region, low, lie)
+        kept = lattice_points(region, low, placement)
     high = max(1.25 * ideal_pitch(region.area, n), low * 1.3)
     for _ in range(HALVINGS):
         pitch = (low + high) / 2
-        points = lattice_points(region, pitch, lie)
+        points = lattice_points(region, pitch, placement)
         if len(points) >= n:
             kept, low = points, pitch
         else:
@@ -102,7 +108,9 @@ def _widen(region: BaseGeometry, n: int, lie: Lattice, low: float) -> tuple[Floa
     return kept, low
 
 
-def _without(region: BaseGeometry, points: FloatArray, surplus: int, pitch: float) -> FloatArray:
+def _thinned_at_boundary(
+    region: BaseGeometry, points: FloatArray, surplus: int, pitch: float
+) -> FloatArray:
     """The points less some that lie next to the boundary, far apart from each other."""
     depth = distances(region.boundary, points)
     outermost = np.argsort(depth, kind="stable")

@@ -1,4 +1,4 @@
-"""Who takes which place, for more robots than an exact assignment has time for.
+"""Approximate assignment of robots to places, for teams too large for an exact one.
 
 A multilevel scheme with prices: blocks of robots are assigned first, then the robots within.
 Prices (the linear program's dual) bound what a better assignment could save. Memory is linear.
@@ -40,7 +40,7 @@ class Matching:
     prices: FloatArray
 
 
-def squares(goals: FloatArray, starts: FloatArray, robots: IntArray) -> float:
+def sum_of_squares(goals: FloatArray, starts: FloatArray, robots: IntArray) -> float:
     """The sum of squared distances, px^2."""
     return float(_squared(goals, starts[robots]).sum())
 
@@ -55,7 +55,7 @@ def lower_bound(goals: FloatArray, starts: FloatArray, prices: FloatArray) -> fl
     return float((cheapest[:, 0] + prices).sum())
 
 
-def matched(goals: FloatArray, starts: FloatArray) -> Matching:
+def multilevel_matching(goals: FloatArray, starts: FloatArray) -> Matching:
     """Nearly the least sum of squared distances, by levels.
 
     Args:
@@ -69,12 +69,12 @@ def matched(goals: FloatArray, starts: FloatArray) -> Matching:
     if n <= BASE:
         robots = linear_sum_assignment(cdist(goals, starts, "sqeuclidean"))[1]
         return Matching(np.asarray(robots, dtype=np.intp), np.zeros(n))
-    goal_blocks = _blocks(goals, goals, FINER)[0]
-    start_blocks = _blocks(starts, starts, FINER)[0]
+    goal_blocks = _median_blocks(goals, goals, FINER)[0]
+    start_blocks = _median_blocks(starts, starts, FINER)[0]
     here, there = _centres(goals, goal_blocks), _centres(starts, start_blocks)
-    coarse = exchanged(here, there, matched(here, there))
+    coarse = improved_by_cycles(here, there, multilevel_matching(here, there))
     robots = _spread_out(goals, starts, goal_blocks, start_blocks, coarse.robots)
-    prices = _interpolated(starts, start_blocks, there, here, coarse)
+    prices = _interpolated_prices(starts, start_blocks, there, here, coarse)
     return _blockwise(goals, starts, Matching(robots, prices))
 
 
@@ -87,13 +87,13 @@ def _blockwise(goals: FloatArray, starts: FloatArray, matching: Matching) -> Mat
     for k in range(PASSES):
         by = starts[robots] if k % 2 else goals
         turned = by @ _rotation(k * GOLDEN_ANGLE)
-        for block in _blocks(turned, turned, LEAF)[0]:
+        for block in _median_blocks(turned, turned, LEAF)[0]:
             cost = cdist(goals[block], starts[robots[block]], "sqeuclidean")
             robots[block] = robots[block][linear_sum_assignment(cost)[1]]
     return replace(matching, robots=robots)
 
 
-def exchanged(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matching:
+def improved_by_cycles(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matching:
     """A round of cycles of exchanges that save (Klein 1967), and prices nearer to the dual's.
 
     Prices fall by Bellman-Ford: a robot is worth no more than the price at which another goal
@@ -102,7 +102,7 @@ def exchanged(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matc
     Args:
         goals, starts: (n, 2).
     """
-    goal, robot, cost = _candidates(goals, starts, matching)
+    goal, robot, cost = _candidate_pairs(goals, starts, matching)
     nothing = ROUNDING * float(cost.max())
     first = np.flatnonzero(np.diff(robot, prepend=-1))
     robots, prices = matching.robots.copy(), matching.prices.copy()
@@ -154,7 +154,7 @@ def _exchange(
     return changed
 
 
-def _candidates(
+def _candidate_pairs(
     goals: FloatArray, starts: FloatArray, matching: Matching
 ) -> tuple[IntArray, IntArray, FloatArray]:
     """Pairs worth considering, ordered by robot: goal, robot, squared distance, (m,) each."""
@@ -203,13 +203,13 @@ def _spread_out(
     left = np.flatnonzero(robots < 0)
     idle = np.setdiff1d(np.arange(len(goals)), robots[robots >= 0])
     if len(left):
-        for block, team in zip(*_blocks(goals[left], starts[idle], LEAF), strict=True):
+        for block, team in zip(*_median_blocks(goals[left], starts[idle], LEAF), strict=True):
             cost = cdist(goals[left[block]], starts[idle[team]], "sqeuclidean")
             robots[left[block]] = idle[team[linear_sum_assignment(cost)[1]]]
     return robots
 
 
-def _interpolated(
+def _interpolated_prices(
     starts: FloatArray,
     blocks: list[IntArray],
     centres: FloatArray,
@@ -234,7 +234,7 @@ def _centres(points: FloatArray, blocks: list[IntArray]) -> FloatArray:
     return np.stack([points[block].mean(axis=0) for block in blocks])
 
 
-def _blocks(
+def _median_blocks(
     goals: FloatArray, starts: FloatArray, size: int
 ) -> tuple[list[IntArray], list[IntArray]]:
     """Both sets cut at medians, again and again, into as many blocks of `size` or fewer, in step.

@@ -159,10 +159,10 @@ class Outline:
         if self.kind == "polygonal":
             turning = [
                 v
-                for v, turn in zip(self.vertices, _turns(self.vertices), strict=True)
+                for v, turn in zip(self.vertices, _turning_angles(self.vertices), strict=True)
                 if abs(turn) > CORNER_TURN
             ]
-            if len(turning) >= 3 and _iou(Polygon(turning), self.filled) > 0.9:
+            if len(turning) >= 3 and _overlap(Polygon(turning), self.filled) > 0.9:
                 return np.asarray(turning, dtype=float)
         return self.bulk_rectangle
 
@@ -181,14 +181,14 @@ def make_outline(exterior: ArrayLike, holes: tuple[ArrayLike, ...] = ()) -> Outl
     Raises:
         InputError: no pairs of numbers, fewer than 3, or enclosing under 4 square pixels.
     """
-    outer, *inner = (_ring(ring) for ring in (exterior, *holes))
+    outer, *inner = (_checked_ring(ring) for ring in (exterior, *holes))
     region = shapely.make_valid(Polygon(outer))
     for hole in inner:
         region = region.difference(shapely.make_valid(Polygon(hole)))
     return outline_of(region)
 
 
-def _ring(points: ArrayLike) -> FloatArray:
+def _checked_ring(points: ArrayLike) -> FloatArray:
     try:
         ring = np.asarray(points, dtype=float)
     except (ValueError, TypeError):
@@ -268,7 +268,7 @@ def _simplify(ring: FloatArray) -> tuple[FloatArray, Kind, float]:
     start = int(np.argmax(((ring - ring.mean(axis=0)) ** 2).sum(axis=1)))
     closed = np.concatenate([np.roll(ring, -start, axis=0), ring[start : start + 1]])
     line = shapely.LineString(closed)
-    low = max(1.5, 4 * _noise(closed), 0.008 * line.length)
+    low = max(1.5, 4 * _contour_noise(closed), 0.008 * line.length)
     tolerances = np.geomspace(low, max(0.04 * line.length, 2 * low), SWEEP_STEPS)
     candidates = [_douglas_peucker(line, eps) for eps in tolerances]
     counts = np.array([len(c) for c in candidates])
@@ -322,7 +322,7 @@ def _half_spanned(region: BaseGeometry, rectangle: FloatArray) -> FloatArray:
     return corner + places @ np.stack(sides)
 
 
-def _noise(closed: FloatArray) -> float:
+def _contour_noise(closed: FloatArray) -> float:
     """Noise of a pixel contour: robust deviation from its smoothed self, px."""
     ring = closed[:-1]
     if len(ring) < 60 or shapely.LineString(closed).length / len(ring) > 2:
@@ -337,7 +337,7 @@ def _noise(closed: FloatArray) -> float:
     return float(1.48 * np.median(np.abs(((ring - smooth) * normal).sum(axis=1))))
 
 
-def _turns(vertices: tuple[tuple[float, float], ...]) -> FloatArray:
+def _turning_angles(vertices: tuple[tuple[float, float], ...]) -> FloatArray:
     """Turning angle at each vertex, radians, signed."""
     points = np.asarray(vertices, dtype=float)
     before = points - np.roll(points, 1, axis=0)
@@ -346,7 +346,7 @@ def _turns(vertices: tuple[tuple[float, float], ...]) -> FloatArray:
     return np.arctan2(cross, (before * after).sum(axis=1))
 
 
-def _iou(a: Polygon, b: Polygon) -> float:
+def _overlap(a: Polygon, b: Polygon) -> float:
     if not a.is_valid:
         return 0.0
     return float(a.intersection(b).area / a.union(b).area)

@@ -1,4 +1,4 @@
-"""Rings of robots: at equal straight distances, several one behind the other, or in the holes.
+"""Rings of robots: with equal straight distances, several nested ones, or inside holes.
 
 Pure functions from outlines to points, built on the offset curves of `curves`. Frame: image
 pixels, x right, y down.

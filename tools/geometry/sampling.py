@@ -122,10 +122,10 @@ def _best_phase(loop: FloatArray, n: int) -> FloatArray:
     starts = np.arange(PHASES) / PHASES * step if n <= 200 else np.zeros(1)
     stations = starts[:, None] + step * np.arange(n)
     layouts = interpolate(loop, stations.ravel()).reshape(len(starts), n, 2)
-    return layouts[int(np.argmax(_closest(layouts)))]
+    return layouts[int(np.argmax(_closest_pairs(layouts)))]
 
 
-def _closest(layouts: FloatArray) -> FloatArray:
+def _closest_pairs(layouts: FloatArray) -> FloatArray:
     """The distance of the closest pair of each layout (k, n, 2), (k,), px."""
     n = layouts.shape[1]
     if n > PAIRS:

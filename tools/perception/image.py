@@ -1,8 +1,7 @@
-"""Pictures come from strangers: any path, any bytes.
+"""Loads picture files safely, whatever they hold.
 
-This module is the one door they pass: either plain RGB pixels come out, as a person would
-see them, or one ImageError whose sentence says what is wrong and what would do. Everything
-is judged from file size and header before a decoder may spend memory on it.
+The result is plain RGB pixels as a person would see them, or one ImageError that says what is
+wrong and what to do. File size and header are checked before a decoder may spend memory.
 """
 
 import hashlib
@@ -28,7 +27,7 @@ MAX_PIXELS = 50_000_000
 MAX_SIDE = 20_000
 MIN_SIDE = 16
 
-# A closed list: Pillow knows dozens of rare formats whose readers few people have tested.
+# A closed list: Pillow reads dozens of rare formats whose decoders are little tested.
 _FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "GIF", "TIFF") + (
     ("AVIF",) if "avif" in features.modules and features.check_module("avif") else ()
 )
@@ -98,7 +97,7 @@ def load_picture(path: str | os.PathLike[str]) -> Picture:
     """
     shown = os.fspath(path)
     try:
-        data = _read(Path(path), shown)
+        data = _file_bytes(Path(path), shown)
     except (OSError, ValueError) as error:
         raise _unreadable(shown, error) from None
     return replace(picture_from_bytes(data, Path(path).name), path=Path(path).resolve())
@@ -130,7 +129,7 @@ def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Pictur
     `picture_from_bytes` refuses.
     """
     if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or pixels.shape[2:] not in ((), (3,)):
-        raise _fault(
+        raise _image_error(
             name,
             f"is an array of {pixels.dtype} with shape {pixels.shape}",
             "give uint8 of shape (height, width, 3) or (height, width)",
@@ -148,7 +147,7 @@ def picture_file(picture: Picture) -> bytes:
     """A file that holds the picture: the one it came from while that is the same, else a PNG."""
     if picture.path is not None:
         with suppress(ImageError, OSError, ValueError):
-            data = _read(picture.path, picture.name)
+            data = _file_bytes(picture.path, picture.name)
             if hashlib.sha256(data).hexdigest() == picture.sha256:
                 return data
     file = BytesIO()
@@ -166,21 +165,21 @@ def picture_from_file(data: bytes, name: str, sha256: str) -> Picture:
     return picture if picture.sha256 == sha256 else picture_from_array(picture.pixels, name)
 
 
-def _fault(name: str, problem: str, remedy: str) -> ImageError:
+def _image_error(name: str, problem: str, remedy: str) -> ImageError:
     return ImageError(f"{name!r} {problem}; {remedy}.")
 
 
 def _empty(name: str) -> ImageError:
-    return _fault(name, "is empty (0 bytes)", f"give a {_ALLOWED} picture")
+    return _image_error(name, "is empty (0 bytes)", f"give a {_ALLOWED} picture")
 
 
-def _read(path: Path, shown: str) -> bytes:
+def _file_bytes(path: Path, shown: str) -> bytes:
     info = path.stat()
     if stat.S_ISDIR(info.st_mode):
-        raise _fault(shown, "is a folder", "give the path of one picture file")
+        raise _image_error(shown, "is a folder", "give the path of one picture file")
     # Reading a pipe can wait for ever, and a device such as /dev/zero never ends.
     if not stat.S_ISREG(info.st_mode):
-        raise _fault(shown, "is a device or pipe", "give the path of a regular picture file")
+        raise _image_error(shown, "is a device or pipe", "give the path of a regular picture file")
     if info.st_size == 0:
         raise _empty(shown)
     _check_bytes(shown, info.st_size)
@@ -191,16 +190,18 @@ def _read(path: Path, shown: str) -> bytes:
 
 def _unreadable(shown: str, error: Exception) -> ImageError:
     if isinstance(error, (FileNotFoundError, NotADirectoryError)):
-        return _fault(shown, "does not exist", "check the spelling of the path")
+        return _image_error(shown, "does not exist", "check the spelling of the path")
     if isinstance(error, PermissionError):
-        return _fault(shown, "may not be read: permission denied", "allow reading, or copy it")
+        return _image_error(
+            shown, "may not be read: permission denied", "allow reading, or copy it"
+        )
     reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-    return _fault(shown, f"cannot be read ({reason})", "check the path of the picture file")
+    return _image_error(shown, f"cannot be read ({reason})", "check the path of the picture file")
 
 
 def _check_bytes(name: str, count: int) -> None:
     if count > MAX_FILE_BYTES:
-        raise _fault(
+        raise _image_error(
             name,
             f"is too large: {count / 2**20:,.1f} MiB",
             f"at most {MAX_FILE_BYTES // 2**20} MiB are allowed, so save a smaller copy",
@@ -209,7 +210,7 @@ def _check_bytes(name: str, count: int) -> None:
 
 def _check_size(name: str, width: int, height: int) -> None:
     if min(width, height) < MIN_SIDE:
-        raise _fault(
+        raise _image_error(
             name,
             f"is too small: {width} x {height} pixels",
             f"give a picture of at least {MIN_SIDE} pixels on each side",
@@ -219,7 +220,7 @@ def _check_size(name: str, width: int, height: int) -> None:
 
 
 def _too_many_pixels(name: str, claim: str) -> ImageError:
-    return _fault(
+    return _image_error(
         name,
         f"is too large: {claim}",
         f"at most {MAX_PIXELS // 10**6} megapixels and {MAX_SIDE:,} pixels on a side are "
@@ -229,7 +230,7 @@ def _too_many_pixels(name: str, claim: str) -> ImageError:
 
 def _decode(data: bytes, name: str) -> tuple[NDArray[np.uint8], tuple[str, ...]]:
     try:
-        with _quiet(), Image.open(BytesIO(data), formats=_FORMATS) as opened:
+        with _pillow_silenced(), Image.open(BytesIO(data), formats=_FORMATS) as opened:
             _check_size(name, *opened.size)
             _check_tiles(name, opened)
             frames = _frames_note(opened)
@@ -247,7 +248,7 @@ def _decode(data: bytes, name: str) -> tuple[NDArray[np.uint8], tuple[str, ...]]
 
 
 @contextmanager
-def _quiet() -> Generator[None]:
+def _pillow_silenced() -> Generator[None]:
     """Keep Pillow's warnings, and the one error it logs, from the user for a while."""
     logger = logging.getLogger(TiffImagePlugin.__name__)
 
@@ -267,12 +268,12 @@ def _undecodable(name: str, data: bytes, error: Exception) -> ImageError:
     if isinstance(error, UnidentifiedImageError):
         what = next((text for pattern, text in _FOREIGN if re.match(pattern, data[:512], re.I)), "")
         problem = f"is {what}, not a picture of an allowed format" if what else _UNKNOWN
-        return _fault(name, problem, f"give a {_ALLOWED} file")
+        return _image_error(name, problem, f"give a {_ALLOWED} file")
     if isinstance(error, Image.DecompressionBombError):
         return _too_many_pixels(name, "its header claims a vast picture")
     if isinstance(error, MemoryError):
-        return _fault(name, "needs more memory than there is", "save a smaller copy")
-    return _fault(
+        return _image_error(name, "needs more memory than there is", "save a smaller copy")
+    return _image_error(
         name, "cannot be decoded: it is damaged, cut short or has oversized metadata", _RESAVE
     )
 

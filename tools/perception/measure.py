@@ -11,7 +11,7 @@ from .contours import outline_of_mask
 from .detectors.candidates import segment_candidate
 from .image import Picture
 from .referring.attributes import Candidate
-from .segmenters.drawn_outline import straightened, within
+from .segmenters.drawn_outline import clipped_to_picture, with_straight_sides
 from .segmenters.grabcut_segmenter import visible_vertices
 from .segmenters.protocol import PromptKind, Segmenter
 from .target_prompt import Point, TargetPrompt
@@ -42,12 +42,13 @@ def measure_outline(
         ToolError: the segmenter does not take such a prompt; the text says which it takes.
         InputError: the mask is empty or in pieces.
     """
-    kinds = _kinds(prompt, segmenter)
+    kinds = _prompt_kinds(prompt, segmenter)
     refused = kinds - segmenter.takes
     if refused:
+        takes = _joined_kinds(segmenter.takes, "and")
         raise ToolError(
-            f"The segmenter {segmenter.name!r} cannot be pointed with {_listed(refused, 'or')}. "
-            f"It takes {_listed(segmenter.takes, 'and')}: use that, or another segmenter."
+            f"The segmenter {segmenter.name!r} cannot be pointed with "
+            f"{_joined_kinds(refused, 'or')}. It takes {takes}: use that, or another segmenter."
         )
     pixels = picture.pixels
     if candidate is not None:
@@ -58,7 +59,7 @@ def measure_outline(
     outline = outline_of_mask(mask.mask)
     if prompt.straight and prompt.outline is not None:
         seen = visible_vertices(prompt.outline, *picture.size)
-        outline = within(straightened(outline, seen), *picture.size)
+        outline = clipped_to_picture(with_straight_sides(outline, seen), *picture.size)
     return Measured(outline, mask.confidence, mask.parts)
 
 
@@ -69,7 +70,7 @@ def missed_vertices(outline: Outline, prompt: TargetPrompt) -> tuple[Point, ...]
     return tuple((float(x), float(y)) for x, y in drawn[away])
 
 
-def _kinds(prompt: TargetPrompt, segmenter: Segmenter) -> set[PromptKind]:
+def _prompt_kinds(prompt: TargetPrompt, segmenter: Segmenter) -> set[PromptKind]:
     """The kinds of prompt it is made of; a candidate is pointed at by outline, or else by box."""
     kinds: set[PromptKind] = set()
     if prompt.candidate is not None:
@@ -84,6 +85,6 @@ def _kinds(prompt: TargetPrompt, segmenter: Segmenter) -> set[PromptKind]:
     return kinds
 
 
-def _listed(kinds: frozenset[PromptKind] | set[PromptKind], last: str) -> str:
+def _joined_kinds(kinds: frozenset[PromptKind] | set[PromptKind], last: str) -> str:
     *most, one = sorted(kinds)
     return f"{', '.join(most)} {last} {one}" if most else one

@@ -78,7 +78,7 @@ class TargetPrompt(BaseModel):
         """Without `straight` where it says nothing, as before there was such a word."""
         return {k: v for k, v in standard(self).items() if k != "straight" or v}
 
-    def mended_by(self, later: "TargetPrompt") -> "TargetPrompt":
+    def corrected_by(self, later: "TargetPrompt") -> "TargetPrompt":
         """This outline, corrected by another prompt's points as well."""
         points = (*(self.points or ()), *(later.points or ()))
         update = {"points": points or None, "negative": self.negative + later.negative}
@@ -95,7 +95,7 @@ class TargetPrompt(BaseModel):
 
     def problems(self, width: int, height: int) -> list[str]:
         """All that makes it unusable on a picture of this size; each one sentence."""
-        allowed = _allowed(width, height)
+        allowed = _picture_extent(width, height)
         found = [
             f"The point ({x:g}, {y:g}) lies outside the picture; {allowed}."
             for x, y in (*(self.points or ()), *self.negative)
@@ -118,11 +118,11 @@ def box_problems(box: Box, width: int, height: int) -> list[str]:
         return [f"{shown} is empty; it must be {MIN_SIDE:g} px or more on each side."]
     left, top = max(x0, 0), max(y0, 0)
     if min(x1, width - 1) - left < MIN_SIDE or min(y1, height - 1) - top < MIN_SIDE:
-        return [f"{shown} lies outside the picture; {_allowed(width, height)}."]
+        return [f"{shown} lies outside the picture; {_picture_extent(width, height)}."]
     return []
 
 
-def _allowed(width: int, height: int) -> str:
+def _picture_extent(width: int, height: int) -> str:
     return f"the picture is {width} x {height} px (x 0 to {width - 1}, y 0 to {height - 1})"
 
 

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 import shapely
 from formup.tools.geometry.interior import coverage_radius, inside, yardstick
-from formup.tools.geometry.lattice import ALL_PHASES, Lattice, ideal_pitch, lattice_points, widest
+from formup.tools.geometry.lattice import (
+    ALL_PHASES,
+    Lattice,
+    ideal_pitch,
+    lattice_points,
+    widest_lattice,
+)
 from formup.tools.geometry.lloyd import cells_of, grid, relax
 from formup.tools.geometry.outline import FloatArray, Outline, make_outline
 from formup.tools.geometry.sampling import min_spacing, nearest
@@ -68,7 +74,7 @@ def test_the_margin_is_kept_at_a_reflex_corner(n: int) -> None:
 def test_the_widest_lattice_has_exactly_n_and_none_missing_inside(n: int, turn: float) -> None:
     region = BUMPY.polygon
     lies = [Lattice(turn, phase) for phase in ALL_PHASES[:4]]
-    points = widest(region, n, lies)
+    points = widest_lattice(region, n, lies)
     pitch = min_spacing(points)
     assert len(points) == n
     assert pitch >= 0.93 * ideal_pitch(region.area, n) or n < 30

@@ -1,8 +1,8 @@
-"""Where to put robots so that they cage an object: few of them, and certified.
+"""Places few robots so that they cage an object, and certifies the cage.
 
-Even rings come first. Else the robots slide along rings at two distances so that the widest way
-out, judged roughly on a coarse grid of configurations, gets narrower; what that finds is then
-put to the tests of `cage`. All of it is deterministic.
+Even rings are tried first. Otherwise robots slide along rings at two distances so that the widest
+way out, estimated on a coarse grid of configurations, gets narrower; the result is then tested by
+`cage`. All of it is deterministic.
 """
 
 from collections.abc import Iterator, Sequence
@@ -159,7 +159,7 @@ class _Slides:
         rings = [
             c for c in demand.curves if c.closed or (demand.walls is not None and c.length > 0)
         ]
-        self._rings = [_stations(curve) for curve in rings]
+        self._rings = [_ring_stations(curve) for curve in rings]
         body = body_of(demand.outline.filled)
         every = np.concatenate(self._rings) if self._rings else np.empty((0, 2))
         self._grid: Grid = first_grid(body, Obstacles(every, demand.radius))
@@ -227,7 +227,7 @@ class _Slides:
         return bool(away.min() >= max(self._demand.spacing, 1e-9))
 
 
-def _stations(curve: Curve) -> FloatArray:
+def _ring_stations(curve: Curve) -> FloatArray:
     """Points evenly along the pieces of a curve, (k, 2)."""
     pieces: list[FloatArray] = []
     for line in map(LineString, curve.lines):

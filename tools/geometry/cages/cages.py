@@ -1,8 +1,8 @@
-"""Is a rigid object caged, so that it cannot get out between robots that stand still?
+"""Decides whether robots that stand still cage a rigid object.
 
-Two sufficient tests, a disc inside it and a flood of its configuration space, and one that shows
-the contrary: a way out checked move by move. Between them the answer is "not certified". No rule
-that compares gaps with the object's least width is used: it is wrong for shapes with recesses.
+Two tests are sufficient for a cage: a disc inside the object and a flood of its configuration
+space. A third shows an escape, checked move by move. Between them the answer is "not certified".
+Comparing gaps with the object's least width is no test: it is wrong for shapes with recesses.
 """
 
 import math
@@ -127,7 +127,7 @@ def widest_link(points: FloatArray, centre: FloatArray) -> tuple[int, int] | Non
     Returns:
         Indices of the points at its ends; None where no ring of the points holds the centre.
     """
-    links = _links(points)
+    links = _delaunay_links(points)
     if not len(links):
         return None
     (xi, yi), (xj, yj) = (points[links] - centre).transpose(1, 2, 0)
@@ -136,14 +136,14 @@ def widest_link(points: FloatArray, centre: FloatArray) -> tuple[int, int] | Non
     near: list[list[int]] = [[] for _ in points]
     for (i, j), angle in zip(links.tolist(), angles, strict=True):
         winds = abs(forest.join(i, j, angle)) > math.pi
-        if winds and _holds(points[_way(near, i, j)] - centre):
+        if winds and _winds_around_origin(points[_fewest_links_path(near, i, j)] - centre):
             return i, j
         near[i].append(j)
         near[j].append(i)
     return None
 
 
-def _holds(loop: FloatArray) -> bool:
+def _winds_around_origin(loop: FloatArray) -> bool:
     """Whether a polygon (n, 2) is simple and the origin lies in it."""
     places = loop.tolist()
     turns = [
@@ -186,7 +186,7 @@ class _Forest:
         return 0.0
 
 
-def _links(points: FloatArray) -> NDArray[np.intp]:
+def _delaunay_links(points: FloatArray) -> NDArray[np.intp]:
     """Edges of the Delaunay triangulation, shortest first, pairs of indices (m, 2)."""
     edges = shapely.delaunay_triangles(shapely.multipoints(points), only_edges=True)
     ends = shapely.get_coordinates(edges)
@@ -196,7 +196,7 @@ def _links(points: FloatArray) -> NDArray[np.intp]:
     return links[np.argsort((across * across).sum(axis=1), kind="stable")]
 
 
-def _way(near: list[list[int]], start: int, end: int) -> list[int]:
+def _fewest_links_path(near: list[list[int]], start: int, end: int) -> list[int]:
     """A way with the fewest links from one point to another."""
     before = {start: start}
     queue = deque([start])

@@ -1,8 +1,8 @@
-"""Can a body get out between robots? A flood over its configuration space (x, y, theta).
+"""Floods a body's configuration space (x, y, theta) to see whether it can get out between robots.
 
 A cell is blocked only if every configuration in it collides, so what the flood does not reach
-nobody reaches (after Varava et al. 2018, who cover slices of it). The other way round nothing
-follows from a flood: a way out counts only once its moves are checked continuously.
+cannot be reached (after Varava et al. 2018, who cover slices of it). The converse does not hold:
+a way out counts only once its moves are checked continuously.
 """
 
 from dataclasses import dataclass
@@ -67,9 +67,9 @@ def flood(body: Body, obstacles: Obstacles, levels: int, *, escapes: bool = True
     sure = np.zeros(alive.shape, dtype=bool)
     last = levels - 1
     for level in range(levels):
-        room = np.where(sure, _farthest(table, grid), -np.inf)
+        room = np.where(sure, _cell_motion(table, grid), -np.inf)
         cells = np.nonzero(alive & ~sure)
-        room[cells] = _gaps(table, obstacles, grid, cells)
+        room[cells] = _cell_clearances(table, obstacles, grid, cells)
         reached = component(room > -np.inf, grid.seed(body.pivot))
         if not reached[:, grid.border].any():
             return Flood(bool(reached.any()))
@@ -79,17 +79,17 @@ def flood(body: Body, obstacles: Obstacles, levels: int, *, escapes: bool = True
             if path is not None:
                 return Flood(False, path)
         if level == FOLLOWED < last and leaks(
-            partial(_gaps, table, obstacles), grid, room, body.pivot, last - level
+            partial(_cell_clearances, table, obstacles), grid, room, body.pivot, last - level
         ):
             last = max(SEARCHED) if escapes else level
         if level == last:
             break
-        sure = halved(room > _farthest(table, grid) + table.slack)
+        sure = halved(room > _cell_motion(table, grid) + table.slack)
         grid, alive = grid.halved(), halved(reached)
     return Flood(False)
 
 
-def _farthest(table: "_Table", grid: Grid) -> float:
+def _cell_motion(table: "_Table", grid: Grid) -> float:
     """How far at most a robot near the body moves, as the body sees it, within a cell, px."""
     return grid.side / np.sqrt(2) + grid.angle / 2 * table.reach
 
@@ -154,7 +154,7 @@ def _simplified(body: Body) -> Polygon:
     return body.polygon
 
 
-def _gaps(
+def _cell_clearances(
     table: _Table, obstacles: Obstacles, grid: Grid, cells: tuple[IndexArray, ...]
 ) -> FloatArray:
     """Clearance in the middle of each cell as far as the table knows it, (k,), px.
@@ -165,7 +165,7 @@ def _gaps(
     cos, sin = np.cos(theta), np.sin(theta)
     least = np.full(len(x), np.inf)
     step, turn = grid.side / np.sqrt(2), grid.angle / 2
-    for points, radius in _points(table, obstacles, grid):
+    for points, radius in _obstacle_points(table, obstacles, grid):
         (x0, y0), (x1, y1) = points.min(axis=0) - table.reach, points.max(axis=0) + table.reach
         close = np.flatnonzero((x > x0) & (x < x1) & (y > y0) & (y < y1) & (least > -np.inf))
         cx, cy = x[close], y[close]
@@ -200,7 +200,9 @@ def clearances(body: Body, robots: FloatArray, radius: float, grid: Grid) -> NDA
     return fields.reshape(-1, grid.turns, *grid.domain.shape)
 
 
-def _points(table: _Table, obstacles: Obstacles, grid: Grid) -> list[tuple[FloatArray, float]]:
+def _obstacle_points(
+    table: _Table, obstacles: Obstacles, grid: Grid
+) -> list[tuple[FloatArray, float]]:
     """Robots and their radius; runs of points of the walls within reach and radius 0."""
     points = [(obstacles.robots, obstacles.radius)]
     if obstacles.walls is not None:

@@ -1,4 +1,4 @@
-"""Cells of a configuration space (x, y, theta), and which of them hang together.
+"""Cells of a configuration space (x, y, theta): grids, connected components and paths.
 
 Arrays are (turns, rows, columns); theta is a circle, its first cell begins at 0. Frame: image
 pixels, x right, y down.
@@ -99,3 +99,45 @@ def component(free: BoolArray, seed: tuple[int, int, int]) -> BoolArray:
 def halved(cells: BoolArray) -> BoolArray:
     """The same cells in a grid halved."""
     return cells.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2)
+
+
+def neighbours(cells: IndexArray, shape: tuple[int, ...]) -> IndexArray:
+    """Pairs of cells side by side, (m, 2) indices into cells (k, 3); the first axis is a circle."""
+    keys: IndexArray = np.asarray(np.ravel_multi_index(tuple(cells.T), shape), dtype=np.intp)
+    order = np.argsort(keys)
+    ordered = keys[order]
+    pairs: list[IndexArray] = []
+    for axis in range(3):
+        beside = cells.copy()
+        beside[:, axis] += 1
+        beside[:, 0] %= shape[0]
+        there = beside[:, axis] < shape[axis]
+        beside[~there] = 0
+        other = np.asarray(np.ravel_multi_index(tuple(beside.T), shape), dtype=np.intp)
+        rank = np.minimum(np.searchsorted(ordered, other), len(keys) - 1)
+        found = np.flatnonzero(there & (ordered[rank] == other))
+        pairs.append(np.stack([found, order[rank[found]]], axis=1))
+    return np.concatenate(pairs)
+
+
+def shortest_path(links: IndexArray, source: int, ends: BoolArray) -> IndexArray | None:
+    """A path with the fewest links from a node to the nearest end, or None.
+
+    Args:
+        links: (m, 2) pairs of nodes.
+        source: where it starts.
+        ends: (n,) which nodes it may end at.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order
+
+    count = len(ends)
+    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), (count, count)).tocsr()
+    order, before = breadth_first_order(graph, source, directed=False)
+    found = order[ends[order]]
+    if not len(found):
+        return None
+    path = [int(found[0])]
+    while path[-1] != source:
+        path.append(int(before[path[-1]]))
+    return np.array(path[::-1])

@@ -1,21 +1,19 @@
-"""A way out between robots: planned on a grid of configurations, then proved move by move.
+"""Finds a way out between robots: planned on a grid of configurations, then proved move by move.
 
-Moves are checked only once they are wanted (lazy planning, Bohlin and Kavraki 2000). A path that
-is given back is clear all along and ends where a line parts the body from every robot.
+Moves are checked only when a path uses them (lazy planning, Bohlin and Kavraki 2000). A returned
+path is clear throughout and ends where a line separates the body from every robot.
 """
 
 import numpy as np
 
 from ..outline import FloatArray
-from .configuration_grid import BoolArray, Grid, IndexArray, component
+from .configuration_grid import BoolArray, Grid, component, neighbours, shortest_path
 from .rigid import Body, Obstacles, clear_moves, shortened, ways_out
 
 RETRIES = 6
 """How often a way is planned anew without the moves that turned out not to be clear."""
 EXITS = 24
 """So many cells of the border, spread by their distance from the start, may end a way."""
-FAR = -9999
-"""Marks what a breadth-first search did not come to, as scipy does."""
 
 
 def way_out(body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray) -> FloatArray | None:
@@ -35,11 +33,11 @@ def way_out(body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray) -> F
         return None
     cells = np.flatnonzero(reached)
     poses = grid.centres(np.unravel_index(cells, reached.shape))
-    links = _links(reached)
+    links = np.sort(neighbours(np.stack(np.nonzero(reached), axis=1), reached.shape), axis=1)
     source = int(np.searchsorted(cells, np.ravel_multi_index(start, reached.shape)))
-    goals = np.searchsorted(cells, list(exits))
+    ends = np.isin(cells, list(exits))
     for _ in range(RETRIES):
-        nodes = _shortest(links, len(cells), source, goals)
+        nodes = shortest_path(links, source, ends)
         if nodes is None:
             return None
         path = np.stack([body.start, *poses[nodes], exits[int(cells[nodes[-1]])]])
@@ -89,34 +87,3 @@ def _exits(
         int(found[k]): away[k, np.argmin(reach[k])]
         for k in np.flatnonzero(np.isfinite(reach.min(axis=1)))
     }
-
-
-def _links(reached: BoolArray) -> IndexArray:
-    """Pairs of cells side by side, by their rank among those reached, (m, 2), lower rank first."""
-    rank = np.cumsum(reached.ravel()).reshape(reached.shape) - 1
-    pairs: list[IndexArray] = []
-    for axis in range(3):
-        other = np.roll(reached, -1, axis=axis)
-        both = reached & other
-        if axis:  # only theta is a circle
-            both[(slice(None),) * axis + (-1,)] = False
-        pairs.append(np.stack([rank[both], np.roll(rank, -1, axis=axis)[both]], axis=1))
-    return np.sort(np.concatenate(pairs), axis=1)
-
-
-def _shortest(links: IndexArray, count: int, source: int, goals: IndexArray) -> IndexArray | None:
-    """Nodes of a path with the fewest links to the nearest goal."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order
-
-    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), (count, count)).tocsr()
-    order, before = breadth_first_order(graph, source, directed=False)
-    when = np.full(count, count)
-    when[order] = np.arange(len(order))
-    node = int(goals[np.argmin(when[goals])])
-    if when[node] == count:
-        return None
-    nodes = [node]
-    while before[nodes[-1]] != FAR:
-        nodes.append(int(before[nodes[-1]]))
-    return np.array(nodes[::-1])

@@ -1,7 +1,7 @@
-"""Does a flood of the finest grid come to the border? Followed along one way, before all of it.
+"""Checks along one path whether a flood of the finest grid would reach the border.
 
-Where it does, the finest grid certifies nothing, and the work on all its cells is saved. The cells
-looked at are some of those that the whole flood reaches, so that no verdict depends on it.
+If it would, the finest grid certifies nothing and the work on its other cells is saved. The cells
+checked are a subset of those that the whole flood reaches, so that no verdict depends on it.
 """
 
 from collections.abc import Callable
@@ -9,8 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..outline import FloatArray
-from .configuration_grid import BoolArray, Grid, IndexArray
-from .escape import FAR
+from .configuration_grid import BoolArray, Grid, IndexArray, neighbours, shortest_path
 
 Cells = tuple[IndexArray, ...]
 Gaps = Callable[[Grid, Cells], FloatArray]
@@ -54,51 +53,16 @@ def _widest_way(
     source = np.flatnonzero((cells == grid.seed(start)).all(axis=1))
     if not len(source):
         return None
-    links, ends = _links(cells, grid), grid.border[cells[:, 1], cells[:, 2]]
-    way = _way(links, np.ones(len(cells), dtype=bool), int(source[0]), ends)
+    shape = (grid.turns, *grid.domain.shape)
+    links, ends = neighbours(cells, shape), grid.border[cells[:, 1], cells[:, 2]]
+    way = shortest_path(links, int(source[0]), ends)
     low, high = -4 * grid.side, float(gap[source[0]])
     for _ in range(BISECTIONS if way is not None else 0):
         middle = (low + high) / 2
-        wider = _way(links, gap > middle, int(source[0]), ends)
+        wide = links[(gap > middle)[links].all(axis=1)]
+        wider = shortest_path(wide, int(source[0]), ends)
         way, low, high = (way, low, middle) if wider is None else (wider, middle, high)
     return way
-
-
-def _links(cells: IndexArray, grid: Grid) -> IndexArray:
-    """Pairs of cells side by side, (2, m) indices; theta is a circle."""
-    shape = (grid.turns, *grid.domain.shape)
-    keys: IndexArray = np.asarray(np.ravel_multi_index(tuple(cells.T), shape), dtype=np.intp)
-    order = np.argsort(keys)
-    ordered = keys[order]
-    pairs: list[IndexArray] = []
-    for axis in range(3):
-        beside = cells.copy()
-        beside[:, axis] += 1
-        beside[:, 0] %= grid.turns
-        there = beside[:, axis] < shape[axis]
-        beside[~there] = 0
-        other = np.asarray(np.ravel_multi_index(tuple(beside.T), shape), dtype=np.intp)
-        rank = np.minimum(np.searchsorted(ordered, other), len(keys) - 1)
-        found = np.flatnonzero(there & (ordered[rank] == other))
-        pairs.append(np.stack([found, order[rank[found]]]))
-    return np.concatenate(pairs, axis=1)
-
-
-def _way(links: IndexArray, kept: BoolArray, source: int, ends: BoolArray) -> IndexArray | None:
-    """Nodes of a path with the fewest links from one to the nearest end, over those kept."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order
-
-    i, j = links[:, kept[links].all(axis=0)]
-    graph = coo_array((np.ones(len(i)), (i, j)), (len(kept), len(kept))).tocsr()
-    order, before = breadth_first_order(graph, source, directed=False)
-    found = order[ends[order]]
-    if not len(found):
-        return None
-    way = [int(found[0])]
-    while before[way[-1]] != FAR:
-        way.append(int(before[way[-1]]))
-    return np.array(way)
 
 
 def _touching(cells: IndexArray, way: IndexArray, grid: Grid) -> BoolArray:

@@ -1,11 +1,16 @@
-"""Letters and digits as the strokes a pen would make: robots stand on lines, not in outlines.
+"""Letters and digits as pen strokes, for robots that stand on lines instead of outlines.
 
-Every glyph is 6 high, y down, its left edge at x = 0; strokes are parted by semicolons. A stroke
-is points "x y" and arcs "@ cx cy rx ry from to" (degrees, clockwise as seen, 0 to the right).
+In `letters.json` every glyph is 6 high, y down, its left edge at x = 0. Strokes are separated by
+semicolons; each is points "x y" and arcs "@ cx cy rx ry from to" (degrees, clockwise as seen, 0 to
+the right).
 """
 
+import json
 import math
+from collections.abc import Mapping
 from functools import cache
+from importlib.resources import files
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,44 +22,13 @@ GAP, SPACE = 1.8, 2.4
 """Between two letters and for a blank, as parts of a height of 6."""
 ARC_STEP = 6.0
 """Degrees between the points of an arc."""
-GLYPHS = {
-    "A": "0 6, 2 0, 4 6; 0.6667 4, 3.3333 4",
-    "B": "0 3, 0 0, 2.2 0, @ 2.2 1.5 1.5 1.5 -90 90, 0 3, 0 6, 2.5 6, @ 2.5 4.5 1.5 1.5 90 -90",
-    "C": "@ 2 2 2 2 -25 -180, @ 2 4 2 2 180 25",
-    "D": "0 0, 0 6, 1.6 6, @ 1.6 3.6 2.4 2.4 90 0, @ 1.6 2.4 2.4 2.4 0 -90, 0 0",
-    "E": "3.6 0, 0 0, 0 6, 3.6 6; 0 3, 2.8 3",
-    "F": "3.6 0, 0 0, 0 6; 0 3, 2.8 3",
-    "G": "@ 2 2 2 2 -25 -180, @ 2 4 2 2 180 0, 4 3.2, 2.2 3.2",
-    "H": "0 0, 0 6; 4 0, 4 6; 0 3, 4 3",
-    "I": "0 0, 0 6",
-    "J": "3 0, 3 4.5, @ 1.5 4.5 1.5 1.5 0 165",
-    "K": "0 0, 0 6; 3.8 0, 0 3.8; 1.4 2.4, 3.8 6",
-    "L": "0 0, 0 6, 3.4 6",
-    "M": "0 6, 0 0, 2.3 4, 4.6 0, 4.6 6",
-    "N": "0 6, 0 0, 4 6, 4 0",
-    "O": "@ 2 2 2 2 -180 0, @ 2 4 2 2 0 180, 0 2",
-    "P": "0 6, 0 0, 2.2 0, @ 2.2 1.6 1.6 1.6 -90 90, 0 3.2",
-    "Q": "@ 2 2 2 2 -180 0, @ 2 4 2 2 0 180, 0 2; 2.5 4.3, 4.3 6.1",
-    "R": "0 6, 0 0, 2.2 0, @ 2.2 1.6 1.6 1.6 -90 90, 0 3.2; 1.8 3.2, 3.9 6",
-    "S": "@ 1.8 1.5 1.8 1.5 -25 -270, @ 1.8 4.5 1.8 1.5 -90 155",
-    "T": "0 0, 4 0; 2 0, 2 6",
-    "U": "0 0, 0 4, @ 2 4 2 2 180 0, 4 0",
-    "V": "0 0, 2 6, 4 0",
-    "W": "0 0, 1.4 6, 2.8 1, 4.2 6, 5.6 0",
-    "X": "0 0, 4 6; 4 0, 0 6",
-    "Y": "0 0, 2 3, 4 0; 2 3, 2 6",
-    "Z": "0 0, 4 0, 0 6, 4 6",
-    "0": "@ 1.7 1.7 1.7 1.7 -180 0, @ 1.7 4.3 1.7 1.7 0 180, 0 1.7",
-    "1": "0 1.5, 1.5 0, 1.5 6",
-    "2": "@ 1.8 1.8 1.8 1.8 -165 35, 0 6, 3.6 6",
-    "3": "@ 1.7 1.5 1.6 1.5 -150 90, @ 1.7 4.5 1.8 1.5 -90 150",
-    "4": "2.8 6, 2.8 0, 0 4.2, 4 4.2",
-    "5": "3.3 0, 0.5 0, 0.4 2.7, @ 1.7 4.1 1.9 1.9 -133 150",
-    "6": "2.7 0, @ 1.8 4.2 1.8 1.8 -143.1 216.9",
-    "7": "0 0, 3.8 0, 1.2 6",
-    "8": "@ 1.8 1.5 1.5 1.5 90 450; @ 1.8 4.5 1.8 1.5 -90 270",
-    "9": "@ 1.8 1.8 1.8 1.8 -323.1 36.9, 0.9 6",
-}
+
+
+class Glyph(NamedTuple):
+    """A character: the distance to where the next one begins, and its lines, (k, 2) each."""
+
+    advance: float
+    lines: tuple[FloatArray, ...]
 
 
 def letter_strokes(text: str) -> tuple[FloatArray, ...]:
@@ -63,25 +37,36 @@ def letter_strokes(text: str) -> tuple[FloatArray, ...]:
     Raises:
         InputError: nothing to write, or a character that has no strokes.
     """
-    unknown = sorted({c for c in text.upper() if c not in GLYPHS and c != " "})
+    glyphs = stroke_glyphs()
+    unknown = sorted({c for c in text.upper() if c not in glyphs and c != " "})
     if unknown or not text.strip():
         named = ", ".join(map(repr, unknown)) or repr(text)
         raise InputError(f"Letters are A to Z, 0 to 9 and blanks; {named} cannot be written.")
-    strokes: list[FloatArray] = []
+    return in_a_row(text.upper(), glyphs, SPACE)
+
+
+def in_a_row(text: str, glyphs: Mapping[str, Glyph], space: float) -> tuple[FloatArray, ...]:
+    """The lines of a text's glyphs side by side, a blank being `space` wide."""
+    lines: list[FloatArray] = []
     x = 0.0
-    for character in text.upper().strip():
+    for character in text.strip():
         if character == " ":
-            x += SPACE
+            x += space
             continue
-        drawn = _glyph(character)
-        strokes += [stroke + np.array([x, 0.0]) for stroke in drawn]
-        x += max(float(stroke[:, 0].max()) for stroke in drawn) + GAP
-    return tuple(strokes)
+        lines += [line + np.array([x, 0.0]) for line in glyphs[character].lines]
+        x += glyphs[character].advance
+    return tuple(lines)
 
 
 @cache
-def _glyph(character: str) -> tuple[FloatArray, ...]:
-    return tuple(_stroke(text) for text in GLYPHS[character].split(";"))
+def stroke_glyphs() -> dict[str, Glyph]:
+    """The letters and digits that have strokes."""
+    written = json.loads((files(__package__ or "") / "letters.json").read_text("utf-8"))
+    strokes = {letter: tuple(map(_stroke, text.split(";"))) for letter, text in written.items()}
+    return {
+        letter: Glyph(max(float(line[:, 0].max()) for line in lines) + GAP, lines)
+        for letter, lines in strokes.items()
+    }
 
 
 def _stroke(text: str) -> FloatArray:

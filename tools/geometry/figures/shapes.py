@@ -115,7 +115,7 @@ def polygon_sketch(corners: int) -> Sketch:
     Raises:
         InputError: fewer than 3 corners.
     """
-    return _loop(np.full(_enough(corners), 1.0), 90 + 180 / corners)
+    return _closed_loop(np.full(_checked_corner_count(corners), 1.0), 90 + 180 / corners)
 
 
 def star_sketch(points: int) -> Sketch:
@@ -124,7 +124,7 @@ def star_sketch(points: int) -> Sketch:
     Raises:
         InputError: fewer than 3 points.
     """
-    return _loop(np.tile([1.0, WAIST], _enough(points)), -90)
+    return _closed_loop(np.tile([1.0, WAIST], _checked_corner_count(points)), -90)
 
 
 def letters_sketch(text: str) -> Sketch:
@@ -170,13 +170,13 @@ def grid_sketch(n: int, rows: int) -> Sketch:
     return Sketch(lines, (0.0, 0.0, columns - 1.0, full - 1.0), places, fills=True)
 
 
-def _enough(corners: int) -> int:
+def _checked_corner_count(corners: int) -> int:
     if corners < 3:
         raise InputError(f"A polygon or star has 3 or more corners, not {corners}.")
     return corners
 
 
-def _loop(radii: FloatArray, begin: float) -> Sketch:
+def _closed_loop(radii: FloatArray, begin: float) -> Sketch:
     turn = np.radians(begin + 360 * np.arange(len(radii) + 1) / len(radii))
     turn[-1] = turn[0]
     closed = np.concatenate([radii, radii[:1]])

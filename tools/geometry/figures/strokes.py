@@ -1,4 +1,4 @@
-"""Robots on drawn lines: at their ends, corners and crossings first, evenly between.
+"""Spreads robots over drawn lines: at ends, corners and crossings first, then evenly between.
 
 A drawing is any set of polylines; where they meet they are one. Frame: image pixels, y down.
 """
@@ -34,7 +34,7 @@ class Stretch(NamedTuple):
     robot: int | None
 
 
-def walks(lines: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+def split_at_crossings(lines: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
     """The drawing parted at its crossings and joined where only two lines meet.
 
     Args:
@@ -63,11 +63,11 @@ def spread(lines: tuple[FloatArray, ...], n: int) -> FloatArray:
         lines: each (k, 2), image pixels.
         n: how many.
     """
-    whole = walks(lines)
+    whole = split_at_crossings(lines)
     parted = [piece for walk in whole for piece in _at_corners(walk)]
-    cornered, plain = _shared(parted, n), _shared(list(whole), n)
+    cornered, plain = _distributed(parted, n), _distributed(list(whole), n)
     if plain is None:
-        keys = _keys(list(whole))
+        keys = _piece_ends(list(whole))
         return keys[spread_subset(keys, n)]
     if cornered is not None and cornered[1] >= min(EVEN, plain[1]):
         return cornered[0]
@@ -85,7 +85,7 @@ def stretches(lines: tuple[FloatArray, ...], points: FloatArray, reach: float) -
     found: list[Stretch] = []
     places = np.asarray(shapely.points(points), dtype=object)
     tree = shapely.STRtree(places)
-    for walk in walks(lines):
+    for walk in split_at_crossings(lines):
         line = LineString(walk)
         near = np.asarray(tree.query(line, predicate="dwithin", distance=reach), dtype=np.intp)
         if not len(near):
@@ -123,7 +123,7 @@ def _at_corners(walk: FloatArray) -> list[FloatArray]:
     return [walk[a : b + 1] for a, b in pairwise(cuts)]
 
 
-def _keys(pieces: list[FloatArray]) -> FloatArray:
+def _piece_ends(pieces: list[FloatArray]) -> FloatArray:
     """Where pieces end, each place once; a loop that nothing touches has none."""
     ends = [p[[0, -1]] for p in pieces if not _closed(p) or _touched(p, pieces)]
     return np.unique(np.concatenate(ends), axis=0) if ends else np.empty((0, 2))
@@ -133,13 +133,13 @@ def _touched(loop: FloatArray, pieces: list[FloatArray]) -> bool:
     return any(p is not loop and bool((p[[0, -1]] == loop[0]).all(axis=1).any()) for p in pieces)
 
 
-def _shared(pieces: list[FloatArray], n: int) -> tuple[FloatArray, float] | None:
+def _distributed(pieces: list[FloatArray], n: int) -> tuple[FloatArray, float] | None:
     """Robots at all ends and n less these between, and the narrowest gap by the widest.
 
     None where there are fewer robots than ends. The next robot always goes to the piece with the
     widest gaps, which makes the widest gap of all as narrow as can be.
     """
-    keys = _keys(pieces)
+    keys = _piece_ends(pieces)
     if n < len(keys):
         return None
     free = [

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import InputError
 from ..outline import FloatArray
-from .letters import ARC_STEP
+from .letters import ARC_STEP, Glyph, in_a_row
 
 Point = tuple[float, float]
 
@@ -38,29 +38,20 @@ def letter_outlines(text: str) -> tuple[FloatArray, ...]:
         raise InputError(
             f"Outlined letters are printing ASCII and blanks; {named} cannot be drawn."
         )
-    rings: list[FloatArray] = []
-    x = 0.0
-    for character in text.strip():
-        if character == " ":
-            x += SPACE
-            continue
-        width, drawn = glyphs[character]
-        rings += [ring + np.array([x, 0.0]) for ring in drawn]
-        x += width
-    return tuple(rings)
+    return in_a_row(text, glyphs, SPACE)
 
 
 @cache
-def _glyphs() -> dict[str, tuple[float, tuple[FloatArray, ...]]]:
-    """Advance width and rings of every character."""
+def _glyphs() -> dict[str, Glyph]:
     font = json.loads((files(__package__ or "") / "typeface.json").read_text("utf-8"))
-    return {
-        character: (float(glyph["width"]), tuple(map(_ring, glyph["path"].split("Z")[:-1])))
-        for character, glyph in font["glyphs"].items()
-    }
+    return {character: _glyph(**written) for character, written in font["glyphs"].items()}
 
 
-def _ring(contour: str) -> FloatArray:
+def _glyph(width: float, path: str) -> Glyph:
+    return Glyph(width, tuple(map(_contour_polyline, path.split("Z")[:-1])))
+
+
+def _contour_polyline(contour: str) -> FloatArray:
     """A closed contour of path data as a polyline, y down."""
     points: list[tuple[float, float]] = []
     for command, written in re.findall(r"([MLHVQ])([^MLHVQ]*)", contour):

@@ -1,7 +1,7 @@
-"""The things in a picture that words may mean, found without weights and without names.
+"""Finds the things that stand out in a picture, without trained weights or labels.
 
-Of many proposals those are kept that look most like a thing; a part of a thing, or several
-things run together, gives way to the thing.
+Of many proposals those that look most like a thing are kept; a part of a thing, or several things
+run together, give way to the thing itself.
 """
 
 import math
@@ -23,7 +23,7 @@ from ..referring.measuring import SIDE, measure_attributes
 from ..segmenters.grabcut import Bytes, Floats, Mask, Window, open_window, pieces, resampled
 from ..segmenters.protocol import Segmentation
 from ..target_prompt import TargetPrompt
-from .objectness import Region, judged
+from .objectness import Region, scored_regions
 from .proposals import CELLS, IN_CELL, proposals
 
 # The score of a thing as clear as can be, and the least that is shown to a person.
@@ -76,11 +76,13 @@ def find_candidates(pixels: Bytes) -> tuple[Candidate, ...]:
     height, width = pixels.shape[:2]
     window = open_window(pixels, (0, 0, width, height), SIDE)
     least = LEAST / REPEATED
-    regions = [r for r in judged(proposals(window.features), window.features) if r.score >= least]
+    regions = [
+        r for r in scored_regions(proposals(window.features), window.features) if r.score >= least
+    ]
     small = resampled(pixels, (window.shape[1], window.shape[0]))
     found: list[Candidate] = []
-    for thing in _things(_distinct(regions, window.features), window.features):
-        outline = _outline(thing, window)
+    for thing in _whole_objects(_distinct_regions(regions, window.features), window.features):
+        outline = _thing_outline(thing, window)
         if outline is not None:
             name = f"c{len(found) + 1}"
             salience = min(thing.score / SURE, 1.0)
@@ -96,7 +98,7 @@ def find_candidates(pixels: Bytes) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def clear_ones(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+def salient_candidates(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """Those that words can mean: what stands out, without the faint patches of a texture."""
     most = max((c.salience for c in candidates), default=0.0)
     return tuple(c for c in candidates if c.salience >= min(CLEAR, CLEAR_SHARE * most))
@@ -105,14 +107,14 @@ def clear_ones(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
 def segment_candidate(
     segment: Callable[[TargetPrompt], Segmentation], candidate: Candidate, *, by_box: bool = False
 ) -> tuple[Outline, float, dict[str, float]]:
-    """The candidate's outline measured again up close, with its confidence and the parts of it.
+    """Measure a candidate's outline again up close: outline, confidence and the cues it is made of.
 
     The segmenter is pointed at the candidate's outline, or only its box. Where it finds something
     else, the candidate stays as it was found; its confidence is half how far the two agree, half
     how clearly it stands out.
     """
     outline = candidate.outline
-    rough = {"box": outline.bounds} if by_box else {"outline": _few_vertices(outline.filled)}
+    rough = {"box": outline.bounds} if by_box else {"outline": _rough_outline(outline.filled)}
     found = segment(TargetPrompt.model_validate(rough))
     try:
         outline = outline_of_mask(found.mask)
@@ -126,7 +128,7 @@ def segment_candidate(
     return candidate.outline, (fit + candidate.salience) / 2, parts
 
 
-def _few_vertices(polygon: Polygon) -> tuple[tuple[float, float], ...]:
+def _rough_outline(polygon: Polygon) -> tuple[tuple[float, float], ...]:
     rough: BaseGeometry = polygon
     tolerance = 0.5
     while shapely.get_num_coordinates(rough) > MOST_VERTICES:
@@ -136,7 +138,7 @@ def _few_vertices(polygon: Polygon) -> tuple[tuple[float, float], ...]:
 
 
 class Thing(NamedTuple):
-    """A region, the holes in it that show the ground, the rest of it, and its score.
+    """A region with its holes (where the ground shows), what is left without them, and a score.
 
     Masks are (h, w), in the region's box.
     """
@@ -172,7 +174,7 @@ def _shows_ground(region: Region, features: Bytes) -> bool:
     return bool(seen.any()) and float(np.mean(np.asarray(again)[seen])) > AGAIN
 
 
-def _distinct(regions: Sequence[Region], features: Bytes) -> list[Region]:
+def _distinct_regions(regions: Sequence[Region], features: Bytes) -> list[Region]:
     """The best of all that show the same, with the gaps any of them shows; none that is ground."""
     chosen: list[Region] = []
     for region in regions:
@@ -193,27 +195,27 @@ def _nested(one: Region, other: Region) -> bool:
     return one.shared(other) >= NESTED * min(one.area, other.area)
 
 
-def _things(regions: Sequence[Region], features: Bytes) -> list[Thing]:
+def _whole_objects(regions: Sequence[Region], features: Bytes) -> list[Thing]:
     """The regions that are neither parts of others nor several things run together."""
     things: list[Thing] = []
     for region in regions:
         if not _run_together(region, regions):
-            holes = _holes(region, features)
+            holes = _ground_holes(region, features)
             solid = region.proposal.mask.copy()
             for hole in holes:
                 solid &= ~hole
             share = int(np.count_nonzero(solid)) / region.area
             things.append(Thing(region, holes, solid, region.score * share**0.5))
-    things = [t._replace(score=t.score * _repeated(t, things, features)) for t in things]
+    things = [t._replace(score=t.score * _repetition_factor(t, things, features)) for t in things]
     clear = [t for t in things if t.score >= LEAST]
     filled = [t for t in clear if not any(_is_hole(t, w) for w in clear)]
     kept = [t for t in filled if not any(_is_part(t, w) for w in filled)]
     return sorted(kept, key=lambda t: -t.score)
 
 
-def _repeated(thing: Thing, things: Sequence[Thing], features: Bytes) -> float:
+def _repetition_factor(thing: Thing, things: Sequence[Thing], features: Bytes) -> float:
     """REPEATED where two others or more have its size, proportions and colour, else 1."""
-    area, colour = np.count_nonzero(thing.solid), _colour(thing, features)
+    area, colour = np.count_nonzero(thing.solid), _median_colour(thing, features)
     height, width = thing.solid.shape
     alike = 0
     for other in things:
@@ -221,11 +223,11 @@ def _repeated(thing: Thing, things: Sequence[Thing], features: Bytes) -> float:
         sides = np.sort(other.solid.shape) / np.sort((height, width))
         near = np.abs(np.log([sizes, *sides])).max() < ALIKE_SIZE
         if other is not thing and near:
-            alike += float(np.linalg.norm(_colour(other, features) - colour)) < ALIKE_COLOUR
+            alike += float(np.linalg.norm(_median_colour(other, features) - colour)) < ALIKE_COLOUR
     return REPEATED if alike >= 2 else 1.0
 
 
-def _colour(thing: Thing, features: Bytes) -> Floats:
+def _median_colour(thing: Thing, features: Bytes) -> Floats:
     """The median colour of a thing, in features."""
     x, y = thing.region.proposal.origin
     height, width = thing.solid.shape
@@ -238,7 +240,7 @@ def _is_hole(thing: Thing, other: Thing) -> bool:
     if thing is other:  # a hole may be nearly all that there is of a wire frame
         return False
     return any(
-        _within(thing.region, other.region, hole)
+        _lies_within(thing.region, other.region, hole)
         and thing.region.shared(other.region, hole) >= FILLS * int(np.count_nonzero(hole))
         for hole in other.holes
     )
@@ -248,10 +250,10 @@ def _is_part(part: Thing, whole: Thing) -> bool:
     """Whether a thing lies in the body of another that looks as good or nearly so."""
     if PART * whole.score < part.score or part.region.area >= whole.region.area:
         return False
-    return _within(part.region, whole.region, whole.solid)
+    return _lies_within(part.region, whole.region, whole.solid)
 
 
-def _within(part: Region, whole: Region, body: Mask) -> bool:
+def _lies_within(part: Region, whole: Region, body: Mask) -> bool:
     return part.shared(whole, body) >= WITHIN * part.area
 
 
@@ -261,7 +263,7 @@ def _run_together(whole: Region, regions: Sequence[Region]) -> bool:
     for region in sorted(regions, key=lambda r: -r.area):
         smaller = region.area < whole.area
         apart = all(region.shared(p) < (1 - WITHIN) * region.area for p in parts)
-        part = smaller and apart and _within(region, whole, whole.proposal.mask)
+        part = smaller and apart and _lies_within(region, whole, whole.proposal.mask)
         if part and _own_ground(region, whole) > OWN_GROUND:
             parts.append(region)
     covered = sum(p.area for p in parts) / whole.area
@@ -275,7 +277,7 @@ def _own_ground(part: Region, whole: Region) -> float:
     return 1 - float(np.mean(whole.holds(part.points + GROUND * part.normals)))
 
 
-def _outline(thing: Thing, window: Window) -> Outline | None:
+def _thing_outline(thing: Thing, window: Window) -> Outline | None:
     """The thing's outline in image px, holes kept; None for a speck."""
     margin = 2
     padded = np.pad(thing.solid, margin).astype(np.float32)
@@ -300,7 +302,7 @@ def _outline(thing: Thing, window: Window) -> Outline | None:
         return None
 
 
-def _holes(region: Region, features: Bytes) -> tuple[Mask, ...]:
+def _ground_holes(region: Region, features: Bytes) -> tuple[Mask, ...]:
     """The holes (h, w) in a region that show the ground around it."""
     mask, (x, y) = region.proposal.mask, region.proposal.origin
     if not region.gaps:

@@ -1,4 +1,4 @@
-"""How much a region looks like a thing: an edge all round, and one plain ground around it."""
+"""Scores how much a region looks like a thing: an edge all round, and plain ground around it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..segmenters.grabcut import Bytes, Floats, Mask
+from ..segmenters.region_growing import solidity
 from .proposals import Proposal
 
 Coordinates = npt.NDArray[np.floating]
@@ -28,7 +29,8 @@ CUT = 0.6
 SIZE_POWER = 0.1
 # Thinner regions than this, px, are lines and cracks rather than things.
 BROAD = 4.0
-# Gaps that are told apart, and from which share of the region they are any.
+# Different gaps that are kept, the least share of the region that is a gap, and the share by which
+# two gaps differ.
 MOST_GAPS, LEAST_GAP, SAME_GAPS = 6, 0.03, 0.02
 
 
@@ -94,7 +96,7 @@ class Region:
         return self if known else replace(self, gaps=(*self.gaps, gaps))
 
 
-def judged(found: Iterable[Proposal], features: Bytes) -> list[Region]:
+def scored_regions(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     """The proposals as regions of `features` (h, w, 3), the best first."""
     traced = [(p, t) for p in found if (t := _traced(p.ring)) is not None]
     if not traced:
@@ -103,8 +105,8 @@ def judged(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     normals = np.stack([t[1] for _, t in traced])
     blurred = cv2.GaussianBlur(features.astype(np.float32), (0, 0), 1.0)
     colours = np.asarray(blurred, dtype=np.float32)
-    inner, _ = _at(colours, points - INSIDE * normals)
-    outer, seen = _at(colours, points + OUTSIDE * normals)
+    inner, _ = _sampled_colours(colours, points - INSIDE * normals)
+    outer, seen = _sampled_colours(colours, points + OUTSIDE * normals)
     contrast = np.where(seen, np.linalg.norm(outer - inner, axis=2), np.inf)
     weak = (WEAK * seen.sum(axis=1)).astype(np.int64)
     clear = np.sort(contrast, axis=1)[np.arange(len(weak)), weak]
@@ -114,8 +116,12 @@ def judged(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     plain = clear / (clear + CLEAR) * UNEVEN / (UNEVEN + uneven)
     regions: list[Region] = []
     for k, (proposal, _) in enumerate(traced):
-        borders = _borders(proposal, features.shape)
-        shape = _solidity(proposal) ** 0.5 * proposal.area**SIZE_POWER * _breadth(proposal)
+        borders = _borders_reached(proposal, features.shape)
+        shape = (
+            solidity(proposal.ring, proposal.area) ** 0.5
+            * proposal.area**SIZE_POWER
+            * _breadth(proposal)
+        )
         score = float(plain[k]) * shape * CUT**borders
         regions.append(Region(proposal, score, points[k], normals[k], borders))
     return sorted(regions, key=lambda r: -r.score)
@@ -139,18 +145,12 @@ def _traced(outermost: npt.NDArray[np.int32]) -> tuple[Floats, Floats] | None:
     return ring[at], np.stack([-along[:, 1], along[:, 0]], axis=1)
 
 
-def _solidity(proposal: Proposal) -> float:
-    """Share of its convex hull that a region fills; pixels reach half a pixel off their centres."""
-    hull = cv2.convexHull(proposal.ring)
-    return proposal.area / (cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1)
-
-
 def _breadth(proposal: Proposal) -> float:
     """1, or less for what is thin as a line."""
     return min(1.0, 2 * proposal.area / (len(proposal.ring) * BROAD))
 
 
-def _at(colours: Floats, points: Coordinates) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _sampled_colours(colours: Floats, points: Coordinates) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Colours (k, n, 3) at points (k, n, 2), the nearest ones beyond the picture; which are in."""
     far = np.array([colours.shape[1] - 1, colours.shape[0] - 1])
     x, y = np.moveaxis(np.rint(points.clip(0, far)).astype(np.int64), 2, 0)
@@ -158,7 +158,7 @@ def _at(colours: Floats, points: Coordinates) -> tuple[Floats, npt.NDArray[np.bo
     return colours[y, x], np.asarray(seen.all(axis=2))
 
 
-def _borders(proposal: Proposal, shape: tuple[int, ...]) -> int:
+def _borders_reached(proposal: Proposal, shape: tuple[int, ...]) -> int:
     """How many borders of the picture the region reaches."""
     (x, y), (height, width) = proposal.origin, proposal.mask.shape
     reached = (x <= 1, y <= 1, x + width >= shape[1] - 1, y + height >= shape[0] - 1)

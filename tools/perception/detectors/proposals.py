@@ -1,4 +1,4 @@
-"""Regions of a picture that may be things, from many cues and no trained weights.
+"""Proposes regions of a picture that may be things, from many cues and no trained weights.
 
 Every connected piece of every threshold of every cue is a proposal, as in a component tree
 (Matas et al., 2002); what is a thing among them is for `candidates` to judge.
@@ -73,11 +73,11 @@ def proposals(features: Bytes) -> list[Proposal]:
                 sides = tuple(round(v / SAME) for v in (x, y, x + width, y + height))
                 key = (*sides, round(FILLS * int(areas[i]) / (width * height)))
                 if key not in found:
-                    found[key] = _proposal(labels[y : y + height, x : x + width] == i, (x, y))
+                    found[key] = _proposal_of(labels[y : y + height, x : x + width] == i, (x, y))
     return list(found.values())
 
 
-def _proposal(raw: Mask, origin: tuple[int, int]) -> Proposal:
+def _proposal_of(raw: Mask, origin: tuple[int, int]) -> Proposal:
     contours, _ = cv2.findContours(raw.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     mask = np.zeros(raw.shape, np.uint8)
     cv2.drawContours(mask, contours, -1, (1,), cv2.FILLED)

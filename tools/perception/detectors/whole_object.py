@@ -1,4 +1,4 @@
-"""The whole thing around the part that a point hit: what stands out from the ground around it.
+"""Proposes the whole object around the part that a point hit, as what stands out from the ground.
 
 A click on a car's roof grows the roof. Where a region is not surrounded by one plain ground, the
 piece of the picture that differs from the ground further out is proposed as the whole.
@@ -34,9 +34,9 @@ PLAIN_SHARE, PLAIN_DISTANCE = 0.8, 14.0
 SURROUNDINGS = 0.1
 
 
-def propose_wholes(pixels: Bytes, points: Sequence[Point], count: int) -> list[Region]:
+def propose_whole(pixels: Bytes, points: Sequence[Point], count: int) -> list[Region]:
     """Up to `count` clearly different regions (H, W, 3) that hold the points and are not ground."""
-    return distinct(_standing_off(pixels, points), count)
+    return distinct(_regions_off_ground(pixels, points), count)
 
 
 def on_plain_ground(window: Window, mask: Mask) -> bool:
@@ -54,15 +54,7 @@ def on_plain_ground(window: Window, mask: Mask) -> bool:
     return int(np.count_nonzero(distance < PLAIN_DISTANCE)) > PLAIN_SHARE * len(distance)
 
 
-def solidity(mask: Mask) -> float:
-    """Share of its convex hull that a mask fills."""
-    points = np.argwhere(mask).astype(np.int32)
-    hull = cv2.convexHull(points)
-    # Pixels reach half a pixel beyond their centres.
-    return points.shape[0] / (cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1)
-
-
-def _standing_off(pixels: Bytes, points: Sequence[Point]) -> Iterator[Region]:
+def _regions_off_ground(pixels: Bytes, points: Sequence[Point]) -> Iterator[Region]:
     kernel = np.ones((3, 3), np.uint8)
     for window in windows(pixels, points):
         seeds = seeds_of(window, points)

@@ -1,4 +1,4 @@
-"""What can be measured of a thing without knowing what it is: colour, size, place, shape.
+"""Measured attributes of a thing, whatever it is: colour, size, place, shape.
 
 Words such as "red", "round" or "the largest" are decided on these numbers alone.
 """
@@ -86,7 +86,7 @@ class Attributes:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A thing found in the picture that nobody has named yet.
+    """A thing found in the picture, not yet identified with any words.
 
     Attributes:
         id: c1, c2, ... in the order of salience, the same on every run.

@@ -1,7 +1,7 @@
-"""Colour names of pixels: the eleven basic colour terms, with doubt where two of them meet.
+"""Names pixels by the eleven basic colour terms, shared out where two of them meet.
 
-A pixel is named by the exemplars nearest to it in CIE Lab, so that a colour between red and
-orange is partly both and nobody decides on a hair's breadth.
+A pixel is named by the exemplars nearest to it in CIE Lab: a colour between red and orange counts
+as partly both.
 """
 
 from functools import cache
@@ -39,7 +39,7 @@ def colour_shares(rgb: Bytes) -> tuple[tuple[ColourName, float], ...]:
     """Colour names of pixels (n, 3) with their shares, the largest first."""
     levels = (rgb >> (8 - BITS)).astype(np.int64)
     index = (levels[:, 0] << 2 * BITS) | (levels[:, 1] << BITS) | levels[:, 2]
-    shares = _table()[index].mean(axis=0)
+    shares = _name_table()[index].mean(axis=0)
     named = zip(NAMES, shares.tolist(), strict=True)
     return tuple(sorted(named, key=lambda name_share: -name_share[1]))
 
@@ -51,7 +51,7 @@ def lab_of(rgb: Bytes) -> Floats:
 
 
 @cache
-def _table() -> Floats:
+def _name_table() -> Floats:
     """The share of each name (8 ** BITS, names) for every coarse RGB colour."""
     step = 2 ** (8 - BITS)
     axis = np.arange(2**BITS) * step + step // 2

@@ -1,6 +1,6 @@
 """Which things fit a description, in three values: sure, possible, no.
 
-What is neither clearly so nor clearly not stays possible, so that nobody is told a guess.
+What is neither clearly so nor clearly not stays possible, so that guesses are not reported.
 """
 
 from collections import Counter

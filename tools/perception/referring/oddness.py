@@ -1,7 +1,7 @@
 """The odd one out: what differs in one way from things that are alike in the others.
 
-The picture may hold anything besides; so each thing is held against those it resembles, and
-what is odd must lie well outside the spread of its group.
+The picture may hold other things as well, so each thing is compared with those it resembles; an
+odd one must lie well outside the spread of its group.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Aspect = Literal["colour", "size", "shape", "orientation"]
 
 @dataclass(frozen=True)
 class Limits:
-    """When things differ in an aspect, in its unit.
+    """When things count as different in an aspect, in its unit.
 
     Attributes:
         differs: least distance that is a difference at all.
@@ -89,16 +89,16 @@ def odd_one_out(things: Things, members: IntArray, by: Oddness) -> Ranked:
         "odd_shape": ("shape",),
         "askew": ("orientation",),
     }
-    apart = _distances(things, members)
+    apart = _aspect_distances(things, members)
     best: dict[int, Odd] = {}
     for aspect in kinds[by]:
-        for alike in _alike(apart, aspect):
-            for odd in _standing_out(apart[aspect], alike, aspect):
+        for alike in _comparable(apart, aspect):
+            for odd in _outliers(apart[aspect], alike, aspect):
                 held = best.get(odd.index)
                 if held is None or _strength(odd) > _strength(held):
                     best[odd.index] = odd
     ranking = sorted(best.values(), key=lambda o: (*(-s for s in _strength(o)), o.index))
-    return _judged(things, members, ranking, by)
+    return _ranked_oddities(things, members, ranking, by)
 
 
 def _strength(odd: Odd) -> tuple[float, float, float]:
@@ -106,12 +106,12 @@ def _strength(odd: Odd) -> tuple[float, float, float]:
     return float(odd.group), float(odd.sure), odd.distance / limits.differs
 
 
-def _judged(things: Things, members: IntArray, ranking: list[Odd], by: Oddness) -> Ranked:
+def _ranked_oddities(things: Things, members: IntArray, ranking: list[Odd], by: Oddness) -> Ranked:
     way = "" if by == "odd" else " by " + by.replace("odd_", "").replace("askew", "its turn")
     if not ranking:
         return Ranked((), {}, f"none of {len(members)} things stands out{way}")
     rivals = [o for o in ranking if o.group * SIMILAR > ranking[0].group]
-    reasons = {int(members[o.index]): _reason(things, members, o) for o in rivals}
+    reasons = {int(members[o.index]): _oddity_reason(things, members, o) for o in rivals}
     contenders = tuple(int(members[o.index]) for o in rivals)
     doubt = ""
     if len(rivals) > 1:
@@ -123,7 +123,7 @@ def _judged(things: Things, members: IntArray, ranking: list[Odd], by: Oddness) 
     return Ranked(contenders, reasons, doubt)
 
 
-def _reason(things: Things, members: IntArray, odd: Odd) -> str:
+def _oddity_reason(things: Things, members: IntArray, odd: Odd) -> str:
     others = f"the {odd.group} things like it"
     if odd.aspect == "orientation":
         apart = f"those by {odd.spread:.0f} degrees at most"
@@ -147,8 +147,8 @@ def _reason(things: Things, members: IntArray, odd: Odd) -> str:
     )
 
 
-def _alike(apart: dict[Aspect, FloatArray], aspect: Aspect) -> list[BoolArray]:
-    """Who may be compared in an aspect, since they agree in the others; several ways to see it."""
+def _comparable(apart: dict[Aspect, FloatArray], aspect: Aspect) -> list[BoolArray]:
+    """Which pairs may be compared in an aspect as they agree in others; one matrix per reading."""
     colour = apart["colour"] < LIMITS["colour"].differs
     size = apart["size"] <= ALIKE_SIZE
     shape = apart["shape"] < LIMITS["shape"].differs
@@ -164,7 +164,7 @@ def _alike(apart: dict[Aspect, FloatArray], aspect: Aspect) -> list[BoolArray]:
     return ways[aspect]
 
 
-def _standing_out(apart: FloatArray, alike: BoolArray, aspect: Aspect) -> list[Odd]:
+def _outliers(apart: FloatArray, alike: BoolArray, aspect: Aspect) -> list[Odd]:
     """All that lie well outside the largest group of those alike to them."""
     limits = LIMITS[aspect]
     found: list[Odd] = []
@@ -211,7 +211,7 @@ def _against_groups(
     return int(seeds[best]), near[best], int(blurred[best]), float(spread[best])
 
 
-def _distances(things: Things, members: IntArray) -> dict[Aspect, FloatArray]:
+def _aspect_distances(things: Things, members: IntArray) -> dict[Aspect, FloatArray]:
     """Distances of all pairs of members in each aspect, (m, m)."""
     attributes = [things.candidates[int(i)].attributes for i in members]
     labs, sizes = things.labs[members], np.log(things.areas[members])
@@ -219,7 +219,7 @@ def _distances(things: Things, members: IntArray) -> dict[Aspect, FloatArray]:
         "colour": np.linalg.norm(labs[:, None] - labs[None], axis=2),
         "size": np.abs(sizes[:, None] - sizes[None]),
         "shape": _shape_distances(attributes),
-        "orientation": _turns(attributes),
+        "orientation": _orientation_differences(attributes),
     }
 
 
@@ -241,7 +241,7 @@ def _shape_distances(attributes: list[Attributes]) -> FloatArray:
     return found + OTHER_SHAPE * ((lead >= SHAPE_LEAD) & (lead.T >= SHAPE_LEAD))
 
 
-def _turns(attributes: list[Attributes]) -> FloatArray:
+def _orientation_differences(attributes: list[Attributes]) -> FloatArray:
     """Degrees between orientations; infinite where one of the two has none."""
     angles = np.array([a.orientation for a in attributes], dtype=float)
     period = np.array([_period(a) for a in attributes], dtype=float)

@@ -1,4 +1,4 @@
-"""How words for a thing reach the code: the query language a language model fills in.
+"""The query language in which a language model describes the thing it means.
 
 It has enumerations and numbers only, so that every word has one meaning, decided on measures.
 """

@@ -1,4 +1,4 @@
-"""Superlatives as numbers: who wins, by how much, and who comes too close to be told apart."""
+"""Ranks things by a superlative: the winner, the numbers, and those too close to call."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ SIDES = {"leftmost": (0, 1), "rightmost": (0, -1), "topmost": (1, 1), "bottommos
 
 @dataclass(frozen=True)
 class Ranked:
-    """Who won a pick.
+    """The outcome of a pick.
 
     Attributes:
         contenders: indices of things, the winner first, then all not clearly behind or ahead of
@@ -83,18 +83,18 @@ class Measure:
 
 def rank(things: Things, members: IntArray, pick: Pick) -> Ranked:
     """Decide a pick among things (indices in ascending order); oddness is decided elsewhere."""
-    return _placed(things, members, _measure(things, members, pick.by), pick.place)
+    return _ranked_at(things, members, _measure(things, members, pick.by), pick.place)
 
 
 def rank_nearest(things: Things, members: IntArray, other: int) -> Ranked:
     """Decide which thing is nearest to another by the distance of their edges."""
     gaps, name = things.gaps(other)[members], things.candidates[other].id
-    ahead = _nearer(gaps, _noise(things), NEARER)
+    ahead = _clearly_nearer(gaps, _distance_noise(things), NEARER)
     measure = Measure(-gaps, ahead, f"distance to {name}", f"near to {name}", _pixels(gaps))
-    return _placed(things, members, measure, 1)
+    return _ranked_at(things, members, measure, 1)
 
 
-def _placed(things: Things, members: IntArray, measure: Measure, place: int) -> Ranked:
+def _ranked_at(things: Things, members: IntArray, measure: Measure, place: int) -> Ranked:
     if place > len(members):
         count = (
             f"is only {len(members)} thing" if len(members) == 1 else f"are {len(members)} things"
@@ -107,7 +107,8 @@ def _placed(things: Things, members: IntArray, measure: Measure, place: int) -> 
     contenders = (winner, *close)
     ids = [things.candidates[int(members[i])].id for i in range(len(members))]
     reasons = {
-        int(members[i]): _reason(measure, order, place, i, winner, ids[winner]) for i in contenders
+        int(members[i]): _rank_reason(measure, order, place, i, winner, ids[winner])
+        for i in contenders
     }
     doubt = ""
     if close:
@@ -118,7 +119,7 @@ def _placed(things: Things, members: IntArray, measure: Measure, place: int) -> 
     return Ranked(tuple(int(members[i]) for i in contenders), reasons, doubt)
 
 
-def _reason(
+def _rank_reason(
     measure: Measure, order: IntArray, place: int, index: int, winner: int, winner_id: str
 ) -> str:
     own = f"{measure.noun} {measure.shown[index]}"
@@ -131,26 +132,26 @@ def _reason(
 
 def _measure(things: Things, members: IntArray, by: str) -> Measure:
     if by in SIDES:
-        return _side(things, members, by)
+        return _side_measure(things, members, by)
     if by in CORNERS:
-        return _corner(things, members, by)
+        return _corner_measure(things, members, by)
     other: dict[str, Callable[[Things, IntArray], Measure]] = {
-        "largest": lambda t, m: _area(t, m, 1),
-        "smallest": lambda t, m: _area(t, m, -1),
-        "longest": _longest,
+        "largest": lambda t, m: _area_measure(t, m, 1),
+        "smallest": lambda t, m: _area_measure(t, m, -1),
+        "longest": _length_measure,
         "roundest": _roundest,
         "lightest": lambda t, m: _lightness(t, m, 1),
         "darkest": lambda t, m: _lightness(t, m, -1),
-        "middle": _middle,
-        "farthest_from_border": lambda t, m: _from_border(t, m, 1),
-        "nearest_to_border": lambda t, m: _from_border(t, m, -1),
-        "alone": _alone,
+        "middle": _centrality,
+        "farthest_from_border": lambda t, m: _border_distance(t, m, 1),
+        "nearest_to_border": lambda t, m: _border_distance(t, m, -1),
+        "alone": _isolation,
     }
     return other[by](things, members)
 
 
-def _over(values: FloatArray, margin: float) -> BoolArray:
-    """Ahead by a difference; a rounding error short of it counts."""
+def _ahead_by(values: FloatArray, margin: float) -> BoolArray:
+    """Whether the row is ahead of the column by a margin, give or take rounding."""
     return values[:, None] - values[None] >= margin - 1e-9
 
 
@@ -158,25 +159,25 @@ def _pixels(values: FloatArray) -> list[str]:
     return [f"{v:,.0f} px" for v in values]
 
 
-def _noise(things: Things) -> float:
+def _distance_noise(things: Things) -> float:
     return GAP_NOISE * max(things.width, things.height)
 
 
-def _nearer(gaps: FloatArray, noise: float, ratio: float) -> BoolArray:
+def _clearly_nearer(gaps: FloatArray, noise: float, ratio: float) -> BoolArray:
     """Whether the row's distance is clearly the smaller one."""
     return (gaps[None] >= ratio * gaps[:, None] - 1e-9) & (gaps[None] - gaps[:, None] >= noise)
 
 
-def _area(things: Things, members: IntArray, sign: int) -> Measure:
+def _area_measure(things: Things, members: IntArray, sign: int) -> Measure:
     areas = things.areas[members]
-    ahead = _over(sign * np.log(areas), np.log(AREA_RATIO))
+    ahead = _ahead_by(sign * np.log(areas), np.log(AREA_RATIO))
     return Measure(sign * areas, ahead, "area", "large" if sign > 0 else "small", _pixels(areas))
 
 
-def _longest(things: Things, members: IntArray) -> Measure:
+def _length_measure(things: Things, members: IntArray) -> Measure:
     lengths = np.array([things.candidates[int(i)].outline.long_axis[1] for i in members])
     built = np.array([things.candidates[int(i)].attributes.elongation for i in members])
-    ahead = _over(np.log(lengths), np.log(LENGTH_RATIO))
+    ahead = _ahead_by(np.log(lengths), np.log(LENGTH_RATIO))
     # A plate is longer than a pencil, yet the pencil may be meant.
     ahead &= (built[:, None] >= LONGISH) | (built[None] < LONGER_BUILT * built[:, None])
     return Measure(lengths, ahead, "length", "long", _pixels(lengths))
@@ -185,70 +186,70 @@ def _longest(things: Things, members: IntArray) -> Measure:
 def _roundest(things: Things, members: IntArray) -> Measure:
     values = np.array([things.candidates[int(i)].attributes.roundness for i in members])
     shown = [f"{v:.2f}" for v in values]
-    return Measure(values, _over(values, ROUNDER), "roundness", "round", shown)
+    return Measure(values, _ahead_by(values, ROUNDER), "roundness", "round", shown)
 
 
 def _lightness(things: Things, members: IntArray, sign: int) -> Measure:
     light = things.labs[members, 0]
     shown = [f"L* {v:.0f}" for v in light]
     adjective = "light" if sign > 0 else "dark"
-    return Measure(sign * light, _over(sign * light, LIGHTER), "lightness", adjective, shown)
+    return Measure(sign * light, _ahead_by(sign * light, LIGHTER), "lightness", adjective, shown)
 
 
-def _side(things: Things, members: IntArray, by: str) -> Measure:
+def _side_measure(things: Things, members: IntArray, by: str) -> Measure:
     axis, sign = SIDES[by]
     side = (things.width, things.height)[axis]
     centre = things.centres[members, axis]
     edge = things.boxes[members, axis if sign > 0 else axis + 2]
-    ahead = _over(-sign * centre, APART * side) & _over(-sign * edge, EDGE_APART * side)
+    ahead = _ahead_by(-sign * centre, APART * side) & _ahead_by(-sign * edge, EDGE_APART * side)
     name = "xy"[axis]
     shown = [f"{name} {v:,.0f} px" for v in centre]
     adjective = "far to the " + by.removesuffix("most")
     return Measure(-sign * centre, ahead, "centre at", adjective, shown)
 
 
-def _corner(things: Things, members: IntArray, by: str) -> Measure:
+def _corner_measure(things: Things, members: IntArray, by: str) -> Measure:
     at = np.array(CORNERS[by]) * (things.width - 1, things.height - 1)
     name = f"the {by.replace('_', ' ')} corner"
     far = np.linalg.norm(things.centres[members] - at, axis=1)
-    ahead = _over(-far, CORNER_APART * float(np.hypot(things.width, things.height)))
+    ahead = _ahead_by(-far, CORNER_APART * float(np.hypot(things.width, things.height)))
     return Measure(-far, ahead, f"distance to {name}", f"near to {name}", _pixels(far))
 
 
-def _middle(things: Things, members: IntArray) -> Measure:
+def _centrality(things: Things, members: IntArray) -> Measure:
     at = np.array([things.width - 1, things.height - 1]) / 2
     diagonal = float(np.hypot(things.width, things.height))
     centres = things.centres[members]
     far = np.linalg.norm(centres - at, axis=1)
-    ahead = _over(-far, CORNER_APART * diagonal)
+    ahead = _ahead_by(-far, CORNER_APART * diagonal)
     if len(members) >= 3:
         # The middle one of a row at one side of the picture may be meant as well.
         among = np.linalg.norm(centres - centres.mean(axis=0), axis=1)
         off = (far > MIDDLE_REACH * diagonal)[:, None]
-        ahead &= ~(off & _over(among, 1e-6))
+        ahead &= ~(off & _ahead_by(among, 1e-6))
     noun = "distance to the picture's centre"
     return Measure(-far, ahead, noun, "near to the middle", _pixels(far))
 
 
-def _from_border(things: Things, members: IntArray, sign: int) -> Measure:
+def _border_distance(things: Things, members: IntArray, sign: int) -> Measure:
     boxes = things.boxes[members]
     beyond = np.array([things.width - 1, things.height - 1]) - boxes[:, 2:]
     gaps = np.maximum(np.minimum(boxes[:, :2], beyond).min(axis=1), 0)
-    ahead = _over(sign * gaps, APART * min(things.width, things.height))
+    ahead = _ahead_by(sign * gaps, APART * min(things.width, things.height))
     adjective = "far from the border" if sign > 0 else "near to the border"
     return Measure(sign * gaps, ahead, "distance to the border", adjective, _pixels(gaps))
 
 
-def _alone(things: Things, members: IntArray) -> Measure:
-    gaps = np.array([_to_neighbour(things, members, int(i)) for i in members], dtype=float)
-    ahead = _nearer(gaps, _noise(things), ALONE[0]).T
+def _isolation(things: Things, members: IntArray) -> Measure:
+    gaps = np.array([_neighbour_distance(things, members, int(i)) for i in members], dtype=float)
+    ahead = _clearly_nearer(gaps, _distance_noise(things), ALONE[0]).T
     clear = np.sort(gaps)[::-1]
     nobody = len(clear) > 1 and clear[0] < ALONE[1] * clear[1]
     adjective = "far from the others, so none stands alone" if nobody else "far from the others"
     return Measure(gaps, ahead, "nearest neighbour at", adjective, _pixels(gaps))
 
 
-def _to_neighbour(things: Things, members: IntArray, index: int) -> float:
+def _neighbour_distance(things: Things, members: IntArray, index: int) -> float:
     """Edge-to-edge distance to the nearest member, px; the diagonal where there is none."""
     others = members[members != index]
     box, boxes = things.boxes[index], things.boxes[others]

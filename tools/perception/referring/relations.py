@@ -1,4 +1,4 @@
-"""Which thing is meant: a description decided on numbers, or what stands between it and an answer.
+"""Resolves a description to the candidate it means, or says why it is ambiguous.
 
 An answer is settled only where every doubtful measure, read either way, gives the same thing;
 else a person is to choose from the matches.
@@ -112,7 +112,7 @@ def select(
 
 def _select(things: Things, query: Description) -> Selection:
     relations = query.relations if isinstance(query, Query) else ()
-    others = [[_other(things, thing) for thing in r.things] for r in relations]
+    others = [[_other_thing(things, thing) for thing in r.things] for r in relations]
     for relation in relations:
         ids = [t for t in relation.things if isinstance(t, str)]
         if len(set(ids)) < len(ids):
@@ -124,7 +124,7 @@ def _select(things: Things, query: Description) -> Selection:
         for other in found:
             if not other.indices:
                 return Selection((), False, f"{relation.kind}: {other.doubt}", "")
-    answers = [_decided(things, query, looks, reading) for reading in _readings(others)]
+    answers = [_answer_in(things, query, looks, reading) for reading in _readings(others)]
     if not answers:
         return Selection((), False, "the two things it is between are one and the same", "")
     merged = _merged(things, answers, [o for found in others for o in found], _capped(others))
@@ -132,7 +132,7 @@ def _select(things: Things, query: Description) -> Selection:
     return Selection(matches, not merged.doubt, merged.doubt, "")
 
 
-def _other(things: Things, thing: str | Description) -> _Other:
+def _other_thing(things: Things, thing: str | Description) -> _Other:
     if isinstance(thing, str):
         return _Other((things.index(thing),), True, True, "")
     found = _select(things, thing)
@@ -179,7 +179,7 @@ def _degrees(things: Things, filters: Sequence[Filter]) -> IntArray:
     return np.minimum.reduce([everything, *(f.degrees for f in filters)])
 
 
-def _decided(things: Things, query: Description, looks: list[Filter], others: Others) -> _Answer:
+def _answer_in(things: Things, query: Description, looks: list[Filter], others: Others) -> _Answer:
     """The answer where it is known what the other things are."""
     relations = query.relations if isinstance(query, Query) else ()
     where = [
@@ -188,8 +188,8 @@ def _decided(things: Things, query: Description, looks: list[Filter], others: Ot
     filters = [*looks, *where]
     fitting = np.flatnonzero(_degrees(things, filters) > NO)
     if not len(fitting):
-        return _Answer((), {}, _emptied(things, looks, where, others))
-    steps = _steps(things, query, others)
+        return _Answer((), {}, _empty_relation(things, looks, where, others))
+    steps = _ordering_steps(things, query, others)
     if steps:
         filters.append(ground_filter(things, fitting))
     degrees = _degrees(things, filters)
@@ -197,15 +197,15 @@ def _decided(things: Things, query: Description, looks: list[Filter], others: Ot
     possibly = _picked(things, query, steps, loose)
     same = len(strict) == len(loose)
     surely = possibly if same else _picked(things, query, steps, strict)
-    answer = _agreed(surely, possibly, _perhaps(things, filters, degrees, possibly.indices))
-    said = {
+    answer = _combined(surely, possibly, _doubt_about(things, filters, degrees, possibly.indices))
+    reasons = {
         i: (*filter(None, (f.explain(i) for f in filters)), *answer.reasons.get(i, ()))
         for i in answer.indices
     }
-    return replace(answer, reasons=said)
+    return replace(answer, reasons=reasons)
 
 
-def _agreed(surely: _Answer, possibly: _Answer, perhaps: str) -> _Answer:
+def _combined(surely: _Answer, possibly: _Answer, perhaps: str) -> _Answer:
     """One answer of those among what surely fits and among all that possibly does.
 
     Args:
@@ -222,7 +222,7 @@ def _agreed(surely: _Answer, possibly: _Answer, perhaps: str) -> _Answer:
     return _Answer(indices, reasons, doubt)
 
 
-def _perhaps(
+def _doubt_about(
     things: Things, filters: list[Filter], degrees: IntArray, answer: tuple[int, ...]
 ) -> str:
     """What of the answer only possibly fits, and by what; else anything that does."""
@@ -235,7 +235,9 @@ def _perhaps(
     return f"{things.candidates[index].id} may be {why.word}{too} ({why.explain(index)})"
 
 
-def _emptied(things: Things, looks: list[Filter], where: list[Filter], others: Others) -> str:
+def _empty_relation(
+    things: Things, looks: list[Filter], where: list[Filter], others: Others
+) -> str:
     """Which relation left nothing."""
     kept = list(looks)
     for found, other in zip(where, others, strict=True):
@@ -251,11 +253,11 @@ def _emptied(things: Things, looks: list[Filter], where: list[Filter], others: O
     raise AssertionError("something is left")
 
 
-def _steps(things: Things, query: Description, others: Others) -> list[_Step]:
+def _ordering_steps(things: Things, query: Description, others: Others) -> list[_Step]:
     """What orders the things that fit: nearness, then the picks, or else the shade."""
     relations = query.relations if isinstance(query, Query) else ()
     steps = [
-        _Step(f"nearest to {things.candidates[other].id}", _nearest(things, other))
+        _Step(f"nearest to {things.candidates[other].id}", _nearest_to(things, other))
         for relation, (other, *_) in zip(relations, others, strict=True)
         if relation.kind == "nearest"
     ]
@@ -267,7 +269,7 @@ def _steps(things: Things, query: Description, others: Others) -> list[_Step]:
     return steps
 
 
-def _nearest(things: Things, other: int) -> Callable[[IntArray], Ranked]:
+def _nearest_to(things: Things, other: int) -> Callable[[IntArray], Ranked]:
     return lambda members: rank_nearest(things, members, other)
 
 
@@ -282,17 +284,17 @@ def _picked(things: Things, query: Description, steps: list[_Step], members: Int
     """Which of some things the picks leave."""
     if not len(members):
         return _Answer((), {}, "")
-    members, number = _counted(things, query, members)
+    members, number = _matching_count(things, query, members)
     if not steps:
         doubt = f"{len(members)} things fit: {listed(things.candidates, members)}"
         indices = tuple(int(i) for i in members)
         return _Answer(indices, {}, doubt if len(members) > 1 else "", number)
     if len(members) == 1 and all(p.place == 1 for p in query.picks):
         return _Answer((int(members[0]),), {}, "", number)
-    return replace(_ranked(things, steps, members), number=number)
+    return replace(_first_step_winner(things, steps, members), number=number)
 
 
-def _ranked(things: Things, steps: list[_Step], members: IntArray) -> _Answer:
+def _first_step_winner(things: Things, steps: list[_Step], members: IntArray) -> _Answer:
     """The winner of the first step, which none of the others may contradict."""
     ranked = [step.decide(members) for step in steps]
     first, later = ranked[0], ranked[1:]
@@ -311,7 +313,7 @@ def _ranked(things: Things, steps: list[_Step], members: IntArray) -> _Answer:
     return _Answer(indices, reasons, doubt)
 
 
-def _counted(things: Things, query: Description, members: IntArray) -> tuple[IntArray, str]:
+def _matching_count(things: Things, query: Description, members: IntArray) -> tuple[IntArray, str]:
     """The things that are meant where their number was said; and why the number is another."""
     count = query.count if isinstance(query, Query) else None
     if count is None or len(members) == count:

@@ -42,7 +42,7 @@ def shape_fits(polygon: Polygon) -> tuple[tuple[ShapeName, float], ...]:
 
     "irregular" stands where the overlap is no better than that of most blobs.
     """
-    grid, area = _sampled(polygon)
+    grid, area = _polar_grid(polygon)
     spectrum = np.fft.rfft(grid, axis=0)
     best: dict[ShapeName, float] = {"irregular": IRREGULAR}
     for template in _templates():
@@ -52,7 +52,7 @@ def shape_fits(polygon: Polygon) -> tuple[tuple[ShapeName, float], ...]:
     return tuple(sorted(best.items(), key=lambda item: -item[1]))
 
 
-def _sampled(shape: BaseGeometry) -> tuple[FloatArray, float]:
+def _polar_grid(shape: BaseGeometry) -> tuple[FloatArray, float]:
     """The shape on the polar grid (turns, rings), each cell weighted by its share of area."""
     centre = shape.centroid
     radius = (np.arange(RINGS) + 0.5) * REACH * np.sqrt(shape.area) / RINGS
@@ -68,13 +68,13 @@ def _sampled(shape: BaseGeometry) -> tuple[FloatArray, float]:
 @cache
 def _templates() -> tuple[Template, ...]:
     found: list[Template] = []
-    for name, shape in _drawn():
-        grid, area = _sampled(shape)
+    for name, shape in _drawn_shapes():
+        grid, area = _polar_grid(shape)
         found.append(Template(name, np.fft.rfft(grid, axis=0).astype(np.complex64), area))
     return tuple(found)
 
 
-def _drawn() -> Iterator[tuple[ShapeName, BaseGeometry]]:
+def _drawn_shapes() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     """Every class in the forms it comes in."""
     yield from _round_ones()
     yield from _polygons()
@@ -118,7 +118,7 @@ def _concave_ones() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     for arm, long in product((0.13, 0.2, 0.26, 0.33), (1.0, 1.25, 1.5)):
         foot = shapely.box(0, 0, long, 2 * arm).union(shapely.box(0, 0, 2 * arm, 1))
         yield "L", foot
-        yield "L", _mirrored(foot)
+        yield "L", _flipped(foot)
     for arm, deep in ((0.25, 1.0), (0.33, 1.0), (0.25, 1.4)):
         bay = shapely.box(arm, arm, deep + 1, 1 - arm)
         yield "C", shapely.box(0, 0, deep, 1).difference(bay)
@@ -146,7 +146,7 @@ def _stretched(shape: BaseGeometry, long: float) -> BaseGeometry:
     return shapely.transform(shape, lambda points: points * (long, 1.0))
 
 
-def _mirrored(shape: BaseGeometry) -> BaseGeometry:
+def _flipped(shape: BaseGeometry) -> BaseGeometry:
     return shapely.transform(shape, lambda points: points * (-1.0, 1.0))
 
 

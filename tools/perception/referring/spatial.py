@@ -46,13 +46,13 @@ def relation_filter(things: Things, kind: RelationKind, others: tuple[int, ...])
     """
     names = " and ".join(things.candidates[i].id for i in others)
     if kind in AXIS:
-        found = _directed(things, kind, others[0], names)
+        found = _direction_filter(things, kind, others[0], names)
     elif kind == "inside":
-        found = _inside(things, others[0], names)
+        found = _inside_filter(things, others[0], names)
     elif kind == "beside":
-        found = _beside(things, others[0], names)
+        found = _beside_filter(things, others[0], names)
     elif kind == "between":
-        found = _between(things, others, names)
+        found = _between_filter(things, others, names)
     else:
         everything = np.full(len(things.candidates), SURE, dtype=np.int64)
         found = Filter(f"other than {names}", everything, lambda i: "")
@@ -81,7 +81,7 @@ def ground_filter(things: Things, members: IntArray) -> Filter:
     )
 
 
-def _directed(things: Things, kind: RelationKind, other: int, names: str) -> Filter:
+def _direction_filter(things: Things, kind: RelationKind, other: int, names: str) -> Filter:
     axis, sign, words = AXIS[kind]
     away = things.centres - things.centres[other]
     along, across = sign * away[:, axis], np.abs(away[:, 1 - axis])
@@ -99,7 +99,7 @@ def _directed(things: Things, kind: RelationKind, other: int, names: str) -> Fil
     return Filter(f"{words} {names}", degrees, explain)
 
 
-def _inside(things: Things, other: int, names: str) -> Filter:
+def _inside_filter(things: Things, other: int, names: str) -> Filter:
     outline = things.candidates[other].outline
     material, filled = things.regions[other], outline.filled
     areas = np.asarray(shapely.area(things.regions), dtype=float)
@@ -116,7 +116,7 @@ def _inside(things: Things, other: int, names: str) -> Filter:
     )
 
 
-def _beside(things: Things, other: int, names: str) -> Filter:
+def _beside_filter(things: Things, other: int, names: str) -> Filter:
     gaps, size = things.gaps(other), things.candidates[other].outline.size
     filled = things.candidates[other].outline.filled
     inside = shapely.contains(filled, shapely.points(things.centres))
@@ -128,9 +128,9 @@ def _beside(things: Things, other: int, names: str) -> Filter:
     )
 
 
-def _between(things: Things, others: tuple[int, ...], names: str) -> Filter:
+def _between_filter(things: Things, others: tuple[int, ...], names: str) -> Filter:
     points = np.asarray(shapely.points(things.centres), dtype=object)
-    to = [_way(points, things.candidates[i].outline.filled) for i in others]
+    to = [_nearest_offsets(points, things.candidates[i].outline.filled) for i in others]
     far = [np.linalg.norm(way, axis=1) for way in to]
     with np.errstate(invalid="ignore", divide="ignore"):
         cosine = (to[0] * to[1]).sum(axis=1) / (far[0] * far[1])
@@ -148,7 +148,7 @@ def _between(things: Things, others: tuple[int, ...], names: str) -> Filter:
     return Filter(f"between {names}", degrees, explain)
 
 
-def _way(points: NDArray[np.object_], region: shapely.Polygon) -> FloatArray:
+def _nearest_offsets(points: NDArray[np.object_], region: shapely.Polygon) -> FloatArray:
     """From each of (n,) points to the nearest point of a region, (n, 2); 0 inside it."""
     lines = shapely.shortest_line(points, region)
     ends = shapely.get_coordinates(lines).reshape(-1, 2, 2)

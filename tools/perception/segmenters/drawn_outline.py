@@ -1,6 +1,6 @@
-"""What somebody who draws an outline knows better than its measuring: where it is right.
+"""Combines a drawn outline with the measured one where the drawing is known to be right.
 
-Points name such places, and of a thing with straight sides each side is measured as a whole.
+That is beside points that say so, and along the sides of a thing with straight sides.
 """
 
 from collections.abc import Iterable, Sequence
@@ -39,7 +39,7 @@ SAMPLES = 120
 """Places of a side that are measured."""
 
 
-def segment_mended(
+def segment_corrected(
     pixels: Bytes,
     vertices: Sequence[Point],
     *,
@@ -58,16 +58,16 @@ def segment_mended(
     found = segment_outline(
         pixels,
         vertices,
-        positive=[p for p in on if not _holds(drawn, p)],
-        negative=[p for p in off if _holds(drawn, p)],
+        positive=[p for p in on if not _contains_point(drawn, p)],
+        negative=[p for p in off if _contains_point(drawn, p)],
     )
     reach = BESIDE * float(np.sqrt(np.count_nonzero(drawn)))
-    kept = _discs(shape, [p for p in on if _holds(drawn, p)], reach)
-    cleared = _discs(shape, [p for p in off if not _holds(drawn, p)], reach)
+    kept = _discs(shape, [p for p in on if _contains_point(drawn, p)], reach)
+    cleared = _discs(shape, [p for p in off if not _contains_point(drawn, p)], reach)
     return replace(found, mask=(found.mask | (drawn & kept)) & (drawn | ~cleared))
 
 
-def straightened(outline: Outline, vertices: Sequence[Point]) -> Outline:
+def with_straight_sides(outline: Outline, vertices: Sequence[Point]) -> Outline:
     """The polygon of a drawn one's sides, each midway between it and the measured edge beside it.
 
     The measured edge is taken as its Theil-Sen line (Sen 1968), which up to 29 % of it do not
@@ -90,8 +90,8 @@ def straightened(outline: Outline, vertices: Sequence[Point]) -> Outline:
     away = np.stack([distances(LineString(side), places) for side in sides])
     nearest = np.argmin(away, axis=0)
     own = away[nearest, np.arange(len(places))] <= STRAY * outline.size
-    lines = [_along(side, places[own & (nearest == i)]) for i, side in enumerate(sides)]
-    corners = [_crossing(lines[i - 1], line) for i, line in enumerate(lines)]
+    lines = [_fitted_side(side, places[own & (nearest == i)]) for i, side in enumerate(sides)]
+    corners = [_side_crossing(lines[i - 1], line) for i, line in enumerate(lines)]
     far = np.linalg.norm(np.asarray(corners) - drawn, axis=1) > 2 * STRAY * outline.size
     made = Polygon(np.where(far[:, None], drawn, corners))
     if not made.is_valid:
@@ -101,13 +101,13 @@ def straightened(outline: Outline, vertices: Sequence[Point]) -> Outline:
     return make_outline(made.exterior.coords) if agreed else outline
 
 
-def within(outline: Outline, width: int, height: int) -> Outline:
+def clipped_to_picture(outline: Outline, width: int, height: int) -> Outline:
     """What lies in the picture of an outline whose sides were laid out past its border."""
     seen = largest_part(outline.polygon.intersection(box(-0.5, -0.5, width - 0.5, height - 0.5)))
     return outline if seen is None or seen.equals(outline.polygon) else outline_of(seen)
 
 
-def _holds(region: Mask, point: Point) -> bool:
+def _contains_point(region: Mask, point: Point) -> bool:
     x, y = (round(v) for v in point)
     return bool(region[y, x])
 
@@ -120,7 +120,7 @@ def _discs(shape: tuple[int, int], centres: Sequence[Point], radius: float) -> M
     return region
 
 
-def _along(side: FloatArray, places: FloatArray) -> FloatArray:
+def _fitted_side(side: FloatArray, places: FloatArray) -> FloatArray:
     """A drawn side, (2, 2), moved and turned towards the line of places measured beside it."""
     way = side[1] - side[0]
     length = float(np.hypot(*way))
@@ -137,7 +137,7 @@ def _along(side: FloatArray, places: FloatArray) -> FloatArray:
     return side + (1 - DRAWN) * np.array([start, start + slope])[:, None] * normal
 
 
-def _crossing(before: FloatArray, after: FloatArray) -> FloatArray:
+def _side_crossing(before: FloatArray, after: FloatArray) -> FloatArray:
     """Where two sides meet that follow each other; nearly in line, midway between their ends."""
     a, b = before[1] - before[0], after[1] - after[0]
     cross = float(a[0] * b[1] - a[1] * b[0])

@@ -7,7 +7,7 @@ from shapely.geometry import Polygon
 
 from ...geometry.outline import largest_part
 from ..target_prompt import Point, TargetPrompt
-from .drawn_outline import segment_mended
+from .drawn_outline import segment_corrected
 from .protocol import Pixels, PromptKind, Segmentation
 from .segment import segment_box, segment_points
 
@@ -29,7 +29,7 @@ class GrabCutSegmenter:
         positive, negative = prompt.points or (), prompt.negative
         if prompt.outline is not None:
             vertices = visible_vertices(prompt.outline, width, height)
-            return segment_mended(pixels, vertices, positive=positive, negative=negative)
+            return segment_corrected(pixels, vertices, positive=positive, negative=negative)
         if prompt.box is not None:
             x0, y0, x1, y1 = prompt.box
             box = (max(x0, 0.0), max(y0, 0.0), min(x1, width - 1.0), min(y1, height - 1.0))

@@ -1,4 +1,4 @@
-"""From a point to the regions it may mean: colour growing at many tolerances and scales.
+"""Proposes regions that a point may mean, grown by colour at many tolerances and scales.
 
 A click says where a thing is but not how large it is. The few regions with contrast all along
 their edge are the proposals that the segmentation proper then has to confirm.
@@ -102,16 +102,16 @@ def pin(image: Bytes, labels: Bytes, positive: Points, negative: Points) -> Byte
         np.round(p).astype(np.int64).clip(0, (width - 1, height - 1)) for p in (positive, negative)
     )
     for seed in on:
-        pinned[_alike(image, seed) & (labels == cv2.GC_PR_BGD)] = cv2.GC_PR_FGD
+        pinned[_like_coloured(image, seed) & (labels == cv2.GC_PR_BGD)] = cv2.GC_PR_FGD
     for seed in off:
-        pinned[_alike(image, seed) & (labels != cv2.GC_BGD)] = cv2.GC_PR_BGD
+        pinned[_like_coloured(image, seed) & (labels != cv2.GC_BGD)] = cv2.GC_PR_BGD
     for seeds, label in ((on, cv2.GC_FGD), (off, cv2.GC_BGD)):
         for x, y in seeds:
             cv2.circle(pinned, (int(x), int(y)), radius, (int(label),), -1)
     return pinned
 
 
-def _alike(image: Bytes, seed: npt.NDArray[np.int64]) -> Mask:
+def _like_coloured(image: Bytes, seed: npt.NDArray[np.int64]) -> Mask:
     """The connected pixels (h, w) of the seed's colour."""
     return _pieces_at(_colour_distance(image, seed[None]) <= PIN_TOLERANCE, seed[None])
 
@@ -206,14 +206,22 @@ def ends_inside(mask: Mask, window: Window) -> bool:
 def region_score(mask: Mask, window: Window) -> float:
     """How much a region looks like a thing: edge contrast, compactness and, weakly, size."""
     contrast = _edge_contrast(window.features.astype(np.float32), mask)
-    points = np.argwhere(mask).astype(np.int32)
-    hull = cv2.convexHull(points)
-    # Pixels reach half a pixel beyond their centres.
-    hull_area = cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1
-    compact = len(points) / hull_area
+    compact = solidity(np.argwhere(mask), int(np.count_nonzero(mask)))
     inside = BORDER_DISCOUNT ** int(touches_border(mask).sum())
     clear = contrast / (contrast + CLEAR_CONTRAST)
     return clear * compact * inside * window.picture_area(mask) ** SIZE_PREFERENCE
+
+
+def solidity(pixels: npt.NDArray[np.integer], area: int) -> float:
+    """Share of its convex hull that a region fills.
+
+    Args:
+        pixels: (n, 2), all or the outermost ones.
+        area: how many there are.
+    """
+    hull = cv2.convexHull(pixels.astype(np.int32))
+    # Pixels reach half a pixel beyond their centres.
+    return area / (cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1)
 
 
 def _edge_contrast(colours: Floats, mask: Mask) -> float:

@@ -1,4 +1,4 @@
-"""The outline of the thing a person points at, without any trained weights.
+"""Segments the thing a person points at, without trained weights.
 
 Pointing with a box, points or a rough outline is enough for classical segmentation to work on
 real photographs, so formup runs with no download and no GPU.
@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from ..detectors.whole_object import on_plain_ground, propose_wholes, solidity
+from ..detectors.whole_object import on_plain_ground, propose_whole
 from . import grabcut as gc
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
 from .mask_openings import cut_openings
 from .protocol import Segmentation
-from .region_growing import Region, box_iou, edge_support, pin, propose
+from .region_growing import Region, box_iou, edge_support, pin, propose, solidity
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
 RING = 0.1
@@ -49,7 +49,7 @@ NEXT_TO = np.ones((3, 3), np.uint8)
 # How strongly missing edges lower the confidence.
 EDGE_WEIGHT = 2
 # Other points of a mask that should lead back to it, and how deep inside it they lie at least.
-ECHOES = 4
+REPROPOSALS = 4
 DEPTH = 0.35
 
 Proposer = Callable[[Bytes, Sequence[Point], int], list[Region]]
@@ -89,7 +89,7 @@ def segment_box(
     boxes = [drawn, *_moved_boxes(drawn)]
     trimaps = [pin(window.features, _box_trimap(window.shape, b), on, off) for b in boxes]
     extent = gc.box_region(window.shape, drawn)
-    core = _middle(window.shape, drawn)
+    core = _middle_ellipse(window.shape, drawn)
     return _segment(_Prompt(window, trimaps, extent, core, on, box))
 
 
@@ -105,7 +105,7 @@ def segment_outline(
     Well inside the outline is surely the thing and well outside surely not, so four vertices make
     a rotated box, and more of them settle what a box leaves open.
     """
-    box = _around(vertices)
+    box = _bounding_box(vertices)
     window = gc.window_around(pixels, box)
     drawn = window.to_work(vertices)
     on, off = window.to_work(list(positive)), window.to_work(list(negative))
@@ -128,34 +128,40 @@ def segment_points(
     back to it. A thing of several colours needs points on each, or a box.
     """
     off = list(negative)
-    parts = _tried(pixels, propose(pixels, points, PROPOSALS), points, off)
-    best = max(parts, key=lambda tried: tried.standing, default=None)
+    parts = _tried_regions(pixels, propose(pixels, points, PROPOSALS), points, off)
+    best = max(parts, key=lambda tried: tried.distinctness, default=None)
     if best is not None and on_plain_ground(best.prompt.window, best.mask):
-        return _judged(best.prompt, best.mask, _echo(pixels, best.prompt, best.mask, propose))
-    wholes = _tried(pixels, propose_wholes(pixels, points, PROPOSALS), points, off)
+        return _rated(
+            best.prompt, best.mask, _reproposal_agreement(pixels, best.prompt, best.mask, propose)
+        )
+    whole_objects = _tried_regions(pixels, propose_whole(pixels, points, PROPOSALS), points, off)
     if best is not None:
-        wholes = [tried for tried in wholes if _is_whole_of(tried, best)]
-    solid = [tried for tried in wholes if solidity(tried.mask) >= SOLID]
-    chosen = max(solid, key=lambda tried: tried.standing, default=best)
+        whole_objects = [tried for tried in whole_objects if _is_whole_of(tried, best)]
+    solid = [
+        tried
+        for tried in whole_objects
+        if solidity(np.argwhere(tried.mask), int(np.count_nonzero(tried.mask))) >= SOLID
+    ]
+    chosen = max(solid, key=lambda tried: tried.distinctness, default=best)
     if chosen is None:
-        return _nothing((pixels.shape[0], pixels.shape[1]), _around(points))
-    proposer = propose if chosen is best else propose_wholes
-    echo = _echo(pixels, chosen.prompt, chosen.mask, proposer)
-    found = _judged(chosen.prompt, chosen.mask, echo)
-    if chosen is best and wholes:  # it may well be a part of one of them
-        rival = max(tried.standing for tried in wholes)
-        return _doubted(found, chosen.standing / (chosen.standing + rival))
+        return _empty_segmentation((pixels.shape[0], pixels.shape[1]), _bounding_box(points))
+    proposer = propose if chosen is best else propose_whole
+    agreement = _reproposal_agreement(pixels, chosen.prompt, chosen.mask, proposer)
+    found = _rated(chosen.prompt, chosen.mask, agreement)
+    if chosen is best and whole_objects:  # it may well be a part of one of them
+        rival = max(tried.distinctness for tried in whole_objects)
+        return _with_rival(found, chosen.distinctness / (chosen.distinctness + rival))
     return found
 
 
 def _segment(prompt: _Prompt) -> Segmentation:
     """The majority of the masks from the prompt and its perturbations, and their agreement."""
-    masks = [_cut(prompt, trimap) for trimap in prompt.trimaps]
+    masks = [_object_mask(prompt, trimap) for trimap in prompt.trimaps]
     mask = gc.clean(gc.majority(masks), prompt.positive)
-    return _judged(prompt, mask, float(np.mean([gc.iou(mask, other) for other in masks[1:]])))
+    return _rated(prompt, mask, float(np.mean([gc.iou(mask, other) for other in masks[1:]])))
 
 
-def _cut(prompt: _Prompt, trimap: Bytes) -> Mask:
+def _object_mask(prompt: _Prompt, trimap: Bytes) -> Mask:
     """The mask from one trimap; if it collapses, what is not surely background starts as object.
 
     A box drawn inside the thing puts its colours into the ring and so into the background.
@@ -168,17 +174,17 @@ def _cut(prompt: _Prompt, trimap: Bytes) -> Mask:
     return gc.clean(gc.grabcut(image, generous), prompt.positive)
 
 
-def _judged(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
+def _rated(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
     window = prompt.window
     if not mask.any() or mask.all():
-        return _nothing(window.picture, prompt.box)
+        return _empty_segmentation(window.picture, prompt.box)
     mask = cut_openings(window.features, mask, prompt.positive)
     flooded = gc.watershed(window.features, prompt.core, prompt.trimaps[0])
     parts = {
         "stability": stability,
         "agreement": gc.iou(mask, flooded),
         "colour_separation": gc.colour_separation(window.features, mask),
-        "prompt_fit": _fit(prompt, mask),
+        "prompt_fit": _prompt_fit(prompt, mask),
     }
     agreed = float(np.prod(list(parts.values())) ** (1 / len(parts)))
     # Cues that agree are worth nothing where the mask ends in the middle of nowhere.
@@ -187,11 +193,11 @@ def _judged(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
     return Segmentation(window.to_picture(mask), confidence, parts, prompt.box)
 
 
-def _nothing(picture: tuple[int, int], box: Box) -> Segmentation:
+def _empty_segmentation(picture: tuple[int, int], box: Box) -> Segmentation:
     return Segmentation(np.zeros(picture, dtype=np.bool_), 0.0, {}, box)
 
 
-def _fit(prompt: _Prompt, mask: Mask) -> float:
+def _prompt_fit(prompt: _Prompt, mask: Mask) -> float:
     """Overlap of the bounding boxes of the mask and of what the prompt says the thing covers."""
     return box_iou(gc.bounding_box(mask), gc.bounding_box(prompt.extent)) if mask.any() else 0.0
 
@@ -206,7 +212,7 @@ def _moved_boxes(box: Points) -> list[Points]:
     return [box + step * move for move in BOX_MOVES]
 
 
-def _middle(shape: tuple[int, int], box: Points) -> Mask:
+def _middle_ellipse(shape: tuple[int, int], box: Points) -> Mask:
     half = np.maximum(CORE * (box[2:] - box[:2]) / 2, 1)
     y, x = np.ogrid[: shape[0], : shape[1]]
     (cx, cy), (rx, ry) = (box[:2] + box[2:]) / 2, half
@@ -237,50 +243,50 @@ def _moved_outlines(outline: Points) -> list[Points]:
 
 
 @dataclass(frozen=True)
-class _Tried:
+class _Trial:
     """A proposal, the mask GrabCut made of it, and how much that stands out."""
 
     prompt: _Prompt
     mask: Mask
-    standing: float
+    distinctness: float
 
     @property
     def area(self) -> float:
         return self.prompt.window.picture_area(self.mask)
 
 
-def _tried(
+def _tried_regions(
     pixels: Bytes, regions: Iterable[Region], points: Sequence[Point], negative: Sequence[Point]
-) -> list[_Tried]:
-    found: list[_Tried] = []
+) -> list[_Trial]:
+    found: list[_Trial] = []
     for region in regions:
         prompt = _region_prompt(pixels, region, region.box, points, negative)
-        mask = _cut(prompt, prompt.trimaps[0])
+        mask = _object_mask(prompt, prompt.trimaps[0])
         for _ in range(WIDENINGS):
             if not _cut_short(prompt, mask):
                 break
             prompt = _region_prompt(pixels, region, _widened(prompt.box), points, negative)
-            mask = _cut(prompt, prompt.trimaps[0])
+            mask = _object_mask(prompt, prompt.trimaps[0])
         if mask.any() and not mask.all():
-            found.append(_Tried(prompt, mask, _standing_out(prompt, mask)))
+            found.append(_Trial(prompt, mask, _distinctness(prompt, mask)))
     return found
 
 
-def _is_whole_of(outer: _Tried, part: _Tried) -> bool:
+def _is_whole_of(outer: _Trial, part: _Trial) -> bool:
     """Whether a mask holds another, is much larger (not just its shadow), and stands out too."""
     shared = part.prompt.window.transfer(part.mask, outer.prompt.window)
     held = int(np.count_nonzero(shared & outer.mask)) >= HELD * int(np.count_nonzero(shared))
     larger = outer.area >= MUCH_LARGER * part.area
-    return held and larger and outer.standing >= RIVAL * part.standing
+    return held and larger and outer.distinctness >= RIVAL * part.distinctness
 
 
-def _doubted(found: Segmentation, share: float) -> Segmentation:
+def _with_rival(found: Segmentation, share: float) -> Segmentation:
     parts = {**found.parts, "unrivalled": share}
     return Segmentation(found.mask, found.confidence * share, parts, found.box)
 
 
 def _cut_short(prompt: _Prompt, mask: Mask) -> bool:
-    """Whether a mask ends at the sure background rather than at an edge of its own."""
+    """Whether a mask runs along the sure background, which then cut it off."""
     touching = np.asarray(cv2.dilate((prompt.trimaps[0] == cv2.GC_BGD).astype(np.uint8), NEXT_TO))
     return int(np.count_nonzero(mask & (touching > 0))) > CUT_SHORT * np.sqrt(
         np.count_nonzero(mask)
@@ -307,11 +313,11 @@ def _region_prompt(
     return _Prompt(window, [pin(window.features, trimap, on, off)], extent, core, on, box)
 
 
-def _standing_out(prompt: _Prompt, mask: Mask) -> float:
-    return _fit(prompt, mask) * gc.colour_separation(prompt.window.features, mask)
+def _distinctness(prompt: _Prompt, mask: Mask) -> float:
+    return _prompt_fit(prompt, mask) * gc.colour_separation(prompt.window.features, mask)
 
 
-def _echo(pixels: Bytes, prompt: _Prompt, mask: Mask, proposer: Proposer) -> float:
+def _reproposal_agreement(pixels: Bytes, prompt: _Prompt, mask: Mask, proposer: Proposer) -> float:
     """Mean overlap of the mask with the likest region proposed from other points well inside."""
     window = prompt.window
     overlaps: list[float] = []
@@ -328,12 +334,12 @@ def _far_inside(mask: Mask, points: Points) -> Points:
     depth = gc.distance_inside(mask)
     inside = np.argwhere(depth >= DEPTH * depth.max())[:, ::-1].astype(np.float64)
     chosen = list(points)
-    for _ in range(ECHOES):
+    for _ in range(REPROPOSALS):
         gaps = np.min([np.linalg.norm(inside - point, axis=1) for point in chosen], axis=0)
         chosen.append(inside[gaps.argmax()])
     return np.array(chosen[len(points) :])
 
 
-def _around(points: Sequence[Point]) -> Box:
+def _bounding_box(points: Sequence[Point]) -> Box:
     (x0, y0), (x1, y1) = np.min(points, axis=0), np.max(points, axis=0)
     return float(x0), float(y0), float(x1), float(y1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from formup.tools.errors import InputError
-from formup.tools.geometry.figures.letters import GLYPHS, letter_strokes
+from formup.tools.geometry.figures.letters import letter_strokes, stroke_glyphs
 from formup.tools.geometry.figures.shapes import (
     Sketch,
     arc_sketch,
@@ -19,7 +19,7 @@ from formup.tools.geometry.figures.shapes import (
     polyline_sketch,
     star_sketch,
 )
-from formup.tools.geometry.figures.strokes import spread, stretches, walks
+from formup.tools.geometry.figures.strokes import split_at_crossings, spread, stretches
 from formup.tools.geometry.outline import FloatArray, distances
 from formup.tools.geometry.sampling import min_spacing
 from hypothesis import given, settings
@@ -48,12 +48,12 @@ def lines_of(sketch: Sketch) -> shapely.MultiLineString:
     return shapely.MultiLineString([shapely.LineString(line) for line in sketch.lines])
 
 
-@pytest.mark.parametrize("glyph", GLYPHS)
+@pytest.mark.parametrize("glyph", stroke_glyphs())
 @pytest.mark.parametrize("height", [3.0, 97.3, 4000.0])
 def test_a_letter_is_in_one_piece_wherever_it_lies(glyph: str, height: float) -> None:
     drawn = fitted(letters_sketch(glyph), (11.3, 7.7, 11.3 + height, 7.7 + height))
-    parts = walks(drawn.lines)
-    assert len(parts) == WALKS.get(glyph, len(walks(letter_strokes(glyph))))
+    parts = split_at_crossings(drawn.lines)
+    assert len(parts) == WALKS.get(glyph, len(split_at_crossings(letter_strokes(glyph))))
     joined = shapely.union_all([shapely.LineString(p).buffer(height / 1000) for p in parts])
     assert joined.geom_type == "Polygon"
     assert sum(shapely.LineString(p).length for p in parts) == pytest.approx(
@@ -63,7 +63,7 @@ def test_a_letter_is_in_one_piece_wherever_it_lies(glyph: str, height: float) ->
 
 def test_every_letter_looks_like_itself_alone() -> None:
     """No two glyphs lie within a fifth of the height of each other's lines all along."""
-    drawn = {g: lines_of(fitted(letters_sketch(g), (0, 0, 100, 100))) for g in GLYPHS}
+    drawn = {g: lines_of(fitted(letters_sketch(g), (0, 0, 100, 100))) for g in stroke_glyphs()}
     alike = {
         (a, b)
         for a, one in drawn.items()
@@ -84,7 +84,7 @@ def test_what_has_no_strokes_is_refused(text: str) -> None:
 def test_robots_stand_on_the_lines_and_no_gap_is_much_wider_than_another(name: str, n: int) -> None:
     drawn = fitted(SKETCHES[name], BOX)
     points = spread(drawn.lines, n)
-    length = sum(shapely.LineString(w).length for w in walks(drawn.lines))
+    length = sum(shapely.LineString(w).length for w in split_at_crossings(drawn.lines))
     assert points.shape == (n, 2)
     assert distances(lines_of(drawn), points).max() < 0.1
     if n >= 24:

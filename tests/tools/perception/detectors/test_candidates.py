@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import shapely
-from formup.tools.perception.detectors.candidates import clear_ones, find_candidates
+from formup.tools.perception.detectors.candidates import find_candidates, salient_candidates
 from formup.tools.perception.image import load_picture
 from formup.tools.perception.referring.attributes import Candidate
 from shapely import affinity
@@ -170,7 +170,7 @@ def test_bays_between_painted_lines_are_no_things() -> None:
     lot = ground((95, 95, 98))
     assert not [c for c in find_candidates(painted(*lines, on=lot)) if c.outline.area > 500]
     found = find_candidates(painted(*lines, (car, RED), on=lot))
-    assert [c.id for c in clear_ones(found)] == ["c1"]
+    assert [c.id for c in salient_candidates(found)] == ["c1"]
     assert iou(found[0], car) > 0.93
 
 
@@ -225,10 +225,10 @@ def test_ids_count_from_c1_in_the_order_of_salience() -> None:
 
 def test_clear_ones_are_the_first_of_them() -> None:
     found = find_candidates(load_picture(PHOTOS / "images/ucm_golfcourse24.jpg").pixels)
-    clear = clear_ones(found)
+    clear = salient_candidates(found)
     assert found[: len(clear)] == clear
     assert 0 < len(clear) < len(found)
-    assert clear_ones(()) == ()
+    assert salient_candidates(()) == ()
 
 
 def test_the_same_picture_gives_the_same_candidates() -> None:

@@ -7,9 +7,9 @@ from formup.tools.errors import ToolError
 from formup.tools.geometry.outline import make_outline
 from formup.tools.perception.image import picture_from_array
 from formup.tools.perception.segmenters.drawn_outline import (
-    segment_mended,
-    straightened,
-    within,
+    clipped_to_picture,
+    segment_corrected,
+    with_straight_sides,
 )
 from formup.tools.perception.segmenters.grabcut import Bytes
 from formup.tools.perception.segmenters.segment import segment_outline
@@ -34,7 +34,7 @@ def picture() -> Bytes:
 
 def test_what_was_drawn_is_taken_beside_a_point_on_it_and_nowhere_else() -> None:
     plain = segment_outline(picture(), WITH_TIP)
-    mended = segment_mended(picture(), WITH_TIP, positive=[(165.0, 70.0)])
+    mended = segment_corrected(picture(), WITH_TIP, positive=[(165.0, 70.0)])
     assert not plain.mask[70, 165:].any()
     assert mended.mask[70, 150:174].all()
     changed = np.argwhere(plain.mask != mended.mask)
@@ -46,7 +46,7 @@ def test_nothing_beyond_what_was_drawn_is_kept_beside_a_negative_point() -> None
     pixels = picture()
     pixels[60:70, 140:142] = (200, 40, 40)  # a bump of the same colour
     bumped = segment_outline(pixels, BOX)
-    mended = segment_mended(pixels, BOX, negative=[(147.0, 65.0)])
+    mended = segment_corrected(pixels, BOX, negative=[(147.0, 65.0)])
     assert bumped.mask[65, 141]
     assert not mended.mask[61:69, 141:].any()
     assert (mended.mask | bumped.mask == bumped.mask).all()
@@ -56,8 +56,8 @@ def test_nothing_beyond_what_was_drawn_is_kept_beside_a_negative_point() -> None
 def test_points_against_the_outline_have_it_cut_anew() -> None:
     pixels = picture()
     pixels[60:80, 90:110] = (40, 40, 200)
-    assert segment_mended(pixels, BOX).mask[70, 100]
-    assert not segment_mended(pixels, BOX, negative=[(100.0, 70.0)]).mask[70, 100]
+    assert segment_corrected(pixels, BOX).mask[70, 100]
+    assert not segment_corrected(pixels, BOX, negative=[(100.0, 70.0)]).mask[70, 100]
 
 
 angles = st.floats(0.0, np.pi / 2)
@@ -76,7 +76,7 @@ def test_sides_come_out_straight_where_corners_were_rounded_and_vertices_are_off
     true = turned(np.array([(-90.0, -60.0), (90.0, -60.0), (90.0, 60.0), (-90.0, 60.0)]), angle)
     measured = make_outline(Polygon(true).buffer(-12).buffer(12).exterior.coords)
     drawn = true + np.reshape(shift, (4, 2))
-    found = straightened(measured, [(float(x), float(y)) for x, y in drawn])
+    found = with_straight_sides(measured, [(float(x), float(y)) for x, y in drawn])
     assert len(found.filled.exterior.coords) == 5
     off, drawn_off = (
         shapely.hausdorff_distance(ring, Polygon(true).exterior)
@@ -94,14 +94,14 @@ def test_a_dent_in_a_quarter_of_a_side_does_not_move_it(
     dent = np.stack([x, -60 + np.array([0.0, depth, depth, 0.0])], axis=1)
     measured = make_outline(turned(np.concatenate([true[:1], dent, true[1:]]), angle))
     sides = turned(true, angle)
-    found = straightened(measured, [(float(x), float(y)) for x, y in sides])
+    found = with_straight_sides(measured, [(float(x), float(y)) for x, y in sides])
     assert shapely.hausdorff_distance(found.filled.exterior, Polygon(sides).exterior) < 1.5
 
 
 def test_where_little_was_measured_the_drawn_side_stays() -> None:
     measured = make_outline([(0, 0), (100, 0), (100, 30), (60, 30), (0, 60)])  # a corner is missing
     drawn = [(1.0, 1.0), (99.0, 1.0), (99.0, 61.0), (1.0, 61.0)]
-    corners = np.array(straightened(measured, drawn).filled.exterior.coords)
+    corners = np.array(with_straight_sides(measured, drawn).filled.exterior.coords)
     assert np.abs(corners - (99.0, 61.0)).sum(axis=1).min() < 4
 
 
@@ -116,7 +116,7 @@ def test_where_little_was_measured_the_drawn_side_stays() -> None:
 )
 def test_sides_of_something_else_leave_it_as_measured(drawn: list[tuple[float, float]]) -> None:
     measured = make_outline([(0, 0), (100, 0), (100, 60), (0, 60)])
-    assert straightened(measured, drawn) is measured
+    assert with_straight_sides(measured, drawn) is measured
 
 
 def test_sides_that_would_lie_beyond_the_picture_end_at_its_border() -> None:
@@ -127,7 +127,7 @@ def test_sides_that_would_lie_beyond_the_picture_end_at_its_border() -> None:
     x0, y0, *_ = work.segment(TargetPrompt(outline=rough, straight=True)).box
     assert min(x0, y0) >= -0.5
     drawn = make_outline([(-5.0, -3.0), (300.0, -3.0), (300.0, 200.0), (-5.0, 200.0)])
-    assert within(drawn, 240, 140).bounds == (-0.5, -0.5, 239.5, 139.5)
+    assert clipped_to_picture(drawn, 240, 140).bounds == (-0.5, -0.5, 239.5, 139.5)
 
 
 def test_straight_goes_with_an_outline_that_was_drawn() -> None:
