@@ -119,7 +119,10 @@ def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
 
 def _group(group: Group, scale: float | None) -> str:
     noun = "robot" if group.robots == 1 else "robots"
-    words = [f"{group.robots} {noun} {PLACES[group.relation]}", " and ".join(group.targets)]
+    words = [
+        f"{group.robots} {noun} {PLACES.get(group.relation, group.relation)}",
+        " and ".join(group.targets),
+    ]
     if group.side:
         words.append(f"({group.side} side)")
     if group.clearance is not None and group.relation == "inside":
