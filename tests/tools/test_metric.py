@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 if TYPE_CHECKING:
-    from ..conftest import ToolCalls
+    from .conftest import ToolCalls
 
 SCALE = 0.05
 Begin = Callable[..., "ToolCalls"]

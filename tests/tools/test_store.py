@@ -179,13 +179,13 @@ def test_other_files_are_refused(tmp_path: Path, text: str, words: str) -> None:
 @pytest.mark.parametrize(
     ("part", "value", "words"),
     [
-        ("targets", [{"outline": []}], "no outline"),
+        ("targets", [{"outline": [3]}], "no outline"),
         ("targets", [{"outline": {"outline": [[0, 0], [1, 1]]}}], "no outline"),
         ("targets", [{"outline": {"outline": 3}}], "no outline"),
         ("targets", [{"outline": {"outline": [["a", "b"]]}}], "no outline"),
         ("targets", [{"outline": {"outline": [[0, 0], [9, 9], [0, 9], [9, 0]]}}], "no outline"),
         ("targets", [{"outline": {"outline": [[0, 0], [9, 9], [0, 1e999]]}}], "no outline"),
-        ("keep_out", [{"outline": {"rings": []}}], "no outline"),
+        ("keep_out", [{"outline": {"rings": 3}}], "no outline"),
         ("robots", [{"id": "1", "x": "left", "y": 0}], "robots.0.x"),
         ("metres_per_pixel", -2, "-2 metres per pixel"),
         ("plans", {"p-1": {"plan": None}}, "plans.p-1.plan"),

@@ -51,23 +51,30 @@ prompts = st.builds(
     outline=st.lists(points, min_size=3, max_size=5).map(tuple),
     negative=st.lists(points, max_size=2).map(tuple),
 )
-targets = outlines().flatmap(
-    lambda outline: st.builds(
-        Target,
-        id=st.sampled_from(["t1", "t2", "t3"]),
-        label=names,
-        box=st.just(outline.bounds),
-        confidence=st.floats(0, 1),
-        outline=st.just(outline),
-        prompt=st.sampled_from(["box", "outline"]),
-        parts=st.dictionaries(st.sampled_from(["edges", "colour"]), st.floats(0, 1)),
-        missed=st.lists(points, max_size=2).map(tuple),
-        source=st.none() | prompts,
-    )
+targets = st.builds(
+    Target,
+    id=st.sampled_from(["t1", "t2", "t3"]),
+    label=names,
+    box=st.tuples(numbers, numbers, numbers, numbers),
+    confidence=st.floats(0, 1),
+    outline=outlines(),
+    prompt=st.sampled_from(["box", "outline"]),
+    parts=st.dictionaries(st.sampled_from(["edges", "colour"]), st.floats(0, 1)),
+    missed=st.lists(points, max_size=2).map(tuple),
+    source=st.none() | prompts,
 )
-poses = st.lists(st.tuples(numbers, numbers, st.none() | numbers, numbers), max_size=5).map(
-    lambda found: tuple(Pose(str(i), *pose) for i, pose in enumerate(found, start=1))
-)
+poses = st.lists(
+    st.builds(
+        Pose,
+        id=st.sampled_from(["1", "2", "r3", "r4", "5"]),
+        x=numbers,
+        y=numbers,
+        heading=st.none() | numbers,
+        seen=numbers,
+    ),
+    max_size=5,
+    unique_by=lambda pose: pose.id,
+).map(tuple)
 
 
 def plan_of(world: World, places: list[tuple[float, float]], *, robots: bool) -> Plan:
@@ -90,37 +97,54 @@ def arrival_of(plan: Plan, off: float) -> Arrival:
     )
 
 
-def deployed(world: World, which: int, off: float) -> World:
-    names = list(world.plans)
-    if not names:
-        return world
-    name = names[which % len(names)]
-    return world.with_arrival(name, arrival_of(world.plans[name].plan, off))
+@st.composite
+def finding(draw: st.DrawFn) -> Step:
+    target = draw(targets)
+    return lambda world: world.with_target(target)
 
 
-def planned(world: World, places: list[tuple[float, float]], facts: dict[str, Any]) -> World:
-    plan = plan_of(world, places, robots=facts.pop("robots"))
-    return world.with_plan(PlanNode(plan=plan, parent=world.current, **facts))
+@st.composite
+def planning(draw: st.DrawFn) -> Step:
+    places, robots = draw(st.lists(points, min_size=1, max_size=4)), draw(st.booleans())
+    edit, unseen = draw(st.none() | names), draw(st.sampled_from([(), ("t1",)]))
+
+    def step(world: World) -> World:
+        plan = plan_of(world, places, robots=robots)
+        return world.with_plan(PlanNode(plan=plan, parent=world.current, edit=edit, unseen=unseen))
+
+    return step
 
 
-def having(name: str, values: st.SearchStrategy[Any]) -> st.SearchStrategy[Step]:
-    return values.map(lambda value: lambda world: world.having(**{name: value}))
+@st.composite
+def sampling(draw: st.DrawFn) -> Step:
+    found = draw(st.lists(points, max_size=4))
+    return lambda world: world.with_sample(found)[0]
 
 
-plan_facts = st.fixed_dictionaries(
-    {"robots": st.booleans(), "edit": st.none() | names, "unseen": st.sampled_from([(), ("t1",)])}
-)
+@st.composite
+def deploying(draw: st.DrawFn) -> Step:
+    which, off = draw(st.integers(0, 9)), draw(numbers)
+
+    def step(world: World) -> World:
+        if not world.plans:
+            return world
+        name = list(world.plans)[which % len(world.plans)]
+        return world.with_arrival(name, arrival_of(world.plans[name].plan, off))
+
+    return step
+
+
+@st.composite
+def having(draw: st.DrawFn, name: str, values: st.SearchStrategy[Any]) -> Step:
+    value = draw(values)
+    return lambda world: world.having(**{name: value})
+
+
 steps: st.SearchStrategy[Step] = st.one_of(
-    targets.map(lambda target: lambda world: world.with_target(target)),
-    st.builds(
-        lambda places, facts: lambda world: planned(world, places, dict(facts)),
-        st.lists(points, min_size=1, max_size=4),
-        plan_facts,
-    ),
-    st.lists(points, max_size=4).map(lambda found: lambda world: world.with_sample(found)[0]),
-    st.builds(
-        lambda which, off: lambda world: deployed(world, which, off), st.integers(0, 9), numbers
-    ),
+    finding(),
+    planning(),
+    sampling(),
+    deploying(),
     having("robots", poses),
     having("metres_per_pixel", st.none() | st.floats(0.01, 2)),
     having("pointed", st.lists(prompts, max_size=2).map(tuple)),

@@ -61,7 +61,10 @@ def starts_of(work: "ToolCalls", plan: Plan) -> Places:
     track = work.world.arrivals[plan.id].track
     assert track is not None
     found = read_track(work.context.services.artefacts.get(track))
-    return dict(zip(found.ids, map(tuple, found.points[0].tolist()), strict=True))
+    return {
+        robot: (float(x), float(y))
+        for robot, (x, y) in zip(found.ids, found.points[0], strict=True)
+    }
 
 
 def reopened(work: "ToolCalls", folder: Path, begin: Begin) -> "ToolCalls":

@@ -126,7 +126,11 @@ def test_in_holes_robots_keep_off_the_edge(work: "ToolCalls") -> None:
 def beside_border(tool_calls: Begin) -> Begin:
     """A crate at the left border of 640 x 480 px, for robots of a radius."""
     outline = make_outline([(8, 150), (100, 150), (100, 300), (8, 300)])
-    return lambda radius: with_target(tool_calls, outline, (640, 480), robot_radius=radius)
+
+    def made(radius: float) -> "ToolCalls":
+        return with_target(tool_calls, outline, (640, 480), robot_radius=radius)
+
+    return made
 
 
 @pytest.mark.parametrize("rings", [1, 2, 3])
