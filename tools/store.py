@@ -80,6 +80,8 @@ def read_world(path: Path) -> StoredWorld:
         digest = _digest(content)
     except ValidationError as error:
         raise StorageError(f"{path} is damaged: {violations(error)}") from None
+    except InputError as error:  # such as a scale that no picture has
+        raise StorageError(f"{path} is damaged: {error}") from None
     except ValueError:
         raise StorageError(f"{path} is damaged: it holds text that is not Unicode.") from None
     world = stored.world

@@ -12,7 +12,7 @@ import re
 import threading
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
@@ -90,16 +90,28 @@ class Tool:
     async def call(self, context: Context, arguments: Mapping[str, Any]) -> ToolResult:
         """Validate and run; a plain function runs in a thread of its own.
 
+        One that runs on after it was given up can no longer put a world in place.
+
         Raises:
             ArgumentsError: they are against the schema.
             ToolError: what they ask for is not possible; for the model.
         """
         parsed = self.parse(arguments)
         values = {name: getattr(parsed, name) for name in type(parsed).model_fields}
-        if inspect.iscoroutinefunction(self.function):
-            answer = await self.function(context, **values)
-        else:
-            answer = await in_thread(lambda: self.function(context, **values))
+        waiting = True
+
+        def observed(world: World) -> None:
+            if waiting:
+                context.observed(world)
+
+        given = replace(context, observed=observed)
+        try:
+            if inspect.iscoroutinefunction(self.function):
+                answer = await self.function(given, **values)
+            else:
+                answer = await in_thread(lambda: self.function(given, **values))
+        finally:
+            waiting = False
         return answer if isinstance(answer, ToolResult) else ToolResult(dict(answer))
 
 

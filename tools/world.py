@@ -10,8 +10,10 @@ from typing import Annotated, Any, cast
 
 import shapely
 from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, field_validator
+from shapely.errors import ShapelyError
+from shapely.geometry import Polygon
 
-from .errors import ToolError
+from .errors import InputError, ToolError
 from .fleet.deploy import Arrival
 from .fleet.protocol import Pose
 from .formation.contract import Contract
@@ -19,7 +21,7 @@ from .formation.placement.place import Site
 from .formation.plan import Plan, scene_version
 from .formation.units import check_scale
 from .formation.value import Value
-from .geometry.outline import Outline, make_outline
+from .geometry.outline import Outline, outline_of
 from .perception.image import Picture
 from .perception.target_prompt import Box, Point, TargetPrompt
 
@@ -44,9 +46,16 @@ def rounded_rings(outline: Outline) -> tuple[list[Any], list[Any]]:
 
 
 def _read_outline(value: Any) -> Outline:
+    """An outline, or what `outline_rings` wrote, with its rings exactly as they were."""
     if isinstance(value, Outline):
         return value
-    return make_outline(value["outline"], value.get("holes", ()))
+    try:
+        polygon = Polygon(value["outline"], value.get("holes", ()))
+        if not polygon.is_valid:
+            raise ValueError("its rings cross, or are not finite")
+        return outline_of(polygon)
+    except (AttributeError, KeyError, TypeError, ValueError, InputError, ShapelyError) as error:
+        raise ValueError(f"is no outline: {error}") from None
 
 
 OutlineField = Annotated[

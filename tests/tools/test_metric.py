@@ -1,30 +1,32 @@
-"""A scene with a scale: what tools take, say and keep, and that it is part of what is certified."""
+"""A scale of the picture: what tools take, say and keep, and that a certificate depends on it."""
 
-import asyncio
 import re
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.first_message import read_task, task_text
 from formup.agent.session import load_run
-from formup.tools.builtin import TOOLS
+from formup.tools.context import Settings
 from formup.tools.draw import draw_plan
 from formup.tools.draw.scale_bar import length_words, round_metres
 from formup.tools.errors import InputError, ToolError
 from formup.tools.formation.units import in_metres
 from formup.tools.perception.image import load_picture, picture_from_array
-from formup.tools.scene import Scene
-from formup.tools.store import read_stored, restore, store
-from formup.tools.world import Settings, Workspace
+from formup.tools.store import StoredWorld, picture_of, read_world
+from formup.tools.world import World
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+if TYPE_CHECKING:
+    from .conftest import ToolCalls
+
 SCALE = 0.05
+Begin = Callable[..., "ToolCalls"]
 TARGET = {"id": "t1", "label": "the box", "box": [75, 65, 145, 125]}
 
 
@@ -35,25 +37,29 @@ def pixels() -> Any:
     return made
 
 
-def workspace(instruction: str = "", scale: float | None = SCALE, **more: Any) -> Workspace:
-    scene = Scene(picture_from_array(pixels()))
-    return Workspace(scene, Settings(metres_per_pixel=scale, **more), instruction=instruction)
+@pytest.fixture
+def begin(tool_calls: Begin) -> Begin:
+    """Calls on that picture, with a scale unless it is given as None."""
+
+    def made(words: str = "", scale: float | None = SCALE, **more: Any) -> "ToolCalls":
+        return tool_calls(picture_from_array(pixels()), words, metres_per_pixel=scale, **more)
+
+    return made
 
 
-def answer(work: Workspace, name: str, **arguments: Any) -> dict[str, Any]:
-    chosen = next(t for t in TOOLS if t.name == name)
-    return asyncio.run(chosen.call(work, arguments)).data
+def answer(work: "ToolCalls", name: str, **arguments: Any) -> dict[str, Any]:
+    return work.call(name, **arguments).data
 
 
-def propose(work: Workspace, more: dict[str, Any], **group: Any) -> dict[str, Any]:
+def propose(work: "ToolCalls", more: dict[str, Any], **group: Any) -> dict[str, Any]:
     given = {"relation": "around", "targets": ["t1"], "robots": 6} | group
     stated = {"groups": [given]} | more
     return answer(work, "propose_formation", contract=stated, targets=[TARGET])
 
 
-def test_metres_and_their_pixels_make_the_same_plan() -> None:
+def test_metres_and_their_pixels_make_the_same_plan(begin: Begin) -> None:
     plans = [
-        propose(workspace(), {"unit": unit, "robot_radius": 4 * f}, clearance=[20 * f, 22 * f])
+        propose(begin(), {"unit": unit, "robot_radius": 4 * f}, clearance=[20 * f, 22 * f])
         for unit, f in (("m", SCALE), ("px", 1))
     ]
     assert plans[0] == plans[1]
@@ -65,50 +71,50 @@ def test_metres_and_their_pixels_make_the_same_plan() -> None:
     assert data["measures"]["min_clearance_m"] == in_metres(px, SCALE)
 
 
-def test_a_length_without_a_unit_and_metres_without_a_scale_are_refused() -> None:
+def test_a_length_without_a_unit_and_metres_without_a_scale_are_refused(begin: Begin) -> None:
     with pytest.raises(ToolError, match='"m" or "px"'):
-        propose(workspace(), {}, clearance=[1, 1.1])
+        propose(begin(), {}, clearance=[1, 1.1])
     with pytest.raises(ToolError, match=r"no scale.*ask the person"):
-        propose(workspace(scale=None), {"unit": "m"}, clearance=[1, 1.1])
-    assert propose(workspace(), {})["certified"]
+        propose(begin(scale=None), {"unit": "m"}, clearance=[1, 1.1])
+    assert propose(begin(), {})["certified"]
 
 
-def test_findings_and_refusals_tell_metres() -> None:
+def test_findings_and_refusals_tell_metres(begin: Begin) -> None:
     group = {"relation": "around", "targets": ["t1"], "robots": 2, "clearance": [1, 1.1]}
     given = {"targets": [TARGET], "positions": [[40, 90], [180, 95]]}
     contract = {"groups": [group], "unit": "m"}
-    data = answer(workspace(), "propose_formation", contract=contract, **given)
+    data = answer(begin(), "propose_formation", contract=contract, **given)
     assert not data["certified"]
     assert re.search(r"is [12]\.\d{3} m \(\d\d\.\d px\) from t1; 1\.100 m \(22\.0 px\)", str(data))
     with pytest.raises(ToolError, match=r"only \d+ robots? fits?: the .* m \(\d+ px\)"):
-        propose(workspace(), {"unit": "m"}, min_spacing=5)
+        propose(begin(), {"unit": "m"}, min_spacing=5)
     contract = {"groups": [group | {"clearance": [20, 22]}]}
-    plain = answer(workspace(scale=None), "propose_formation", contract=contract, **given)
+    plain = answer(begin(scale=None), "propose_formation", contract=contract, **given)
     assert [re.sub(r"[0-9.]+ m \((.+?)\)", r"\1", f) for f in data["findings"]] == plain["findings"]
     assert len(plain["findings"]) > 1
 
 
-def test_a_named_length_that_the_contract_has_not_is_doubted() -> None:
+def test_a_named_length_that_the_contract_has_not_is_doubted(begin: Begin) -> None:
     words = "Surround the box, 1 m from it; the robots are 40 cm across"
     right = {"unit": "m", "robot_radius": 0.2}
-    assert propose(workspace(words), right, clearance=[1, 1.05])["certified"]
+    assert propose(begin(words), right, clearance=[1, 1.05])["certified"]
     in_px = {"unit": "px", "robot_radius": 4}
-    assert propose(workspace(words), in_px, clearance=[20, 21])["certified"]
+    assert propose(begin(words), in_px, clearance=[20, 21])["certified"]
     for more, clearance in (({"unit": "px", "robot_radius": 4}, [1, 1.05]), (right, [20, 21])):
         with pytest.raises(ToolError, match="names 1 m, which is no length"):
-            propose(workspace(words), more, clearance=clearance)
+            propose(begin(words), more, clearance=clearance)
     with pytest.raises(ToolError, match=r"40 cm across, but robot_radius is 0\.400 m \(8\.0 px\)"):
-        propose(workspace(words), {"unit": "m", "robot_radius": 0.4}, clearance=[1, 1.05])
+        propose(begin(words), {"unit": "m", "robot_radius": 0.4}, clearance=[1, 1.05])
     with pytest.raises(ToolError, match="A doubt"):
-        propose(workspace(words), right)
+        propose(begin(words), right)
     read = right | {"reading": "the metre is another thing's"}
-    assert propose(workspace(words), read)["certified"]
-    assert propose(workspace(words, clearance=20.0, robot_radius=4.0), {})["certified"]
-    assert propose(workspace(words, scale=None), {})["certified"]
+    assert propose(begin(words), read)["certified"]
+    assert propose(begin(words, clearance=20.0, robot_radius=4.0), {})["certified"]
+    assert propose(begin(words, scale=None), {})["certified"]
 
 
-def test_measuring_tools_tell_metres_beside_pixels() -> None:
-    work = workspace()
+def test_measuring_tools_tell_metres_beside_pixels(begin: Begin) -> None:
+    work = begin()
     propose(work, {})
     shape = answer(work, "describe_shape", target="t1")
     assert (shape["length_m"], shape["width_m"]) == (
@@ -120,13 +126,13 @@ def test_measuring_tools_tell_metres_beside_pixels() -> None:
     assert far["nearest_m"] == pytest.approx(far["nearest_px"] * SCALE, abs=1e-3)
     (point,) = answer(work, "check_point", target="t1", points=[[10, 90]])["points"]
     assert point["signed_distance_m"] == far["nearest_m"]
-    plain = workspace(scale=None)
+    plain = begin(scale=None)
     propose(plain, {})
     assert "_m" not in " ".join(answer(plain, "describe_shape", target="t1"))
 
 
-def test_samples_take_metres() -> None:
-    work = workspace()
+def test_samples_take_metres(begin: Begin) -> None:
+    work = begin()
     propose(work, {})
     metric = answer(work, "sample_along_edges", target="t1", n=6, offset=1, unit="m")
     plain = answer(work, "sample_along_edges", target="t1", n=6, offset=20, unit="px")
@@ -140,29 +146,34 @@ def test_samples_take_metres() -> None:
         answer(work, "sample_inside", target="t1", n=3, margin=5)
 
 
-def test_the_scale_is_part_of_what_is_certified_and_is_kept(tmp_path: Path) -> None:
+def test_the_scale_is_part_of_what_is_certified_and_is_kept(
+    tool_calls: Begin, tmp_path: Path
+) -> None:
     Image.fromarray(pixels()).save(tmp_path / "box.png")
     picture = load_picture(tmp_path / "box.png")
-    work = Workspace(Scene(picture), Settings(metres_per_pixel=SCALE))
+    work = tool_calls(picture, metres_per_pixel=SCALE)
     plan = propose(work, {"unit": "m"}, clearance=[1, 1.1])["plan_id"]
     path = tmp_path / "state.json"
-    path.write_text(store(work).model_dump_json())
-    back = restore(read_stored(path), None, Settings())
-    assert back.scene.metres_per_pixel == SCALE
+    path.write_bytes(StoredWorld(picture=str(picture.path), world=work.world).to_bytes())
+    stored = read_world(path)
+    back = tool_calls(picture_of(stored, path), world=stored.world)
+    assert back.world.metres_per_pixel == SCALE
     assert answer(back, "deploy", plan_id=plan)["arrived"]
-    other = restore(read_stored(path), None, Settings(metres_per_pixel=0.1))
+    other = tool_calls(picture, world=stored.world, metres_per_pixel=0.1)
     with pytest.raises(ToolError, match="or the scale is another"):
         answer(other, "deploy", plan_id=plan)
-    assert replace(work.scene, metres_per_pixel=None).version != work.scene.version
+    assert work.world.having(metres_per_pixel=None).version != work.world.version
     with pytest.raises(InputError, match="-2 metres per pixel"):
-        Workspace(Scene(picture), Settings(metres_per_pixel=-2))
+        tool_calls(picture, metres_per_pixel=-2)
+    with pytest.raises(InputError, match="-2 metres per pixel"):
+        World.of(picture, metres_per_pixel=-2)
 
 
-def test_the_first_message_tells_the_scale_only_where_there_is_one() -> None:
-    text = task_text(workspace("Go"))
+def test_the_first_message_says_the_scale_only_where_there_is_one(begin: Begin) -> None:
+    text = task_text(begin("Go").context)
     assert "\nMetres per pixel: 0.05\n" in text
     assert read_task(text).metres_per_pixel == SCALE
-    plain = task_text(workspace("Go", scale=None))
+    plain = task_text(begin("Go", scale=None).context)
     assert plain == text.replace("Metres per pixel: 0.05\n", "")
     assert read_task(plain).metres_per_pixel is None
 
@@ -213,17 +224,17 @@ def test_scale_bars_have_round_lengths(longest: float) -> None:
     assert number.strip("0.")[0] in "125"
 
 
-def test_a_drawn_plan_has_a_scale_bar_of_the_length_it_says() -> None:
-    work = workspace()
+def test_a_drawn_plan_has_a_scale_bar_of_the_length_it_says(begin: Begin) -> None:
+    work = begin()
     propose(work, {})
-    (plan,) = work.plans.values()
-    drawn = np.asarray(draw_plan(work.scene, plan, "")).astype(int)
-    scene = replace(work.scene, metres_per_pixel=None)
-    plain = np.asarray(draw_plan(scene, plan, "")).astype(int)
+    picture, plan = work.context.picture, work.world.plan().plan
+    drawn = np.asarray(draw_plan(picture, work.world, plan, "")).astype(int)
+    world = work.world.having(metres_per_pixel=None)
+    plain = np.asarray(draw_plan(picture, world, plan, "")).astype(int)
     assert drawn.shape == plain.shape
     bright = (drawn[:, :, 0] > 230) & (np.abs(drawn - plain).sum(axis=2) > 300)
     rows = np.flatnonzero(bright.sum(axis=1) > 100)
     columns = np.flatnonzero(bright[rows].all(axis=0))
-    width = drawn.shape[1] / scene.picture.width
+    width = drawn.shape[1] / picture.width
     runs = np.split(columns, np.flatnonzero(np.diff(columns) > 1) + 1)
     assert max(map(len, runs)) == pytest.approx(2 / SCALE * width, abs=3)  # 2 m of 12

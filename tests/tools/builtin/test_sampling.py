@@ -1,39 +1,49 @@
-"""The doors that draw forms, equal chords, several rings and rings in holes."""
+"""Built-in tools that draw forms, equal chords, several rings and rings in holes."""
 
-import asyncio
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 import shapely
-from formup.tools.builtin import TOOLS
 from formup.tools.errors import ToolError
-from formup.tools.geometry.outline import FloatArray, make_outline
+from formup.tools.geometry.outline import FloatArray, Outline, make_outline
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene, Target
-from formup.tools.tool import ToolResult
-from formup.tools.world import Settings, Workspace
+from formup.tools.world import Target, World
+
+if TYPE_CHECKING:
+    from ..conftest import ToolCalls
+
+Begin = Callable[..., "ToolCalls"]
 
 
 @pytest.fixture
-def work() -> Workspace:
+def work(tool_calls: Begin) -> "ToolCalls":
     """A picture of 300 x 240 px with a rectangle t1 that has a hole 40 px wide."""
     outline = make_outline(
         [(100, 80), (200, 80), (200, 160), (100, 160)],
         ([(130, 100), (170, 100), (170, 140), (130, 140)],),
     )
-    target = Target("t1", "frame", outline.bounds, 1.0, outline, "outline")
-    picture = picture_from_array(np.full((240, 300, 3), 90, np.uint8))
-    return Workspace(Scene(picture, targets=(target,)))
+    return with_target(tool_calls, outline, (300, 240))
 
 
-def call(workspace: Workspace, name: str, **arguments: Any) -> ToolResult:
-    tool = next(t for t in TOOLS if t.name == name)
-    return asyncio.run(tool.call(workspace, arguments))
+def with_target(
+    tool_calls: Begin, outline: Outline, size: tuple[int, int], **settings: Any
+) -> "ToolCalls":
+    picture = picture_from_array(np.full((size[1], size[0], 3), 90, np.uint8))
+    target = Target(
+        id="t1",
+        label="thing",
+        box=outline.bounds,
+        confidence=1.0,
+        outline=outline,
+        prompt="outline",
+    )
+    return tool_calls(picture, world=World.of(picture, targets=(target,)), **settings)
 
 
-def sampled(workspace: Workspace, name: str, **arguments: Any) -> FloatArray:
-    return np.asarray(call(workspace, name, **arguments).data["positions"])
+def sampled(work: "ToolCalls", name: str, **arguments: Any) -> FloatArray:
+    return np.asarray(work.call(name, **arguments).data["positions"])
 
 
 FORMS: list[dict[str, Any]] = [
@@ -51,12 +61,12 @@ FORMS: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda f: f["kind"])
 def test_a_sampled_form_is_certified_as_the_form_it_is(
-    work: Workspace, form: dict[str, Any]
+    work: "ToolCalls", form: dict[str, Any]
 ) -> None:
-    sample = call(work, "sample_shape", n=12, **form).data["sample"]
+    sample = work.call("sample_shape", n=12, **form).data["sample"]
     shape = {k: v for k, v in form.items() if k != "targets"}
     group = {"relation": "shape", "targets": form.get("targets", []), "robots": 12, "shape": shape}
-    plan = call(work, "propose_formation", contract={"groups": [group]}, samples=[sample]).data
+    plan = work.call("propose_formation", contract={"groups": [group]}, samples=[sample]).data
     assert plan["findings"] == []
     assert plan["certified"]
 
@@ -75,13 +85,13 @@ def test_a_sampled_form_is_certified_as_the_form_it_is(
     ],
 )
 def test_forms_that_mean_nothing_are_refused(
-    work: Workspace, arguments: dict[str, Any], why: str
+    work: "ToolCalls", arguments: dict[str, Any], why: str
 ) -> None:
     with pytest.raises(ToolError, match=why):
-        call(work, "sample_shape", n=5, **arguments)
+        work.call("sample_shape", n=5, **arguments)
 
 
-def test_chords_are_equal_around_and_along_a_side(work: Workspace) -> None:
+def test_chords_are_equal_around_and_along_a_side(work: "ToolCalls") -> None:
     ring = sampled(work, "sample_along_edges", target="t1", n=9, offset=20, chords=True)
     chords = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
     assert chords.min() > 0.99 * chords.max()
@@ -89,61 +99,65 @@ def test_chords_are_equal_around_and_along_a_side(work: Workspace) -> None:
     assert np.ptp(np.linalg.norm(np.diff(line, axis=0), axis=1)) < 0.5
 
 
-def test_rings_stand_one_behind_the_other_and_say_how_many_each(work: Workspace) -> None:
-    reply = call(work, "sample_along_edges", target="t1", n=20, offset=12, rings=2, step=9).data
+def test_rings_stand_one_behind_the_other_and_say_how_many_each(work: "ToolCalls") -> None:
+    reply = work.call("sample_along_edges", target="t1", n=20, offset=12, rings=2, step=9).data
     counts = reply["robots_per_ring"]
     assert (len(counts), sum(counts)) == (2, 20)
     groups = [
         {"relation": "around", "targets": ["t1"], "robots": k, "clearance": [d - 1, d + 1]}
         for k, d in zip(counts, (12, 21), strict=True)
     ]
-    plan = call(
-        work, "propose_formation", contract={"groups": groups}, samples=[reply["sample"]]
+    plan = work.call(
+        "propose_formation", contract={"groups": groups}, samples=[reply["sample"]]
     ).data
     assert plan["findings"] == []
 
 
-def test_in_holes_robots_keep_off_the_edge(work: Workspace) -> None:
+def test_in_holes_robots_keep_off_the_edge(work: "ToolCalls") -> None:
     points = sampled(work, "sample_along_edges", target="t1", n=6, offset=8, holes=True)
     assert np.abs(points - (150, 120)).max(axis=1) == pytest.approx(12, abs=0.1)
     with pytest.raises(ToolError, match="do not fit in the holes of t1"):
-        call(work, "sample_along_edges", target="t1", n=6, offset=30, holes=True)
+        work.call("sample_along_edges", target="t1", n=6, offset=30, holes=True)
     with pytest.raises(ToolError, match="n, offset and step alone"):
-        call(work, "sample_along_edges", target="t1", n=6, holes=True, side="left")
+        work.call("sample_along_edges", target="t1", n=6, holes=True, side="left")
 
 
-def beside_border(radius: float) -> Workspace:
+@pytest.fixture
+def beside_border(tool_calls: Begin) -> Begin:
+    """A crate at the left border of 640 x 480 px, for robots of a radius."""
     outline = make_outline([(8, 150), (100, 150), (100, 300), (8, 300)])
-    picture = picture_from_array(np.full((480, 640, 3), 90, np.uint8))
-    target = Target("t1", "crate", outline.bounds, 1.0, outline, "outline")
-    return Workspace(
-        Scene(picture, targets=(target,)), settings=Settings(robots=None, robot_radius=radius)
-    )
+
+    def made(radius: float) -> "ToolCalls":
+        return with_target(tool_calls, outline, (640, 480), robot_radius=radius)
+
+    return made
 
 
 @pytest.mark.parametrize("rings", [1, 2, 3])
 @pytest.mark.parametrize("radius", [0.0, 6.0])
-def test_rings_that_the_border_cuts_keep_their_distance(rings: int, radius: float) -> None:
+def test_rings_that_the_border_cuts_keep_their_distance(
+    beside_border: Begin, rings: int, radius: float
+) -> None:
     place = beside_border(radius)
     points = sampled(
         place, "sample_along_edges", target="t1", n=18, rings=rings, offset=15.0, step=20.0
     )
-    off = shapely.distance(place.scene.target("t1").outline.filled, shapely.points(points))
+    off = shapely.distance(place.world.target("t1").outline.filled, shapely.points(points))
     assert off.min() >= 15 + radius - 0.05
     assert len(points) == 18
 
 
-def test_a_line_keeps_robots_apart_and_in_the_picture() -> None:
+def test_a_line_keeps_robots_apart_and_in_the_picture(beside_border: Begin) -> None:
     place = beside_border(20.0)
     with pytest.raises(ToolError, match=r"robots? fit"):
-        call(place, "sample_shape", kind="line", n=5, start=(0, 0), end=(40, 0))
+        place.call("sample_shape", kind="line", n=5, start=(0, 0), end=(40, 0))
     points = sampled(place, "sample_shape", kind="line", n=5, start=(0, 30), end=(639, 30))
     assert points[:, 0].min() >= 20
     assert points[:, 0].max() <= 619
     with pytest.raises(ToolError, match="takes no targets"):
-        call(place, "sample_shape", kind="line", n=2, start=(0, 9), end=(40, 9), targets=["t1"])
+        place.call("sample_shape", kind="line", n=2, start=(0, 9), end=(40, 9), targets=["t1"])
 
 
-def test_on_the_outline_itself_there_are_no_rings() -> None:
+def test_on_the_outline_itself_there_are_no_rings(beside_border: Begin) -> None:
     with pytest.raises(ToolError, match="offset of 0"):
-        call(beside_border(0.0), "sample_along_edges", target="t1", n=9, rings=2, offset=0)
+        beside_border(0.0).call("sample_along_edges", target="t1", n=9, rings=2, offset=0)

@@ -13,7 +13,7 @@ from formup.tools.geometry.outline import FloatArray, largest_part, outline_of
 from formup.tools.perception.detectors.candidates import find_candidates
 from formup.tools.perception.image import Picture, load_picture, picture_from_array
 from formup.tools.perception.referring.attributes import Attributes, Candidate
-from formup.tools.scene import Scene, Target
+from formup.tools.world import Target, World
 from numpy.typing import NDArray
 from scipy import ndimage
 from shapely.geometry import LineString, Point, Polygon
@@ -42,10 +42,11 @@ def candidate(number: int, polygon: BaseGeometry) -> Candidate:
 
 def numbered(*polygons: BaseGeometry) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]:
     """Where candidates changed the picture, and the picture, at 4 px per pixel of it."""
-    made = Scene(picture_from_array(np.full((200, 300, 3), 120, dtype=np.uint8)))
+    picture = picture_from_array(np.full((200, 300, 3), 120, dtype=np.uint8))
+    world = World.of(picture)
     candidates = [candidate(k, p) for k, p in enumerate(polygons, start=1)]
-    pixels = np.asarray(draw_look(made, candidates=candidates, rulers=False))
-    return (pixels != np.asarray(draw_look(made, rulers=False))).any(axis=2), pixels
+    pixels = np.asarray(draw_look(picture, world, candidates=candidates, rulers=False))
+    return (pixels != np.asarray(draw_look(picture, world, rulers=False))).any(axis=2), pixels
 
 
 def chip_of(pixels: NDArray[np.uint8], colour: tuple[int, int, int]) -> tuple[float, float]:
@@ -157,9 +158,13 @@ def test_candidates_at_the_very_edge_and_of_odd_shape() -> None:
 def test_targets_and_candidates_share_no_colour() -> None:
     picture = picture_from_array(np.full((200, 300, 3), 120, dtype=np.uint8))
     outline = outline_of(shapely.box(20, 20, 90, 90))
-    target = Target("t1", "thing", outline.bounds, 0.9, outline, "box")
+    target = Target(
+        id="t1", label="thing", box=outline.bounds, confidence=0.9, outline=outline, prompt="box"
+    )
     found = candidate(1, shapely.box(150, 20, 220, 90))
-    image = draw_look(Scene(picture, (target,)), candidates=[found], rulers=False)
+    image = draw_look(
+        picture, World.of(picture, targets=(target,)), candidates=[found], rulers=False
+    )
     halves = np.split(np.asarray(image), [4 * 120], axis=1)
     for half, own, other in zip(halves, MARKS[:2], MARKS[1::-1], strict=True):
         assert (half == own).all(axis=2).sum() > 1000

@@ -1,6 +1,7 @@
 """The picture as a model is shown it: places read off it are places in the photograph."""
 
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ from formup.tools.errors import ToolError
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import make_plan
 from formup.tools.geometry.outline import make_outline
-from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene, Target
+from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.world import Target, World
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -18,12 +19,24 @@ RULERS = (52, 30)
 """Room at the right and at the lower edge, px."""
 
 
-def scene(width: int, height: int) -> Scene:
+def bare(width: int, height: int) -> Picture:
     """Grey, with a bright spot of 5 px in its right lower half."""
     pixels = np.full((height, width, 3), 120, np.uint8)
     y, x = spot(width, height)
     pixels[y - 2 : y + 3, x - 2 : x + 3] = (255, 255, 0)
-    return Scene(picture_from_array(pixels))
+    return picture_from_array(pixels)
+
+
+def box() -> Target:
+    outline = make_outline([(100, 100), (200, 100), (200, 200), (100, 200)])
+    return Target(
+        id="t1", label="box", box=outline.bounds, confidence=0.9, outline=outline, prompt="box"
+    )
+
+
+def view_of(picture: Picture, **more: Any) -> bytes:
+    """The view where nothing has been found yet."""
+    return draw_view(picture, World.of(picture), **more)
 
 
 def spot(width: int, height: int) -> tuple[int, int]:
@@ -50,9 +63,9 @@ def spot_at(view: bytes) -> tuple[float, float]:
 def test_the_photograph_lies_at_the_upper_left_at_a_known_scale(
     size: tuple[int, int], scale: float
 ) -> None:
-    made = scene(*size)
-    assert view_scale(made.picture) == scale
-    view = draw_view(made)
+    picture = bare(*size)
+    assert view_scale(picture) == scale
+    view = view_of(picture)
     height, width = shown(view).shape[:2]
     assert (width, height) == (size[0] * scale + RULERS[0], size[1] * scale + RULERS[1])
     y, x = spot(*size)
@@ -62,8 +75,8 @@ def test_the_photograph_lies_at_the_upper_left_at_a_known_scale(
 
 @pytest.mark.parametrize("size", [(50_000, 16), (16, 4000), (16, 16), (6000, 5000)])
 def test_no_view_is_larger_than_providers_take(size: tuple[int, int]) -> None:
-    made = Scene(picture_from_array(np.full((size[1], min(size[0], 20_000), 3), 9, np.uint8)))
-    height, width = shown(draw_view(made)).shape[:2]
+    picture = picture_from_array(np.full((size[1], min(size[0], 20_000), 3), 9, np.uint8))
+    height, width = shown(view_of(picture)).shape[:2]
     assert 400 <= max(width, height) <= 1024 + max(RULERS)
 
 
@@ -77,8 +90,8 @@ def ticks(strip: NDArray[np.int16]) -> NDArray[np.int64]:
 def test_the_rulers_count_the_photographs_own_pixels(
     region: tuple[float, float, float, float] | None,
 ) -> None:
-    made = scene(768, 432)
-    view = shown(draw_view(made, region=region))
+    picture = bare(768, 432)
+    view = shown(view_of(picture, region=region))
     x0, y0, x1, y1 = region or (0, 0, 768, 432)
     height, width = view.shape[0] - RULERS[1], view.shape[1] - RULERS[0]
     for axis, first, last, strip in (
@@ -94,23 +107,22 @@ def test_the_rulers_count_the_photographs_own_pixels(
 
 
 def test_a_part_is_shown_closer_and_cut_at_the_pictures_border() -> None:
-    made = scene(768, 432)
+    picture = bare(768, 432)
     y, x = spot(768, 432)
-    found = spot_at(draw_view(made, region=(x - 20, y - 20, x + 20, y + 20)))
+    found = spot_at(view_of(picture, region=(x - 20, y - 20, x + 20, y + 20)))
     assert found == pytest.approx((20.5 * 768 / 40, 20.5 * 768 / 40), abs=2)
-    corner = shown(draw_view(made, region=(600, 300, 5000, 5000)))
+    corner = shown(view_of(picture, region=(600, 300, 5000, 5000)))
     assert corner.shape[1] - RULERS[0] == 768
     assert corner.shape[0] - RULERS[1] == round(768 * 132 / 168)
 
 
 def test_targets_and_robots_are_drawn_where_they_are() -> None:
-    made = scene(600, 400)
-    outline = make_outline([(100, 100), (200, 100), (200, 200), (100, 200)])
-    made = made.with_target(Target("t1", "box", outline.bounds, 0.9, outline, "box"))
+    picture = bare(600, 400)
+    world = World.of(picture).with_target(box())
     contract = Contract(groups=(Group(relation="corners", targets=("t1",), robots=4),))
-    plan = make_plan(contract, made.site(contract), made.version)
-    bare, view = shown(draw_view(scene(600, 400))), shown(draw_view(made, plan=plan))
-    changed = np.abs(bare - view).sum(axis=2) > 60
+    plan = make_plan(contract, world.site(contract), world.version)
+    plain, view = shown(view_of(picture)), shown(draw_view(picture, world, plan=plan))
+    changed = np.abs(plain - view).sum(axis=2) > 60
     assert changed[150, 96:104].any()  # the left edge
     for x, y in plan.formation.points.round().astype(int):
         assert changed[y - 3 : y + 4, x - 3 : x + 4].all()
@@ -118,10 +130,9 @@ def test_targets_and_robots_are_drawn_where_they_are() -> None:
 
 
 def test_a_plan_about_a_target_that_is_gone_is_refused() -> None:
-    made = scene(600, 400)
-    outline = make_outline([(100, 100), (200, 100), (200, 200), (100, 200)])
-    whole = made.with_target(Target("t1", "box", outline.bounds, 0.9, outline, "box"))
+    picture = bare(600, 400)
+    whole = World.of(picture).with_target(box())
     contract = Contract(groups=(Group(relation="around", targets=("t1",), robots=4),))
     plan = make_plan(contract, whole.site(contract), whole.version)
     with pytest.raises(ToolError, match="'t1'"):
-        draw_view(made, plan=plan)
+        view_of(picture, plan=plan)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from random import Random
 
 import numpy as np
 import pytest
@@ -103,6 +104,33 @@ def test_a_plan_with_positions_that_break_the_contract_says_so() -> None:
     plan = make_plan(AROUND, SITE, "s", points)
     assert not plan.verdict.certified
     assert plan.verdict.findings[0].robot == 1
+
+
+@given(st.lists(st.integers(1, 5), min_size=1, max_size=4), st.integers(0, 3), st.randoms())
+@settings(derandomize=True, deadline=None, max_examples=60)
+def test_robots_take_all_places_in_the_fleets_order(
+    sizes: list[int], idle: int, random: Random
+) -> None:
+    count = sum(sizes)
+    contract = Contract(groups=tuple(Group(relation="shape", robots=n) for n in sizes))
+    plan = make_plan(contract, SITE, "s", [(10.0 * i, 7.0 * (i % 5)) for i in range(count)])
+    fleet = [f"r{i}" for i in range(count + idle)]
+    random.shuffle(fleet)
+    taking = random.sample(fleet, count)
+    made = plan.for_robots(taking, fleet).formation
+    assert list(made.robots) == [robot for robot in fleet if robot in taking]
+    assert made.robot_of_place == tuple(taking)
+    assert made.points.tolist() == plan.formation.points.tolist()
+    assert [len(group) for group in made.members] == sizes
+    assert sorted(i for group in made.members for i in group) == list(range(count))
+    place_of = dict(zip(taking, plan.formation.positions, strict=True))
+    assert made.positions == tuple(place_of[robot] for robot in made.robots)
+    assert certify(made.points, made.contract, SITE) == plan.verdict
+    again = Formation.model_validate_json(made.model_dump_json())
+    assert (again, again.id) == (made, made.id)
+    reassigned = plan.for_robots(taking, fleet).for_robots(taking[::-1], fleet)
+    assert reassigned.formation.points.tolist() == plan.formation.points.tolist()
+    assert (reassigned.id == made.id) == (count == 1)
 
 
 def test_negative_zero_is_the_same_place_as_zero() -> None:

@@ -11,10 +11,10 @@ from formup.tools.formation.checking.verdict import Verdict
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.placement.caging import CageError
 from formup.tools.formation.placement.place import Site
-from formup.tools.formation.plan import Formation, Plan, make_plan
+from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import Outline, make_outline
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene, Target
+from formup.tools.world import Target, World
 from pydantic import ValidationError
 
 ELL = make_outline([(250, 150), (400, 150), (400, 200), (300, 200), (300, 300), (250, 300)])
@@ -151,24 +151,18 @@ def test_robots_that_have_no_room_on_the_ring_are_counted() -> None:
     assert planned(speck, caught.value.fits, 5.0, closure="escape-proof").verdict.certified
 
 
-def test_a_contract_that_says_nothing_of_walls_keeps_the_id_it_had() -> None:
-    group = Group(relation="cage", targets=("t1",), robots=4)
-    formation = Formation(
-        positions=((1.0, 2.0),), contract=Contract(groups=(group,)), scene_version="s-1"
-    )
-    assert "walls" not in formation.model_dump_json()
-    assert formation.id == "p-af1241d6e4"
-
-
 def test_a_way_out_is_drawn_on_the_plan() -> None:
     pixels = np.full((480, 640, 3), 120, dtype=np.uint8)
-    target = Target("t1", "thing", ELL.bounds, 0.9, ELL, "box")
-    scene = Scene(picture_from_array(pixels)).with_target(target)
+    target = Target(
+        id="t1", label="thing", box=ELL.bounds, confidence=0.9, outline=ELL, prompt="box"
+    )
+    picture = picture_from_array(pixels)
+    world = World.of(picture).with_target(target)
     orange = (255, 128, 14)
     for n, shown in ((5, True), (14, False)):
         plan = planned(ELL, n)
         assert (plan.verdict.escape is not None) is shown
-        image = np.asarray(draw_plan(scene, plan, "Cage it"), dtype=int)
+        image = np.asarray(draw_plan(picture, world, plan, "Cage it"), dtype=int)
         near = np.abs(image - orange).max(axis=2) < 30
         assert near.any() == shown
     escape = planned(ELL, 5).verdict.escape

@@ -1,11 +1,10 @@
 """What cannot be met in full: the number that would do, and a plan that says it is partial."""
 
-import asyncio
-from dataclasses import replace
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from formup.tools.builtin import TOOLS
 from formup.tools.errors import ToolError
 from formup.tools.fleet.deploy import Arrival
 from formup.tools.formation.checking.check import certify
@@ -17,8 +16,10 @@ from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.formation.site import CapacityError, Site
 from formup.tools.geometry.outline import make_outline
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene, Target
-from formup.tools.world import Workspace
+from formup.tools.world import Target, World
+
+if TYPE_CHECKING:
+    from ...conftest import ToolCalls
 
 BRICK = make_outline([(200, 160), (400, 160), (400, 280), (200, 280)])
 SITE = Site({"t1": BRICK}, 640, 480)
@@ -135,7 +136,6 @@ def test_the_id_covers_the_shortfall_and_whole_plans_keep_theirs() -> None:
     assert plan.id != plan.formation.id
     whole = plan.model_copy(update={"partial": None})
     assert whole.id == plan.formation.id
-    assert "partial" not in whole.model_dump()
     assert Plan.model_validate_json(whole.model_dump_json()) == whole
     assert Plan.model_validate_json(plan.model_dump_json()).id == plan.id
     assert plan.partial is not None
@@ -143,34 +143,34 @@ def test_the_id_covers_the_shortfall_and_whole_plans_keep_theirs() -> None:
     assert plan.model_copy(update={"partial": other}).id != plan.id
 
 
-def test_what_one_group_leaves_no_place_for_is_said_by_name() -> None:
-    work = workspace()
+@pytest.fixture
+def work(tool_calls: Callable[..., "ToolCalls"]) -> "ToolCalls":
+    picture = picture_from_array(np.full((480, 640, 3), 90, np.uint8))
+    target = Target(
+        id="t1", label="brick", box=BRICK.bounds, confidence=1.0, outline=BRICK, prompt="outline"
+    )
+    return tool_calls(picture, world=World.of(picture, targets=(target,)))
+
+
+def test_what_one_group_leaves_no_place_for_is_said_by_name(work: "ToolCalls") -> None:
     group = {"relation": "centre", "targets": ["t1"], "robots": 4}
     said = r"group 1 and of group 2.*certified as partial: .*0 of 4 in group 2"
     with pytest.raises(ToolError, match=said):
         wanted = {"groups": [group, group], "robot_radius": 10}
-        call(work, "propose_formation", contract=wanted)
-    (plan,) = work.plans.values()
+        work.call("propose_formation", contract=wanted)
+    (node,) = work.world.plans.values()
+    plan = node.plan
     assert plan.partial is not None and plan.partial.asked == 8
 
 
-def workspace() -> Workspace:
-    picture = picture_from_array(np.full((480, 640, 3), 90, np.uint8))
-    target = Target("t1", "brick", BRICK.bounds, 1.0, BRICK, "outline")
-    return Workspace(Scene(picture, (target,)))
-
-
-def call(work: Workspace, name: str, **arguments: object) -> object:
-    tool = next(t for t in TOOLS if t.name == name)
-    return asyncio.run(tool.call(work, arguments)).data
-
-
-def test_a_proposal_names_the_partial_plan_which_only_a_person_may_have_driven() -> None:
-    work = workspace()
+def test_a_proposal_names_the_partial_plan_which_only_a_person_may_have_driven(
+    work: "ToolCalls",
+) -> None:
     group = {"relation": "corners", "targets": ["t1"], "robots": 6}
     with pytest.raises(ToolError, match=r"only 4 robots fit.*4 of the 6 robots") as caught:
-        call(work, "propose_formation", contract={"groups": [group]})
-    (plan,) = work.plans.values()
+        work.call("propose_formation", contract={"groups": [group]})
+    (node,) = work.world.plans.values()
+    plan = node.plan
     assert caught.value.kind == "capacity"
     assert (caught.value.facts["robots_that_fit"], caught.value.facts["partial_plan"]) == (
         4,
@@ -179,23 +179,21 @@ def test_a_proposal_names_the_partial_plan_which_only_a_person_may_have_driven()
     assert str(caught.value).startswith(caught.value.facts["plain"])
     for named in ({"plan_id": plan.id}, {}):
         with pytest.raises(ToolError, match=r"partial \(4 of 6\)"):
-            call(work, "deploy", **named)
-    assert not work.arrivals
-    work.settings = replace(work.settings, approved="p-0123456789")
+            work.call("deploy", **named)
+    assert not work.world.arrivals
+    work.fix(approved="p-0123456789")
     with pytest.raises(ToolError, match="partial"):
-        call(work, "deploy", plan_id=plan.id)
-    work.settings = replace(work.settings, approved=plan.id)
-    call(work, "deploy", plan_id=plan.id)
-    assert isinstance(work.arrivals[plan.id], Arrival)
-    assert work.arrivals[plan.id].arrived
+        work.call("deploy", plan_id=plan.id)
+    work.fix(approved=plan.id)
+    work.call("deploy", plan_id=plan.id)
+    assert isinstance(work.world.arrivals[plan.id], Arrival)
+    assert work.world.arrivals[plan.id].arrived
 
 
-def test_a_ring_the_picture_cuts_open_is_offered_nearer() -> None:
-    work = workspace()
+def test_a_ring_the_picture_cuts_open_is_offered_nearer(work: "ToolCalls") -> None:
     group = {"relation": "cage", "targets": ["t1"], "robots": 9, "clearance": [190, 200]}
-    data = call(work, "propose_formation", contract={"groups": [group]})
-    assert isinstance(data, dict)
+    data = work.call("propose_formation", contract={"groups": [group]}).data
     assert data["certified"] is False
-    partial_id, shown = list(work.plans)
+    partial_id, shown = list(work.world.plans)
     assert shown == data["plan_id"]
     assert data["partial"]["plan_id"] == partial_id

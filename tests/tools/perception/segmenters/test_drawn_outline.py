@@ -1,8 +1,12 @@
 """Where an outline somebody drew is taken in place of the measured one, or lays out its sides."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import shapely
+from formup.tools.builtin.targets import measured_all
+from formup.tools.context import Context
 from formup.tools.errors import ToolError
 from formup.tools.geometry.outline import make_outline
 from formup.tools.perception.image import picture_from_array
@@ -14,8 +18,7 @@ from formup.tools.perception.segmenters.drawn_outline import (
 from formup.tools.perception.segmenters.grabcut import Bytes
 from formup.tools.perception.segmenters.segment import segment_outline
 from formup.tools.perception.target_prompt import TargetPrompt
-from formup.tools.scene import Scene
-from formup.tools.world import Workspace
+from formup.tools.world import Target
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -119,12 +122,16 @@ def test_sides_of_something_else_leave_it_as_measured(drawn: list[tuple[float, f
     assert with_straight_sides(measured, drawn) is measured
 
 
+def segmented(pixels: Bytes, **prompt: Any) -> Target:
+    context = Context.of(picture_from_array(pixels))
+    return measured_all(context, (TargetPrompt(**prompt),)).target("t1")
+
+
 def test_sides_that_would_lie_beyond_the_picture_end_at_its_border() -> None:
     pixels = picture()
     pixels[:60, :80] = (200, 40, 40)
-    work = Workspace(Scene(picture_from_array(pixels)))
     rough = ((0, 0), (78, 1), (80, 59), (0, 61))
-    x0, y0, *_ = work.segment(TargetPrompt(outline=rough, straight=True)).box
+    x0, y0, *_ = segmented(pixels, outline=rough, straight=True).box
     assert min(x0, y0) >= -0.5
     drawn = make_outline([(-5.0, -3.0), (300.0, -3.0), (300.0, 200.0), (-5.0, 200.0)])
     assert clipped_to_picture(drawn, 240, 140).bounds == (-0.5, -0.5, 239.5, 139.5)
@@ -133,14 +140,15 @@ def test_sides_that_would_lie_beyond_the_picture_end_at_its_border() -> None:
 def test_straight_goes_with_an_outline_that_was_drawn() -> None:
     with pytest.raises(ValidationError, match="straight belongs to an outline"):
         TargetPrompt(box=(1, 2, 30, 40), straight=True)
-    work = Workspace(Scene(picture_from_array(picture())))
     rough = ((62.0, 38.0), (138.0, 41.0), (141.0, 98.0), (58.0, 101.0))
-    target = work.segment(TargetPrompt(outline=rough, straight=True))
+    target = segmented(picture(), outline=rough, straight=True)
     assert len(target.outline.filled.exterior.coords) == 5
     truth = shapely.box(59.5, 39.5, 139.5, 99.5)
     off = shapely.hausdorff_distance(target.outline.filled.exterior, truth.exterior)
     assert off < 0.55 * shapely.hausdorff_distance(Polygon(rough).exterior, truth.exterior)
     with pytest.raises(ToolError, match="Insufficient segmentation accuracy"):
-        Workspace(Scene(picture_from_array(np.full((90, 90, 3), 9, np.uint8)))).segment(
-            TargetPrompt(outline=((10, 10), (50, 10), (50, 50), (10, 50)), straight=True)
+        segmented(
+            np.full((90, 90, 3), 9, np.uint8),
+            outline=((10, 10), (50, 10), (50, 50), (10, 50)),
+            straight=True,
         )
