@@ -26,7 +26,7 @@ from . import (
     deploy as plans,
 )
 from . import (
-    eval_run,
+    evaluate,
     prompts,
     tools,
 )
@@ -49,7 +49,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(tools.app, name="tools", help="The tools the model sees.")
-app.add_typer(eval_run.app, name="eval", help="How good it is.")
+app.add_typer(evaluate.app, name="eval", help="How good it is.")
 app.add_typer(prompts.app, name="prompts", help="What models are told, in versions.")
 
 

@@ -13,7 +13,7 @@ from ..evals.experiments.comparison import Bounded, Comparison, Difference, Metr
 from ..evals.experiments.gate import MARGIN
 from ..evals.experiments.journal import Arm, merge, read_rows
 from ..evals.experiments.trials import TrialRow
-from ..evals.tasks.stored_suite import join_kept
+from ..evals.tasks.stored_suite import join_stored
 from ..tools.errors import InputError
 from ..tools.store import write_whole
 from . import arguments as inputs
@@ -70,7 +70,7 @@ def gate(console: Console, made: Comparison) -> int:
 def merge_shards(shards: o.Shards, out: o.MergedFolder) -> None:
     """Put the trials of shards together in a new folder."""
     count = merge(shards, out)
-    join_kept(shards, out)
+    join_stored(shards, out)
     print(f"{count:,} trials in {out}")  # noqa: T201
 
 

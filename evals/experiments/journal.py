@@ -25,7 +25,7 @@ ROWS, MANIFEST, LOCK = "trials.jsonl", "manifest.json", ".lock"
 
 
 class Arm(BaseModel):
-    """What is compared: a method with its prompt, tools, model and descriptor of shapes."""
+    """What is compared: a method with its prompt, tools, model, descriptor and way of pointing."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -35,6 +35,7 @@ class Arm(BaseModel):
     tools: Sha | None
     model: Name
     descriptor: Name | None = None
+    mode: Name = "words"
 
     @classmethod
     def of(cls, trial: Trial) -> Self:
@@ -46,14 +47,16 @@ class Arm(BaseModel):
             tools=trial.tools_sha,
             model=trial.model,
             descriptor=trial.descriptor,
+            mode=trial.mode,
         )
 
     @property
     def name(self) -> str:
-        """Method, prompt with the beginning of its hash, model, descriptor if not the usual one."""
-        told = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
+        """Method, prompt with the beginning of its hash, model; descriptor and mode if unusual."""
+        prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
         shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
-        return f"{self.method}{told} {self.model}{shapes}"
+        mode = "" if self.mode == "words" else f" {self.mode}"
+        return f"{self.method}{prompt} {self.model}{shapes}{mode}"
 
 
 class Manifest(BaseModel):

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Sha = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Name = Annotated[str, Field(min_length=1)]
+Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Status = Literal["pass", "fail", "model_invalid", "infra_error"]
@@ -32,8 +33,9 @@ class Trial(BaseModel):
         tools_sha: SHA-256 of the schemas of the tools offered.
         model: provider:name, or offline.
         descriptor: how shapes are put into words, such as edges; None where none are.
-        category: of the task, such as caging; results are also told by it.
-        setup: of the task, such as hidden; results are also told by it.
+        mode: how things are pointed at; words where they are not.
+        category, setup, style: of the task, such as caging, hidden, fresh; results are also shown
+            by each.
         must_pass: the task is one that always succeeds.
     """
 
@@ -41,15 +43,17 @@ class Trial(BaseModel):
 
     suite: Sha
     task: Name
-    trial: Annotated[int, Field(ge=0)]
+    trial: Count
     method: Name
     prompt: Name | None = None
     prompt_sha: Sha | None = None
     tools_sha: Sha | None = None
     model: Name
     descriptor: Name | None = None
+    mode: Name = "words"
     category: str = ""
     setup: str = ""
+    style: str = ""
     must_pass: bool = False
 
     @cached_property
@@ -66,7 +70,7 @@ class Trial(BaseModel):
     @property
     def order(self) -> tuple[Any, ...]:
         """By task, trial, then arm: the order of compared results."""
-        arm = (self.method, self.prompt or "", self.model, self.descriptor or "")
+        arm = (self.method, self.prompt or "", self.model, self.descriptor or "", self.mode)
         return (self.task, self.trial, *arm, self.key)
 
 
@@ -77,21 +81,28 @@ class TrialRow(Trial):
     """A trial with what came of it.
 
     Attributes:
+        outcome: status the run ended with, such as deployed or question.
         sr: success; None for an infrastructure error, as gcr and strict.
         gcr: goal conditions recall, the share of robots that stand right.
         strict: success at the tighter tolerances.
         object_correct: whether it was about the right thing; None if that was not graded.
+        iou: overlap of the best outline measured with the true one; None where none was.
         feedback: what was wrong, in a sentence.
+        cached_tokens: input in tokens of full price, with the prompt and the tools in the cache.
     """
 
     status: Status
+    outcome: str = ""
     sr: bool | None = None
     gcr: Share | None = None
     strict: bool | None = None
     object_correct: bool | None = None
+    iou: Share | None = None
     feedback: str = ""
-    input_tokens: Annotated[int, Field(ge=0)] = 0
-    output_tokens: Annotated[int, Field(ge=0)] = 0
+    requests: Count = 0
+    input_tokens: Count = 0
+    cached_tokens: Count = 0
+    output_tokens: Count = 0
     cost_usd: Amount = 0.0
     seconds: Amount = 0.0
     host: str = ""
@@ -116,6 +127,11 @@ class TrialRow(Trial):
     def scored(self) -> bool:
         """Whether it says anything about the arm."""
         return self.status != "infra_error"
+
+    @property
+    def placed(self) -> bool:
+        """Whether robots stand where they were sent."""
+        return self.outcome == "deployed"
 
     @property
     def line(self) -> bytes:

@@ -13,7 +13,7 @@ from ...tools.formation.contract import Contract, Group, Relation, with_defaults
 from ...tools.formation.placement.place import Site, place
 from ...tools.geometry.outline import FloatArray
 from ...tools.geometry.sampling import nearest
-from ..tasks.photographs import Task
+from ..tasks.task import Goal
 from .grading import grade_goals
 
 SPARE = 0.02
@@ -24,7 +24,7 @@ WIDTHS = (0.25, 0.05)
 """Half the part of a band that is used; a narrow one follows recesses that a wide one bridges."""
 
 
-def reference(goal: Task) -> FloatArray:
+def reference(goal: Goal) -> FloatArray:
     """Positions that satisfy a goal, (N, 2) px.
 
     Raises:
@@ -45,7 +45,7 @@ def reference(goal: Task) -> FloatArray:
     return placed[-1]
 
 
-def _spread(goal: Task) -> FloatArray:
+def _spread(goal: Goal) -> FloatArray:
     """Means of clusters of the region's cells, the nearest cells to them: quick and often even."""
     rule, target = goal.success, goal.target.outline.polygon
     inner = target.buffer(-rule["min_clearance_px"] * (1 + SPARE))
@@ -60,14 +60,14 @@ def _spread(goal: Task) -> FloatArray:
     return cells[nearest(cells, means, 1)[1]]
 
 
-def _placed(goal: Task, where: str, width: float) -> FloatArray:
+def _placed(goal: Goal, where: str, width: float) -> FloatArray:
     outlines = {"t1": goal.target.outline}
     site = Site(outlines, *(float(side) for side in goal.size))
     contract = with_defaults(Contract(groups=(_group(goal, where, width),)), outlines, site.room)
     return place(contract, site)
 
 
-def _group(goal: Task, where: str, width: float) -> Group:
+def _group(goal: Goal, where: str, width: float) -> Group:
     rule, n = goal.success, goal.robots
     kind, _, name = where.partition(":")
     if kind == "inside":

@@ -4,8 +4,6 @@ Every 54 seeds, from a multiple of 54 on, hold each of the paper's nine cells (c
 with each family once. The words are drawn apart from the picture: new ones change no pixel.
 """
 
-import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -15,13 +13,11 @@ from typing import Any
 import numpy as np
 import yaml
 from numpy.random import Generator
-from PIL import Image
 
 from .choose import GENERAL, HIDDEN, KINDS, Slots, View, goes_by, told
 from .compose import compose, stage
 from .families import FAMILIES
 from .layout import GAP, clearance, nearest_gap, room
-from .paint import draw
 from .rules import arrangements, robots_for, success
 from .things import Family, Scene, Thing
 
@@ -44,29 +40,6 @@ class Story:
     target: Thing
     kind: str
     slots: Slots
-
-
-def write_scenes(seeds: Iterable[int], folder: Path) -> Path:
-    """Draw the scenes of the seeds into a folder that `load_tasks` reads.
-
-    Returns:
-        The path of its annotations.json.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    entries: list[dict[str, Any]] = []
-    for seed in seeds:
-        image, entry = make_scene(seed)
-        image.save(folder / entry["image"], compress_level=1)
-        entries.append(entry)
-    path = folder / "annotations.json"
-    path.write_text(json.dumps(entries), encoding="utf-8")
-    return path
-
-
-def make_scene(seed: int) -> tuple[Image.Image, dict[str, Any]]:
-    """The picture of a seed and its entry of annotations.json."""
-    story = tell(seed)
-    return draw(story.scene), entry_of(story)
 
 
 def family_of(seed: int) -> Family:

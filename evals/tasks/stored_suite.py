@@ -16,9 +16,8 @@ from ...tools.tool import violations
 from ..experiments.journal import MANIFEST, read_manifest
 from ..experiments.trials import Sha
 from ..statistics.cells import Chance
-from .photographs import Task, Thing
-from .rendered_pictures import Hung
-from .suite_task import Suite, SuiteTask
+from .rendered_pictures import RenderedPicture
+from .task import Goal, Ring, Suite, Task
 
 NAME, PICTURES, ATTEMPTS = "suite.json", "pictures", "attempts"
 """In a run's folder: its suite, the pictures drawn for it, what came of each trial."""
@@ -29,7 +28,7 @@ class _Value(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class KeptThing(_Value):
+class StoredThing(_Value):
     """An object's true outline and holes, px of the picture."""
 
     name: str
@@ -37,15 +36,15 @@ class KeptThing(_Value):
     holes: tuple[tuple[Point, ...], ...]
 
 
-class KeptGoal(_Value):
+class StoredGoal(_Value):
     """So many robots about a thing, perhaps two, and the rule that says when it is done."""
 
     robots: int
-    things: tuple[KeptThing, ...]
+    things: tuple[StoredThing, ...]
     success: dict[str, Any]
 
 
-class KeptTask(_Value):
+class StoredTask(_Value):
     """A task.
 
     Attributes:
@@ -58,14 +57,15 @@ class KeptTask(_Value):
     category: str
     setup: str
     style: str
+    referring: str
     robots: int | None
     expects: tuple[str, ...]
-    goals: tuple[KeptGoal, ...]
+    goals: tuple[StoredGoal, ...]
     picture: str
     pixels: Sha
 
 
-class KeptSuite(_Value):
+class StoredSuite(_Value):
     """A suite's split; the held-out one keeps no tasks.
 
     Attributes:
@@ -77,7 +77,7 @@ class KeptSuite(_Value):
     split: str
     sha256: Sha
     chance: dict[str, tuple[float, float]]
-    tasks: tuple[KeptTask, ...]
+    tasks: tuple[StoredTask, ...]
 
     @property
     def held_out(self) -> bool:
@@ -90,12 +90,12 @@ class KeptSuite(_Value):
         return {name: Chance(*level) for name, level in self.chance.items()}
 
 
-def keep_suite(
+def store_suite(
     folder: Path,
     suite: Suite,
     split: str,
     sha256: str,
-    hung: Mapping[str, Hung],
+    pictures: Mapping[str, RenderedPicture],
     levels: Mapping[str, Chance],
 ) -> None:
     """Write down the suite of a run; a folder of another suite, which is refused, is left alone.
@@ -105,7 +105,7 @@ def keep_suite(
         suite: what is run of it.
         split: that it is.
         sha256: by which results name it.
-        hung: the picture of each task, by its id.
+        pictures: the picture of each task, by its id.
         levels: of chance, by name of cell.
 
     Raises:
@@ -114,26 +114,26 @@ def keep_suite(
     if (folder / MANIFEST).exists() and read_manifest(folder).suite != sha256:
         return
     shown = [] if split == "test" else [task for task in suite.tasks if task.split != "test"]
-    kept = KeptSuite(
+    stored = StoredSuite(
         name=suite.name,
         description=suite.description,
         split=split,
         sha256=sha256,
         chance={name: (level.sr, level.gcr) for name, level in levels.items()},
-        tasks=tuple(_kept(task, hung[task.id], folder) for task in shown),
+        tasks=tuple(_stored_task(task, pictures[task.id], folder) for task in shown),
     )
-    write_whole(folder / NAME, kept.model_dump_json().encode())
+    write_whole(folder / NAME, stored.model_dump_json().encode())
 
 
-def read_suite(folder: Path) -> KeptSuite:
-    """What was kept of the suite of a run.
+def read_suite(folder: Path) -> StoredSuite:
+    """The stored suite of a run.
 
     Raises:
-        InputError: nothing was, it is damaged, or it is not that of the run's trials.
+        InputError: there is none, it is damaged, or it is not that of the run's trials.
     """
     path = folder / NAME
     try:
-        suite = KeptSuite.model_validate_json(path.read_bytes())
+        suite = StoredSuite.model_validate_json(path.read_bytes())
     except OSError as error:
         raise InputError(
             f"{path}: {error.strerror or error}; run the suite again into this folder, which "
@@ -146,7 +146,7 @@ def read_suite(folder: Path) -> KeptSuite:
     return suite
 
 
-def join_kept(folders: Sequence[Path], into: Path) -> None:
+def join_stored(folders: Sequence[Path], into: Path) -> None:
     """Put what runs keep beside their rows together, as far as they keep anything.
 
     Raises:
@@ -163,29 +163,32 @@ def join_kept(folders: Sequence[Path], into: Path) -> None:
         raise InputError(f"{into}: {error.strerror or error}.") from None
 
 
-def _kept(task: SuiteTask, hung: Hung, folder: Path) -> KeptTask:
-    return KeptTask(
+def _stored_task(task: Task, picture: RenderedPicture, folder: Path) -> StoredTask:
+    return StoredTask(
         id=task.id,
         instruction=task.instruction,
         category=task.category,
         setup=task.setup,
         style=task.style,
+        referring=task.referring,
         robots=task.robots,
         expects=task.expects,
-        goals=tuple(_goal(goal) for goal in task.goals),
-        picture=_seen_from(folder, hung.path),
-        pixels=hung.pixels,
+        goals=tuple(_stored_goal(goal) for goal in task.goals),
+        picture=_seen_from(folder, picture.path),
+        pixels=picture.pixels,
     )
 
 
-def _goal(goal: Task) -> KeptGoal:
-    things = tuple(_thing(thing) for thing in (goal.target, goal.other) if thing)
-    return KeptGoal(robots=goal.robots, things=things, success=goal.success)
+def _stored_goal(goal: Goal) -> StoredGoal:
+    things = tuple(
+        StoredThing(name=t.name, outline=_ring_of(t.polygon), holes=tuple(map(_ring_of, t.holes)))
+        for t in goal.things
+    )
+    return StoredGoal(robots=goal.robots, things=things, success=goal.success)
 
 
-def _thing(thing: Thing) -> KeptThing:
-    rings = [tuple((float(x), float(y)) for x, y in ring) for ring in (thing.polygon, *thing.holes)]
-    return KeptThing(name=thing.name, outline=rings[0], holes=tuple(rings[1:]))
+def _ring_of(points: Ring) -> tuple[Point, ...]:
+    return tuple((float(x), float(y)) for x, y in points)
 
 
 def _seen_from(folder: Path, picture: Path) -> str:

@@ -81,6 +81,7 @@ def test_the_report_is_what_promotion_reads() -> None:
         "tools": None,
         "model": "offline",
         "descriptor": None,
+        "mode": "words",
     }
     assert report["b"]["prompt"] == "former@v002"
     assert (report["suite"], report["verdict"]) == (SUITE, "pass")

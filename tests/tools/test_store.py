@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from formup.evals.tasks.photographs import load_tasks
+from formup.evals.tasks.suites import load_suite
 from formup.tools.builtin import TOOLS
 from formup.tools.errors import InputError
 from formup.tools.formation.contract import Contract, Group
@@ -21,7 +21,7 @@ PHOTO = Path(__file__).parents[2] / "evals/photos/images/scissors_blue.jpg"
 
 @pytest.fixture(scope="module")
 def work() -> Workspace:
-    outline = next(t for t in load_tasks() if t.image == PHOTO).target.outline
+    outline = next(t for t in load_suite("photos").tasks if t.picture == PHOTO).things[0].outline
     assert len(outline.polygon.interiors) == 2
     target = Target("t1", "scissors", outline.bounds, 1.0, outline, "outline")
     workspace = Workspace(Scene(load_picture(PHOTO), (target,)))
