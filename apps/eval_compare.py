@@ -9,10 +9,11 @@ from rich.table import Table
 from rich.text import Text
 
 from ..evals.experiments.compare import compare as compared
-from ..evals.experiments.comparison import Bounded, Comparison, Difference, Metric, Range, Settled
-from ..evals.experiments.gate import MARGIN
+from ..evals.experiments.comparison import Comparison, Difference, Metric, Range
+from ..evals.experiments.gate import MARGIN, Rise
 from ..evals.experiments.journal import Arm, merge, read_rows
 from ..evals.experiments.trials import TrialRow
+from ..evals.statistics.power import Needed
 from ..evals.tasks.stored_suite import join_stored
 from ..tools.errors import InputError
 from ..tools.store import write_whole
@@ -179,7 +180,7 @@ def _conclude(
     console: Console,
     word: str,
     reasons: tuple[str, ...],
-    settled: Settled | None,
+    settled: Needed | None,
     overall: Difference,
 ) -> None:
     console.print(Text.assemble((word, STYLE[word]), f": {'; '.join(reasons)}" if reasons else ""))
@@ -199,7 +200,7 @@ def _shares(found: Range | None) -> str:
     return "-" if found is None else f"{found.low:.3f} to {found.high:.3f}"
 
 
-def _bounds(found: Range | Bounded) -> str:
+def _bounds(found: Range | Rise) -> str:
     return f"{_points(found.low)} to {_points(found.high)}"
 
 

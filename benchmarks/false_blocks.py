@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..evals.experiments.gate import Paired, gate
-from ..evals.statistics.intervals import Interval, wilson
-from ..evals.statistics.power import TASK_SD, rates
+from ..evals.statistics.intervals import ICC, Interval, wilson
+from ..tools.geometry.outline import FloatArray
 
 COMPARISONS = 2000
 SIZES = ((15, 2), (15, 10), (30, 10), (60, 10), (150, 10))
 """Tasks and trials of each."""
+MEAN, TASK_SD = 0.7, 0.05
+"""Success rate of the first version, and the spread of a version's effect between tasks."""
 INVALID = 0.02
 TOKENS, TOKENS_SD = 3000.0, 0.1
 """Mean tokens of a trial, and the relative spread of a task's mean."""
@@ -66,6 +68,12 @@ def simulate(
         blocked += verdict == "block"
         passed += verdict == "pass"
     return Blocked(tasks, trials, regression, blocked, passed, comparisons)
+
+
+def rates(random: np.random.Generator, shape: tuple[int, ...], mean: float = MEAN) -> FloatArray:
+    """Success rates of tasks, from the beta distribution of that mean and the ICC."""
+    weight = 1 / ICC - 1
+    return random.beta(mean * weight, (1 - mean) * weight, shape)
 
 
 def _versions(

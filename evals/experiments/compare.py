@@ -23,14 +23,12 @@ from ..statistics.intervals import (
 )
 from ..statistics.power import Needed, Spread, needed, spread
 from .comparison import (
-    Bounded,
     Comparison,
     Difference,
     Metric,
     Outcome,
     Range,
     Score,
-    Settled,
 )
 from .gate import MARGIN, Gated, Paired, gate
 from .journal import Arm
@@ -97,8 +95,8 @@ def compare(
         verdict=judged.verdict,
         reasons=judged.reasons,
         outcome=overall.outcome,
-        success=Bounded.model_validate(judged.success._asdict()),
-        invalid=Bounded.model_validate(judged.invalid._asdict()),
+        success=judged.success,
+        invalid=judged.invalid,
         tokens=judged.tokens,
         overall=overall,
         slices=slices,
@@ -206,9 +204,7 @@ def _difference(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Diff
         fixed_tasks=_fixed(estimate, seen),
         fixed_p=sign_flips(weighted),
         outcome=outcome,
-        settled_by=_settled(needed(seen, max(abs(estimate), margin)))
-        if outcome == "inconclusive"
-        else None,
+        settled_by=needed(seen, max(abs(estimate), margin)) if outcome == "inconclusive" else None,
     )
 
 
@@ -267,17 +263,13 @@ def _slices(
     return slices
 
 
-def _gate_settled(judged: Gated, tasks: dict[str, _Pairs], margin: float) -> Settled | None:
+def _gate_settled(judged: Gated, tasks: dict[str, _Pairs], margin: float) -> Needed | None:
     """What would tell the success from the margin, if it is that which is open."""
     low, high = judged.success.low, judged.success.high
     if judged.verdict != "inconclusive" or low > -margin or high < -margin:
         return None
     seen = spread([pairs.differences for pairs in tasks.values()])
-    return _settled(needed(seen, abs(judged.success.estimate + margin), one_sided=True))
-
-
-def _settled(found: Needed) -> Settled:
-    return Settled(difference=found.difference, trials=found.trials, tasks=found.tasks)
+    return needed(seen, abs(judged.success.estimate + margin), one_sided=True)
 
 
 def _called(metric: Metric) -> str:

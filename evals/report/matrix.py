@@ -64,7 +64,7 @@ def matrix(sides: Sequence[Side], comparison: Comparison | None = None) -> Matri
         sides: one run, or A and B, each of one arm.
         comparison: of A and B.
     """
-    levels = sides[0].suite.levels
+    levels = sides[0].suite.chance
     arms = [(side, arm, side.of(arm)) for side in sides for arm in side.arms]
     found = [{cell.name: cell for cell in cells(rows, levels)} for _, _, rows in arms]
     there = {name for named in found for name in named}

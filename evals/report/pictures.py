@@ -9,8 +9,9 @@ from PIL import Image
 
 from ...tools.errors import ImageError
 from ...tools.perception.image import load_picture
-from ..tasks.rendered_pictures import hashed
-from ..tasks.stored_suite import StoredSuite, StoredTask
+from ..tasks.rendered_pictures import RenderedPicture, hashed
+from ..tasks.stored_suite import StoredSuite
+from ..tasks.task import Task
 
 LONG = 900
 """Most pixels along the longer side."""
@@ -46,17 +47,19 @@ def pictures(folder: Path, suite: StoredSuite) -> dict[str, PagePicture]:
     """
     found: dict[str, PagePicture] = {}
     for task in suite.tasks:
-        if task.pixels not in found:
-            found[task.pixels] = _page_picture(folder, task, f"picture-{len(found) + 1}")
+        source = suite.pictures[task.id]
+        if source.pixels not in found:
+            name = f"picture-{len(found) + 1}"
+            found[source.pixels] = _page_picture(folder, source, task, name)
     return found
 
 
-def _page_picture(folder: Path, task: StoredTask, name: str) -> PagePicture:
+def _page_picture(folder: Path, source: RenderedPicture, task: Task, name: str) -> PagePicture:
     try:
-        picture = load_picture(folder / task.picture)
+        picture = load_picture(folder / source.path)
     except ImageError:
         return PagePicture("", _extent(task))
-    if hashed(picture) != task.pixels:
+    if hashed(picture) != source.pixels:
         return PagePicture("", picture.size)
     image = Image.fromarray(picture.pixels)
     image.thumbnail((LONG, LONG), Image.Resampling.LANCZOS)
@@ -65,8 +68,8 @@ def _page_picture(folder: Path, task: StoredTask, name: str) -> PagePicture:
     return PagePicture(name, picture.size, file.getvalue())
 
 
-def _extent(task: StoredTask) -> tuple[int, int]:
+def _extent(task: Task) -> tuple[int, int]:
     """As much as the true outlines take, where there is no picture to measure."""
-    points = [p for goal in task.goals for thing in goal.things for p in thing.outline]
+    points = [point for thing in task.things for point in thing.polygon]
     right, low = (int(max((p[axis] for p in points), default=99.0)) for axis in (0, 1))
     return right + MARGIN, low + MARGIN

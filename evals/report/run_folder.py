@@ -16,8 +16,9 @@ from ...tools.errors import InputError
 from ..experiments.journal import Arm
 from ..experiments.suite_work import attempt_name
 from ..experiments.trials import TrialRow
-from ..tasks.stored_suite import ATTEMPTS, Point, StoredSuite, read_suite
+from ..tasks.stored_suite import ATTEMPTS, StoredSuite, read_suite
 
+Point = tuple[float, float]
 LONGEST = 4_000
 """Characters shown of one text of a transcript."""
 

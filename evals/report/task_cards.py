@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..experiments.journal import Arm
 from ..experiments.trials import TrialRow
-from ..tasks.stored_suite import StoredTask
+from ..tasks.task import Task
 from .pictures import PagePicture
 from .run_folder import Side, Utterance
 from .trial_overlay import Drawing, drawing
@@ -32,7 +32,7 @@ class TrialPanel:
 class Card:
     """A task with its trials."""
 
-    task: StoredTask
+    task: Task
     passed: int
     scored: int
     facts: str
@@ -56,10 +56,11 @@ def cards(sides: Sequence[Side], pictures: Mapping[str, PagePicture]) -> list[Ca
     for side in sides:
         for row in side.rows:
             trials[row.task].append((side, row))
+    suite = sides[0].suite
     return [
-        _card(task, sorted(trials[task.id], key=_number_and_arm), pictures[task.pixels])
-        for task in sides[0].suite.tasks
-        if task.id in trials
+        _card(task, sorted(trials[task.id], key=_number_and_arm), picture)
+        for task in suite.tasks
+        if task.id in trials and (picture := pictures[suite.pictures[task.id].pixels])
     ]
 
 
@@ -69,7 +70,7 @@ def _number_and_arm(trial: tuple[Side, TrialRow]) -> tuple[int, str, str]:
     return row.trial, side.label, Arm.of(row).name
 
 
-def _card(task: StoredTask, trials: Sequence[tuple[Side, TrialRow]], picture: PagePicture) -> Card:
+def _card(task: Task, trials: Sequence[tuple[Side, TrialRow]], picture: PagePicture) -> Card:
     scored = [row for _, row in trials if row.scored]
     robots = None if task.robots is None else f"{task.robots} robots"
     expects = None if "deployed" in task.expects else f"right: {' or '.join(task.expects)}"
@@ -84,7 +85,7 @@ def _card(task: StoredTask, trials: Sequence[tuple[Side, TrialRow]], picture: Pa
     )
 
 
-def _panel(task: StoredTask, side: Side, row: TrialRow, picture: PagePicture) -> TrialPanel:
+def _panel(task: Task, side: Side, row: TrialRow, picture: PagePicture) -> TrialPanel:
     attempt, transcript = side.attempt(row), side.transcript(row)
     robots, wrong = (len(attempt.observed or ()), attempt.right.count(False)) if attempt else (0, 0)
     title = f"{task.id}, trial {row.trial}: {robots} robots, {wrong} wrong"

@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..grading.slots import matched
-from ..tasks.stored_suite import Point, StoredGoal, StoredTask, StoredThing
+from ..tasks.task import Goal, Task
 from .pictures import PagePicture
 from .run_folder import StoredAttempt
 
@@ -22,6 +22,7 @@ MARK = 0.011
 """Radius of a robot as a share of the picture's long side."""
 CROWD = 20
 """Robots above which marks are drawn smaller."""
+Point = tuple[float, float]
 Ends = tuple[Point, Point]
 
 
@@ -77,9 +78,7 @@ class Drawing:
     robots: Sequence[Mark]
 
 
-def drawing(
-    task: StoredTask, attempt: StoredAttempt | None, picture: PagePicture, title: str
-) -> Drawing:
+def drawing(task: Task, attempt: StoredAttempt | None, picture: PagePicture, title: str) -> Drawing:
     """A picture with what belongs on it.
 
     Args:
@@ -112,11 +111,11 @@ def drawing(
     )
 
 
-def _truth_paths(goal: StoredGoal) -> Iterator[Path]:
+def _truth_paths(goal: Goal) -> Iterator[Path]:
     """The true outlines, and where robots may stand as far as the rule says it."""
     for thing in goal.things:
-        yield from _paths(_polygon(thing), "truth", thing.name)
-    rule, target = goal.success, _polygon(goal.things[0])
+        yield from _paths(Polygon(thing.polygon, thing.holes), "truth", thing.name)
+    rule, target = goal.success, Polygon(goal.target.polygon, goal.target.holes)
     if "band_px" in rule:
         low, high = rule["band_px"]
         yield from _paths(target.buffer(low), "band", f"{low:g} px off")
@@ -126,14 +125,14 @@ def _truth_paths(goal: StoredGoal) -> Iterator[Path]:
         yield from _paths(target.buffer(-least), "band", f"{least:g} px inside")
 
 
-def _corridors(goal: StoredGoal) -> list[Corridor]:
+def _corridors(goal: Goal) -> list[Corridor]:
     if goal.success["where"] != "line_between":
         return []
     (x1, y1), (x2, y2) = goal.success["points"]
     return [Corridor(((x1, y1), (x2, y2)), 2 * goal.success["tolerance_px"])]
 
 
-def _rule_slots(goal: StoredGoal, attempt: StoredAttempt | None) -> list[Slot]:
+def _rule_slots(goal: Goal, attempt: StoredAttempt | None) -> list[Slot]:
     """Places that the rule names; all count as held where no trial is shown."""
     rule = goal.success
     if rule["where"] not in ("corners", "center"):
@@ -154,10 +153,6 @@ def _mark(number: int, point: Point, kind: str, size: tuple[int, int]) -> Mark:
     """Where it can be seen: what is outside the picture is drawn at its edge."""
     x, y = (min(max(value, 0.0), side - 1.0) for value, side in zip(point, size, strict=True))
     return Mark(x, y, kind, f"robot {number}, {kind} at {point[0]:.1f}, {point[1]:.1f}")
-
-
-def _polygon(thing: StoredThing) -> Polygon:
-    return Polygon(thing.outline, thing.holes)
 
 
 def _paths(shape: BaseGeometry, kind: str, title: str) -> Iterator[Path]:

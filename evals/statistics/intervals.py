@@ -158,15 +158,6 @@ def pass_k(successes: FloatArray, counts: FloatArray, k: int) -> float:
     return float(np.mean(comb(successes, k) / comb(counts, k)))
 
 
-def chance_corrected(score: float, chance: float) -> float:
-    """A score on the scale where guessing is 0 and all right is 1.
-
-    Args:
-        chance: what guessing scores, below 1.
-    """
-    return (score - chance) / (1 - chance)
-
-
 @lru_cache(maxsize=1024)
 def _t_quantile(level: float, values: int) -> float:
     from scipy.special import stdtrit

@@ -1,12 +1,11 @@
-"""What a run's folder keeps of its suite, so that the run can be looked at without the suite.
+"""The suite in a run's folder, so that the run can be looked at without where it came from.
 
-Of held-out tasks only the chance level is kept: nothing of what they ask, show or expect.
+Of held-out tasks only the chance level is stored: nothing of what they ask, show or expect.
 """
 
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -17,77 +16,34 @@ from ..experiments.journal import MANIFEST, read_manifest
 from ..experiments.trials import Sha
 from ..statistics.cells import Chance
 from .rendered_pictures import RenderedPicture
-from .task import Goal, Ring, Suite, Task
+from .task import Suite, Task
 
 NAME, PICTURES, ATTEMPTS = "suite.json", "pictures", "attempts"
 """In a run's folder: its suite, the pictures drawn for it, what came of each trial."""
-Point = tuple[float, float]
 
 
-class _Value(BaseModel):
+class StoredSuite(BaseModel):
+    """A suite's split; the held-out one holds no tasks.
+
+    Attributes:
+        chance: what the best policy without understanding scores, by cell.
+        pictures: of the tasks, by id; paths as seen from the run's folder.
+    """
+
     model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class StoredThing(_Value):
-    """An object's true outline and holes, px of the picture."""
-
-    name: str
-    outline: tuple[Point, ...]
-    holes: tuple[tuple[Point, ...], ...]
-
-
-class StoredGoal(_Value):
-    """So many robots about a thing, perhaps two, and the rule that says when it is done."""
-
-    robots: int
-    things: tuple[StoredThing, ...]
-    success: dict[str, Any]
-
-
-class StoredTask(_Value):
-    """A task.
-
-    Attributes:
-        picture: its file, seen from the run's folder.
-        pixels: hash of the picture's pixels.
-    """
-
-    id: str
-    instruction: str
-    category: str
-    setup: str
-    style: str
-    referring: str
-    robots: int | None
-    expects: tuple[str, ...]
-    goals: tuple[StoredGoal, ...]
-    picture: str
-    pixels: Sha
-
-
-class StoredSuite(_Value):
-    """A suite's split; the held-out one keeps no tasks.
-
-    Attributes:
-        chance: what the best policy without understanding scores, (SR, GCR), by cell.
-    """
 
     name: str
     description: str
     split: str
     sha256: Sha
-    chance: dict[str, tuple[float, float]]
-    tasks: tuple[StoredTask, ...]
+    chance: dict[str, Chance]
+    tasks: tuple[Task, ...]
+    pictures: dict[str, RenderedPicture]
 
     @property
     def held_out(self) -> bool:
         """Whether scores are all that may be seen."""
         return self.split == "test"
-
-    @property
-    def levels(self) -> dict[str, Chance]:
-        """The chance level by name of cell."""
-        return {name: Chance(*level) for name, level in self.chance.items()}
 
 
 def store_suite(
@@ -119,8 +75,9 @@ def store_suite(
         description=suite.description,
         split=split,
         sha256=sha256,
-        chance={name: (level.sr, level.gcr) for name, level in levels.items()},
-        tasks=tuple(_stored_task(task, pictures[task.id], folder) for task in shown),
+        chance=dict(levels),
+        tasks=tuple(shown),
+        pictures={task.id: _seen_from(folder, pictures[task.id]) for task in shown},
     )
     write_whole(folder / NAME, stored.model_dump_json().encode())
 
@@ -147,7 +104,7 @@ def read_suite(folder: Path) -> StoredSuite:
 
 
 def join_stored(folders: Sequence[Path], into: Path) -> None:
-    """Put what runs keep beside their rows together, as far as they keep anything.
+    """Put what runs store beside their rows together, as far as they store anything.
 
     Raises:
         InputError: it cannot be copied.
@@ -163,35 +120,8 @@ def join_stored(folders: Sequence[Path], into: Path) -> None:
         raise InputError(f"{into}: {error.strerror or error}.") from None
 
 
-def _stored_task(task: Task, picture: RenderedPicture, folder: Path) -> StoredTask:
-    return StoredTask(
-        id=task.id,
-        instruction=task.instruction,
-        category=task.category,
-        setup=task.setup,
-        style=task.style,
-        referring=task.referring,
-        robots=task.robots,
-        expects=task.expects,
-        goals=tuple(_stored_goal(goal) for goal in task.goals),
-        picture=_seen_from(folder, picture.path),
-        pixels=picture.pixels,
-    )
-
-
-def _stored_goal(goal: Goal) -> StoredGoal:
-    things = tuple(
-        StoredThing(name=t.name, outline=_ring_of(t.polygon), holes=tuple(map(_ring_of, t.holes)))
-        for t in goal.things
-    )
-    return StoredGoal(robots=goal.robots, things=things, success=goal.success)
-
-
-def _ring_of(points: Ring) -> tuple[Point, ...]:
-    return tuple((float(x), float(y)) for x, y in points)
-
-
-def _seen_from(folder: Path, picture: Path) -> str:
+def _seen_from(folder: Path, picture: RenderedPicture) -> RenderedPicture:
     """Inside the folder as it is, which may be moved; else where it lies."""
-    inside = picture.is_relative_to(folder)
-    return (picture.relative_to(folder) if inside else picture.resolve()).as_posix()
+    path = picture.path
+    inside = path.is_relative_to(folder)
+    return RenderedPicture(path.relative_to(folder) if inside else path.resolve(), picture.pixels)

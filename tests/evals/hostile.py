@@ -10,8 +10,10 @@ from formup.agent.wrappers.doubles import ScriptedModel
 from formup.evals.experiments.journal import Manifest
 from formup.evals.experiments.suite_work import attempt_name
 from formup.evals.experiments.trials import Status, Trial, TrialRow
-from formup.evals.tasks.rendered_pictures import hashed
-from formup.evals.tasks.stored_suite import StoredGoal, StoredSuite, StoredTask, StoredThing
+from formup.evals.statistics.cells import Chance
+from formup.evals.tasks.rendered_pictures import RenderedPicture, hashed
+from formup.evals.tasks.stored_suite import StoredSuite
+from formup.evals.tasks.task import Goal, Task, Thing
 from formup.tools.perception.image import load_picture
 from PIL import Image
 
@@ -33,15 +35,19 @@ def write_run(folder: Path, method: str, *, passing: int, split: str = "dev") ->
     pixels[40:80, 60:100] = (200, 40, 40)
     Image.fromarray(pixels).save(folder / "square.png")
     rows = [_row(i, n, method, i < passing) for i in range(TASKS) for n in range(2)]
+    pixels_hash = hashed(load_picture(folder / "square.png"))
+    picture = RenderedPicture(Path("square.png"), pixels_hash)
     suite = StoredSuite(
         name="hostile",
         description=EVIL.replace("\ud800", ""),
         split=split,
         sha256=SUITE,
         chance=dict.fromkeys(
-            ("total", "general", "caging", "single", "general single", "caging single"), (0.1, 0.2)
+            ("total", "general", "caging", "single", "general single", "caging single"),
+            Chance(0.1, 0.2),
         ),
         tasks=tuple(_task(i, folder) for i in range(TASKS)),
+        pictures={_name(i): picture for i in range(TASKS)},
     )
     (folder / "suite.json").write_text(suite.model_dump_json(), "utf-8")
     (folder / "manifest.json").write_text(Manifest.of(rows).model_dump_json(), "utf-8")
@@ -80,23 +86,24 @@ def _row(number: int, trial: int, method: str, passes: bool) -> TrialRow:
     )
 
 
-def _task(number: int, folder: Path) -> StoredTask:
-    ring = ((60.0, 40.0), (100.0, 40.0), (100.0, 80.0), (60.0, 80.0))
-    thing = StoredThing(name=EVIL.replace("\ud800", ""), outline=ring, holes=())
-    corners = {"where": "corners", "points": [list(p) for p in ring], "tolerance_px": 6}
+def _task(number: int, folder: Path) -> Task:
+    ring = [[60.0, 40.0], [100.0, 40.0], [100.0, 80.0], [60.0, 80.0]]
+    thing = Thing("square", EVIL.replace("\ud800", ""), ring, [])
+    corners = {"where": "corners", "points": ring, "tolerance_px": 6}
     band = {"where": "boundary", "band_px": [3, 20], "max_gap_px": 70}
-    return StoredTask(
+    return Task(
         id=_name(number),
         instruction=f"{SECRET} {EVIL}".replace("\ud800", ""),
+        robots=4,
         category="caging" if number % 2 else "general",
         setup="single",
+        family="",
+        split="dev",
         style="plain",
         referring="",
-        robots=4,
+        goals=(Goal(4, (160, 120), thing, band if number % 2 else corners),),
         expects=("deployed",),
-        goals=(StoredGoal(robots=4, things=(thing,), success=band if number % 2 else corners),),
-        picture="square.png",
-        pixels=hashed(load_picture(folder / "square.png")),
+        picture=folder / "square.png",
     )
 
 
