@@ -80,7 +80,7 @@ def run_suite(
     tries = trials or str(JITTERS if common.mode in JITTERED else 1)
     count, limit = inputs.whole("--trials", tries, least=1), inputs.dollars("--budget", budget)
     loaded = load_suite(suite, split, seeds)
-    tasks, folder = _chosen(loaded, arms, task), out or _new_folder(loaded.name)
+    tasks, folder = _tasks_tried(loaded, arms, task), out or _new_folder(loaded.name)
     runs_on = executor("serial" if workers == 1 else "pool", workers)
     how = {"executor": runs_on, "budget_usd": limit, "shard": shard}
     done = _run_trials(loaded, tasks, arms, count, split, folder, how)
@@ -141,11 +141,11 @@ def _run_trials(
         )
         store_suite(folder, suite, split, sha256, pictures, levels)
         done = sweep(planned, work, folder, **how)
-    _show(suite, folder, planned, levels)
+    _print_summary(suite, folder, planned, levels)
     return done
 
 
-def _chosen(suite: Suite, arms: Sequence[Method], names: list[str] | None) -> list[Task]:
+def _tasks_tried(suite: Suite, arms: Sequence[Method], names: list[str] | None) -> list[Task]:
     """The tasks that are tried: those named, or all, as far as every arm takes them.
 
     Raises:
@@ -179,7 +179,9 @@ def _new_folder(suite: str) -> Path:
     return RUNS / f"{suite}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
 
 
-def _show(suite: Suite, folder: Path, planned: Sequence[Trial], levels: dict[str, Chance]) -> None:
+def _print_summary(
+    suite: Suite, folder: Path, planned: Sequence[Trial], levels: dict[str, Chance]
+) -> None:
     """Tables of each arm, and all of them as JSON."""
     keys = {trial.key for trial in planned}
     rows = [row for row in read_rows(folder) if row.key in keys]

@@ -22,7 +22,7 @@ LONGEST = 150
 def print_scores(title: str, found: Sequence[Cell]) -> None:
     """Successes by cell with intervals and the chance level."""
     extra = [n for n in ("invalid", "lost") if any(getattr(cell, n) for cell in found)]
-    table = _numbers(title, *SCORES, *extra)
+    table = _number_table(title, *SCORES, *extra)
     for cell in found:
         low, high = cell.interval
         table.add_row(
@@ -40,7 +40,7 @@ def print_scores(title: str, found: Sequence[Cell]) -> None:
 
 def print_placed(found: Sequence[Cell]) -> None:
     """Shares of the trials, and of those that placed robots, by category, setup and style."""
-    table = _numbers(None, *PLACED)
+    table = _number_table(None, *PLACED)
     for cell in (cell for cell in found if " " not in cell.name):
         right, known = cell.right_thing
         table.add_row(
@@ -80,7 +80,7 @@ def print_misses(rows: Sequence[TrialRow]) -> None:
         console.print(f"and {len(misses) - MISSES} more")
 
 
-def _numbers(title: str | None, *names: str) -> Table:
+def _number_table(title: str | None, *names: str) -> Table:
     table = Table(title=title, header_style="cyan", box=None)
     for name in ("", *names):
         table.add_column(name, justify="right" if name else "left", no_wrap=True)

@@ -58,7 +58,7 @@ def main() -> None:
             check=True,
         )
         for name, cpu, wall in json.loads(done.stdout.splitlines()[-1]):
-            _print(name, cpu, wall)
+            _print_row(name, cpu, wall)
 
 
 def _ours(name: str, executor: Executor) -> None:
@@ -68,10 +68,10 @@ def _ours(name: str, executor: Executor) -> None:
         cpu, wall = time.process_time(), time.perf_counter()
         run_trials(planned, trivial, Path(folder), executor=executor)
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
-    _print(name, cpu - _inside[0], wall)
+    _print_row(name, cpu - _inside[0], wall)
 
 
-def _print(name: str, cpu: float, wall: float) -> None:
+def _print_row(name: str, cpu: float, wall: float) -> None:
     each = 1000 * cpu / (TASKS * TRIES)
     print(f"{name:24} {cpu:8.2f} {wall:8.2f} {each:15.2f}")  # noqa: T201
 

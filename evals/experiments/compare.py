@@ -83,7 +83,7 @@ def compare(
         )
     tasks = _pairs(a, b, metric)
     judged = gate(_paired(tasks), margin, _unfinished(a, b), _called(metric))
-    overall = _difference(tasks, metric, margin)
+    overall = _difference_of(tasks, metric, margin)
     slices = _slices(tasks, metric, margin)
     count = sum(len(pairs.rows) for pairs in tasks.values())
     return Comparison(
@@ -154,7 +154,7 @@ def _paired(tasks: dict[str, _Pairs]) -> Paired:
         pairs=np.array([float(len(pairs.rows)) for pairs in every]),
         score=np.array([pairs.scores.mean(axis=1) for pairs in every]).T,
         invalid=np.array([pairs.means(_is_invalid) for pairs in every]).T,
-        tokens=np.array([pairs.means(_tokens) for pairs in every]).T,
+        tokens=np.array([pairs.means(_row_tokens) for pairs in every]).T,
         must_pass=np.array([any(new.must_pass for _, new in pairs.rows) for pairs in every]),
     )
 
@@ -163,7 +163,7 @@ def _is_invalid(row: TrialRow) -> float:
     return float(row.status == "model_invalid")
 
 
-def _tokens(row: TrialRow) -> float:
+def _row_tokens(row: TrialRow) -> float:
     return float(row.input_tokens + row.output_tokens)
 
 
@@ -183,7 +183,7 @@ def _unfinished(a: Sequence[TrialRow], b: Sequence[TrialRow]) -> list[str]:
     return found
 
 
-def _difference(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Difference:
+def _difference_of(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Difference:
     differences = [pairs.differences for pairs in tasks.values()]
     means = np.array([d.mean() for d in differences])
     counts = np.array([float(len(d)) for d in differences])
@@ -191,7 +191,7 @@ def _difference(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Diff
     interval = paired_t(means, 0.95, least_error(counts.sum()))
     seen = spread(differences)
     weighted = np.concatenate([d / (len(d) * len(differences)) for d in differences])
-    outcome = _outcome(estimate, p, interval)
+    outcome = _outcome_of(estimate, p, interval)
     return Difference(
         tasks=len(means),
         pairs=int(counts.sum()),
@@ -208,7 +208,7 @@ def _difference(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Diff
     )
 
 
-def _outcome(estimate: float, p: float, interval: Interval) -> Outcome:
+def _outcome_of(estimate: float, p: float, interval: Interval) -> Outcome:
     if p >= ALPHA or interval.low <= 0 <= interval.high:
         return "inconclusive"
     return "better" if estimate > 0 else "worse"
@@ -253,7 +253,7 @@ def _slices(
         named = {task: str(getattr(pairs.rows[0][1], kind)) for task, pairs in tasks.items()}
         for value in sorted(set(named.values()) - {""}):
             chosen = {task: pairs for task, pairs in tasks.items() if named[task] == value}
-            found[kind, value] = _difference(chosen, metric, margin)
+            found[kind, value] = _difference_of(chosen, metric, margin)
     adjusted = holm([difference.p for difference in found.values()])
     slices: dict[str, dict[str, Difference]] = {}
     for ((kind, value), difference), p in zip(found.items(), adjusted, strict=True):

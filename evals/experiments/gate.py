@@ -95,7 +95,7 @@ def gate(
     """
     least = least_error(float(paired.pairs.sum()))
     success, invalid = _rise(paired.score, least), _rise(paired.invalid, least)
-    tokens, dearer = _tokens(paired)
+    tokens, dearer = _token_rise(paired)
     blocks, doubts = list[str](), list[str]()
     if success.high < -margin:
         blocks.append(f"{scale} falls by more than {_in_points(margin)}: {success.words}")
@@ -126,7 +126,7 @@ def _rise(values: FloatArray, least: float) -> Rise:
     return Rise(float(differences.mean()), max(-1.0, found.low), min(1.0, found.high))
 
 
-def _tokens(paired: Paired) -> tuple[float | None, bool]:
+def _token_rise(paired: Paired) -> tuple[float | None, bool]:
     """The rise of the tokens, and whether it is shown to be above the margin."""
     before, after = paired.tokens
     if before.sum() < TINY:

@@ -238,7 +238,7 @@ def merge(shards: Sequence[Path], into: Path) -> int:
         manifest = read_manifest(shards[0])
         for folder in shards[1:]:
             manifest = manifest.joined(read_manifest(folder), folder)
-        kept = list[TrialRow]()
+        merged = list[TrialRow]()
         done = dict[str, TrialRow]()
         for row in (row for folder in shards for row in all_rows(folder)):
             before = done.get(row.key)
@@ -250,14 +250,14 @@ def merge(shards: Sequence[Path], into: Path) -> int:
             if row.scored:
                 done[row.key] = row
             if before is None:
-                kept.append(row)
+                merged.append(row)
         stack.enter_context(held(into))
         if (into / ROWS).exists():
             raise InputError(f"{into} has trials already; merge into a new folder.")
-        kept.sort(key=lambda row: (row.order, row.scored))
+        merged.sort(key=lambda row: (row.order, row.scored))
         write_whole(into / MANIFEST, manifest.model_dump_json(indent=1).encode())
-        write_whole(into / ROWS, b"".join(row.line for row in kept))
-    return len({row.key for row in kept})
+        write_whole(into / ROWS, b"".join(row.line for row in merged))
+    return len({row.key for row in merged})
 
 
 @contextmanager

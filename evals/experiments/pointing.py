@@ -59,7 +59,7 @@ def pointing(task: Task, mode: Mode, number: int) -> Pointing:
     random = np.random.default_rng([number, zlib.crc32(task.id.encode())])
     (thing,) = task.things
     far = np.array(task.goals[0].size, dtype=float) - 1
-    jittered = {"box": _box, "outline": _outline, "point": _point}[mode]
+    jittered = {"box": _jittered_box, "outline": _jittered_outline, "point": _inner_point}[mode]
     return Pointing(pointed=(jittered(thing, random, far),))
 
 
@@ -68,14 +68,14 @@ def _true_target(thing: Thing, index: int) -> Target:
     return Target(f"t{index + 1}", thing.name, outline.bounds, 1.0, outline, "truth")
 
 
-def _box(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
+def _jittered_box(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
     box = np.asarray(thing.outline.bounds).reshape(2, 2)
     moved = box + random.uniform(-BOX_JITTER, BOX_JITTER, (2, 2)) * (box[1] - box[0])
     x0, y0, x1, y1 = np.clip(moved, 0, far).ravel()
     return TargetPrompt(box=(float(x0), float(y0), float(x1), float(y1)))
 
 
-def _outline(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
+def _jittered_outline(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
     """The true outline simplified to at most 12 vertices, each moved."""
     ring = LineString([*thing.polygon, thing.polygon[0]])
     tolerance = 0.5
@@ -90,7 +90,7 @@ def _outline(thing: Thing, random: np.random.Generator, far: FloatArray) -> Targ
             return TargetPrompt(outline=tuple((float(x), float(y)) for x, y in moved))
 
 
-def _point(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
+def _inner_point(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
     """A random point of the thing, off its edge by an eighth of its least width if it can be."""
     outline = thing.outline
     inner = outline.polygon.buffer(-outline.min_width / 8)

@@ -1,6 +1,6 @@
 """Requests to a model no faster than its provider allows.
 
-Each process keeps its own pace, so that a sweep divides what is allowed among its processes.
+Each process has its own limit, so that a sweep divides what is allowed among its processes.
 """
 
 import asyncio

@@ -19,8 +19,8 @@ from ...agent.outcomes import Answered, Stopped
 from ...tools.perception.image import Picture, load_picture
 from ...tools.store import write_whole
 from ...tools.world import Settings
-from ..grading.graded import VERSION, Graded
-from ..grading.grading import Attempt, grade_attempt
+from ..grading.attempts import Attempt, grade_attempt
+from ..grading.grades import VERSION, Graded
 from ..grading.policies import POLICIES, positions
 from ..tasks.task import Task
 from .journal import Arm
@@ -145,7 +145,7 @@ def _attempt(run: Run, arm: Method) -> Attempt:
 def _written_positions(text: str) -> tuple[tuple[float, float], ...] | None:
     """The positions that a model alone, without tools, has written as JSON; None if it has not."""
     try:
-        pairs = np.asarray(_written(text)["positions"], dtype=float)
+        pairs = np.asarray(_json_object(text)["positions"], dtype=float)
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.isfinite(pairs).all():
@@ -156,7 +156,7 @@ def _written_positions(text: str) -> tuple[tuple[float, float], ...] | None:
 def _declined(text: str) -> Literal["question", "impossible"] | None:
     """What a model alone has done that writes that no robot shall be placed; else None."""
     try:
-        written = _written(text)
+        written = _json_object(text)
         if written["positions"] != []:
             return None
         return "question" if written.get("question") else "impossible"
@@ -164,7 +164,7 @@ def _declined(text: str) -> Literal["question", "impossible"] | None:
         return None
 
 
-def _written(text: str) -> Any:
+def _json_object(text: str) -> Any:
     """The JSON object in a text."""
     return json.loads(text[text.find("{") : text.rfind("}") + 1])
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from ...tools.errors import ToolError
 from ..tasks.task import Task
-from .grading import grade_goals
+from .attempts import grade_goals
 from .policies import POLICIES, scores
-from .reference import reference
+from .reference_answers import reference
 
 
 def check_task(task: Task) -> list[str]:

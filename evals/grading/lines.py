@@ -7,7 +7,7 @@ from shapely.geometry import LineString, Polygon
 
 from ...tools.geometry.outline import FloatArray, distances
 from ..tasks.task import Goal
-from .graded import EVEN, STRICT_SHARE, Part
+from .grades import EVEN, STRICT_SHARE, Part
 from .slots import even_along, matched
 
 OFF = 0.1
@@ -52,7 +52,7 @@ def side(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     name, (low, high) = rule["where"].partition(":")[2], rule["band_px"]
     axis = 0 if name in ("top", "bottom") else 1
     off = distances(target, points)
-    there = _beyond(target, points, name)
+    there = _on_side(target, points, name)
     right = free & (off >= low) & (off <= high) & there
     problems = list[str]()
     if not there.all():
@@ -113,7 +113,7 @@ def _uneven(stations: FloatArray) -> tuple[str, ...]:
     return () if even == len(stations) else (f"uneven: {even} of {len(stations)} on even places",)
 
 
-def _beyond(target: Polygon, points: FloatArray, name: str) -> NDArray[np.bool_]:
+def _on_side(target: Polygon, points: FloatArray, name: str) -> NDArray[np.bool_]:
     """Which robots have nothing of the target between them and the picture's border that side."""
     far = 1e5
     way = {"left": (-far, 0), "right": (far, 0), "top": (0, -far), "bottom": (0, far)}[name]

@@ -13,8 +13,8 @@ from shapely.geometry import LineString
 
 from ...tools.geometry.outline import FloatArray
 from ..tasks.task import Goal
-from .graded import Graded
-from .grading import grade_goals
+from .attempts import grade_goals
+from .grades import Graded
 
 DRAWS = 4
 """Repetitions of the policies that draw lots, for a chance level."""

@@ -13,7 +13,7 @@ from shapely.geometry import LineString, Polygon
 from ...tools.geometry.cages.cages import THOROUGH, Cage, cage
 from ...tools.geometry.outline import FloatArray, distances
 from ..tasks.task import Goal
-from .graded import EVEN, Part
+from .grades import EVEN, Part
 from .slots import even_along, phase_free
 
 WAYS = ("right", "lower right", "bottom", "lower left", "left", "upper left", "top", "upper right")
@@ -38,7 +38,7 @@ def ring(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
         return Part(right, 0.0, tuple(problems))
     order = np.flatnonzero(stands)[_order_around(target, points[stands])]
     loop = points[order]
-    wide = _gaps(loop)
+    wide = _gaps_of_loop(loop)
     closed = wide <= goal.success["max_gap_px"]
     right[order] = closed | np.roll(closed, 1)
     measures = {"worst_gap_px": float(wide.max())}
@@ -47,8 +47,8 @@ def ring(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     whole = _closed_share(target, loop, closed)
     if not _goes_round(goal.target.outline.centre, loop):
         problems.insert(0, "the robots do not go round it")
-        whole = min(whole, _reach(target, loop))
-    even, share = _even(goal, target, loop)
+        whole = min(whole, _share_reached(target, loop))
+    even, share = _even_places(goal, target, loop)
     measures["even_share"] = share
     strict = () if even else (f"uneven: {share:.0%} of the robots on even places",)
     return Part(right, whole, tuple(problems), strict, measures)
@@ -72,7 +72,7 @@ def escape_proof(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Par
     measures = {"certified": float(found.state == "caged")}
     if found.state == "caged":
         return Part(stands, 1.0, tuple(problems), (), measures)
-    spread = _reach(Polygon(goal.target.polygon), points[stands]) if stands.any() else 0.0
+    spread = _share_reached(Polygon(goal.target.polygon), points[stands]) if stands.any() else 0.0
     return Part(stands, spread, (*problems, _loose(found)), (), measures)
 
 
@@ -84,23 +84,23 @@ def _in_band(
     near, far = distances(target, points), distances(target.convex_hull, points)
     problems: list[str] = []
     if (near < low).any():
-        problems.append(f"{_count(near < low)} too near: {near.min():.1f} px, {low} needed")
+        problems.append(f"{_robots_are(near < low)} too near: {near.min():.1f} px, {low} needed")
     if (far > high).any():
-        problems.append(f"{_count(far > high)} too far: {far.max():.1f} px, {high} allowed")
+        problems.append(f"{_robots_are(far > high)} too far: {far.max():.1f} px, {high} allowed")
     return free & (near >= low) & (far <= high), problems
 
 
 def _loose(found: Cage) -> str:
-    said = (
+    text = (
         "it can get out, on a way that was checked"
         if found.state == "escape"
         else "it is not certified that it cannot get out"
     )
     gap = "" if found.widest_gap is None else f": a gap of {found.widest_gap:.0f} px"
-    return f"{said}{gap}; gaps below {found.inscribed_diameter:.0f} px certainly hold it"
+    return f"{text}{gap}; gaps below {found.inscribed_diameter:.0f} px certainly hold it"
 
 
-def _count(flags: NDArray[np.bool_]) -> str:
+def _robots_are(flags: NDArray[np.bool_]) -> str:
     count = int(flags.sum())
     return "1 robot is" if count == 1 else f"{count} robots are"
 
@@ -115,20 +115,20 @@ def _widest(goal: Goal, loop: FloatArray, wide: FloatArray) -> str:
 def _closed_share(target: Polygon, loop: FloatArray, closed: NDArray[np.bool_]) -> float:
     """Share of the convex hull's length that lies in no open gap."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
-    station = _stations(hull, loop)
+    station = _stations_along(hull, loop)
     open_ends = zip(station[~closed], np.roll(station, -1)[~closed], strict=True)
     bare = sum((end - start) % hull.length for start, end in open_ends)
     return float(np.clip(1 - bare / hull.length, 0, 1))
 
 
-def _reach(target: Polygon, loop: FloatArray) -> float:
+def _share_reached(target: Polygon, loop: FloatArray) -> float:
     """Share of the convex hull's length that the robots are spread along."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
-    station = np.sort(_stations(hull, loop))
+    station = np.sort(_stations_along(hull, loop))
     return 1 - float(np.diff(station, append=station[0] + hull.length).max() / hull.length)
 
 
-def _even(goal: Goal, target: Polygon, loop: FloatArray) -> tuple[bool, float]:
+def _even_places(goal: Goal, target: Polygon, loop: FloatArray) -> tuple[bool, float]:
     """Whether all stand on even places of a loop in mid band whose start is free; which share.
 
     Where the picture cuts the loop, the places are even along the rest of it.
@@ -136,7 +136,7 @@ def _even(goal: Goal, target: Polygon, loop: FloatArray) -> tuple[bool, float]:
     if not goal.success.get("even") or len(loop) < 3:
         return True, 1.0
     middle = _middle_line(target, loop)
-    station = _stations(middle, loop)
+    station = _stations_along(middle, loop)
     width, height = goal.size
     n = len(loop)
     if shapely.box(0, 0, width - 1, height - 1).contains(middle):
@@ -156,8 +156,10 @@ def _order_around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
     turn; along the convex hull those that bridge one.
     """
     lines = (_middle_line(target, points), LineString(shapely.get_coordinates(target.convex_hull)))
-    orders = [np.lexsort((distances(line, points), _stations(line, points))) for line in lines]
-    return min(orders, key=lambda order: float(_gaps(points[order]).max(initial=0.0)))
+    orders = [
+        np.lexsort((distances(line, points), _stations_along(line, points))) for line in lines
+    ]
+    return min(orders, key=lambda order: float(_gaps_of_loop(points[order]).max(initial=0.0)))
 
 
 def _middle_line(target: Polygon, points: FloatArray) -> LineString:
@@ -165,12 +167,12 @@ def _middle_line(target: Polygon, points: FloatArray) -> LineString:
     return target.buffer(max(float(np.mean(distances(target, points))), 1.0)).exterior
 
 
-def _stations(line: LineString, points: FloatArray) -> FloatArray:
+def _stations_along(line: LineString, points: FloatArray) -> FloatArray:
     """Arc length of the place of a line that is nearest to each point, (m,), px."""
     return np.asarray(shapely.line_locate_point(line, shapely.points(points)), dtype=float)
 
 
-def _gaps(loop: FloatArray) -> FloatArray:
+def _gaps_of_loop(loop: FloatArray) -> FloatArray:
     """Distance of each robot of a loop to the next, the last one's to the first, (m,), px."""
     return np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
 

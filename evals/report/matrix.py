@@ -75,15 +75,15 @@ def matrix(sides: Sequence[Side], comparison: Comparison | None = None) -> Matri
     rows = [
         MatrixRow(
             f"{side.label}: {arm.method}" if side.label else arm.method,
-            _facts(arm),
-            _ordered([_success(named.get(name)) for name in names], _spent(own)),
+            _arm_facts(arm),
+            _cells_in_order([_success(named.get(name)) for name in names], _spent_figures(own)),
         )
         for (side, arm, own), named in zip(arms, found, strict=True)
     ]
     if comparison is not None:
         rows.append(_difference_row(sides[0].rows, sides[1].rows, comparison, names))
     chance = [MatrixCell(f"{levels[name].sr:.2f}") for name in names]
-    rows.append(MatrixRow("chance", (), _ordered(chance, ("", "", "")), "chance"))
+    rows.append(MatrixRow("chance", (), _cells_in_order(chance, ("", "", "")), "chance"))
     return Matrix(("who", names[0], *SPENT, *names[1:]), rows)
 
 
@@ -91,14 +91,13 @@ def verdict(made: Comparison) -> VerdictText:
     """What the comparison comes to, in a sentence."""
     overall = made.overall
     word = {"better": "B is better", "worse": "B is worse"}.get(made.outcome, "Inconclusive")
-    text = (
-        f": B − A is {_points(overall.estimate)} ({_interval(overall)}, at 95 %, of tasks like "
-        f"these), over {overall.pairs} pairs of trials of {overall.tasks} tasks."
-    )
+    difference = f"{_signed_points(overall.estimate)} ({_interval(overall)}, at 95 %, of tasks like"
+    counts = f"{overall.pairs} pairs of trials of {overall.tasks} tasks"
+    text = f": B − A is {difference} these), over {counts}."
     return VerdictText(word, made.outcome, text)
 
 
-def _facts(arm: Arm) -> list[str]:
+def _arm_facts(arm: Arm) -> list[str]:
     """What stands below the head of an arm's row."""
     facts = [f"{arm.prompt}#{(arm.sha256 or '')[:12]}"] if arm.prompt else []
     facts += [] if arm.model in ("none", arm.method) else [arm.model]
@@ -106,11 +105,11 @@ def _facts(arm: Arm) -> list[str]:
     return [*facts, *([] if arm.mode == "words" else [arm.mode])]
 
 
-def _ordered(slices: Sequence[MatrixCell], spent: Sequence[str]) -> list[MatrixCell]:
+def _cells_in_order(slices: Sequence[MatrixCell], spent: Sequence[str]) -> list[MatrixCell]:
     return [slices[0], *map(MatrixCell, spent), *slices[1:]]
 
 
-def _spent(rows: Sequence[TrialRow]) -> tuple[str, str, str]:
+def _spent_figures(rows: Sequence[TrialRow]) -> tuple[str, str, str]:
     scored = [row for row in rows if row.scored]
     tokens = sum(row.input_tokens + row.output_tokens for row in scored) / max(len(scored), 1)
     seconds = median(row.seconds for row in scored) if scored else 0.0
@@ -142,14 +141,14 @@ def _difference_row(
         found = known.get(name) or _difference_in(a, b, name)
         kind = found.outcome if found and name in known else "inconclusive"
         cells.append(
-            MatrixCell(_points(found.estimate), _interval(found), (), kind)
+            MatrixCell(_signed_points(found.estimate), _interval(found), (), kind)
             if found
             else MatrixCell("–")
         )
     tokens = "" if made.tokens is None else f"{100 * made.tokens:+.0f} %"
     cost = sum(row.cost_usd for row in b) - sum(row.cost_usd for row in a)
     spent = (tokens, f"{cost:+.4f}" if cost else "", "")
-    return MatrixRow("B − A", ("points",), _ordered(cells, spent), "gap")
+    return MatrixRow("B − A", ("points",), _cells_in_order(cells, spent), "gap")
 
 
 def _difference_in(a: Sequence[TrialRow], b: Sequence[TrialRow], name: str) -> Difference | None:
@@ -161,7 +160,7 @@ def _difference_in(a: Sequence[TrialRow], b: Sequence[TrialRow], name: str) -> D
         return None
 
 
-def _points(share: float) -> str:
+def _signed_points(share: float) -> str:
     return f"{round(100 * share, 1) + 0.0:+.1f}".replace("-", "−")
 
 

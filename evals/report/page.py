@@ -42,7 +42,7 @@ def page(sides: Sequence[Side]) -> str:
     comparison = compare(sides[0].rows, sides[1].rows) if len(sides) == 2 else None
     version = f"suite {suite.sha256[:12]}, formup {read_manifest(sides[0].folder).formup}"
     shown = {} if suite.held_out else pictures(sides[0].folder, suite)
-    return _templates().get_template("page.html").render(
+    return _environment().get_template("page.html").render(
         sides=sides,
         suite=suite,
         style=style,
@@ -52,7 +52,7 @@ def page(sides: Sequence[Side]) -> str:
             f"script-src '{_sha(script)}'; base-uri 'none'; form-action 'none'"
         ),
         folders=[side.folder.resolve().name for side in sides],
-        facts=f"Split {suite.split}, {version}; {_counts(sides)}.",
+        facts=f"Split {suite.split}, {version}; {_tasks_and_trials(sides)}.",
         verdict=comparison and verdict(comparison),
         matrix=matrix(sides, comparison),
         categories=list(dict.fromkeys(task.category for task in suite.tasks)),
@@ -63,7 +63,7 @@ def page(sides: Sequence[Side]) -> str:
 
 
 @cache
-def _templates() -> Environment:
+def _environment() -> Environment:
     """Whatever is not HTML already is escaped, so that forgetting it is harmless."""
     made = Environment(
         loader=FileSystemLoader(HERE / "templates"),
@@ -84,7 +84,7 @@ def _clean(value: Any) -> Any:
     return CONTROLS.sub("\ufffd", value.replace("\r\n", "\n"))
 
 
-def _counts(sides: Sequence[Side]) -> str:
+def _tasks_and_trials(sides: Sequence[Side]) -> str:
     """How many tasks and trials there are."""
     rows = [row for side in sides for row in side.rows]
     lost = sum(not row.scored for row in rows)

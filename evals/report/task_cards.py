@@ -1,4 +1,4 @@
-"""Tasks as cards: the picture, what each trial placed on it, how it was judged, what was said."""
+"""Tasks as cards: the picture, what each trial placed on it, its grades, its transcript."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence

@@ -68,7 +68,7 @@ def chances(tasks: Sequence[Task]) -> dict[str, Chance]:
     """The chance level of every cell that has tasks, by name."""
     return {
         name: Chance(*chance([task.goals for task in tasks if name in cell_names(task)]))
-        for name in _ordered(tasks)
+        for name in _ordered_names(tasks)
     }
 
 
@@ -81,7 +81,7 @@ def cells(rows: Sequence[TrialRow], levels: dict[str, Chance]) -> list[Cell]:
     """
     return [
         _cell(name, [row for row in rows if name in cell_names(row)], levels[name])
-        for name in _ordered(rows)
+        for name in _ordered_names(rows)
     ]
 
 
@@ -91,7 +91,7 @@ def cell_names(of: Task | Trial) -> list[str]:
     return [name for name in (both, of.category, of.setup, of.style, TOTAL) if name]
 
 
-def _ordered(there: Iterable[Task | Trial]) -> list[str]:
+def _ordered_names(there: Iterable[Task | Trial]) -> list[str]:
     """All cells: the paper's, then styles, then the total."""
     names = {name for of in there for name in cell_names(of)} - {TOTAL}
     known = [name for name in ORDER if name in names]

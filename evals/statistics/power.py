@@ -42,7 +42,7 @@ class Needed:
     """Either of the two settles a question: more trials of these tasks, or more tasks.
 
     Attributes:
-        difference: that can then be told, 0 to 1.
+        difference: that can then be seen, 0 to 1.
         trials: per task with the tasks there are; None where no number of trials is enough.
         tasks: with as many trials of each as now; None where none is enough.
     """
@@ -80,20 +80,20 @@ def needed(seen: Spread, difference: float, *, one_sided: bool = False) -> Neede
         return Needed(difference, None, None)
     trials = tasks = None
     if seen.tasks > 1 and seen.within > 0:
-        error = difference / _reach(seen.tasks, one_sided)
+        error = difference / _errors_needed(seen.tasks, one_sided)
         left = error**2 * seen.tasks - seen.between
         trials = math.ceil(seen.within / left) if left > seen.within / MOST else None
     each = seen.between + seen.within / seen.trials
 
     def enough(count: int) -> bool:
-        return count >= each * (_reach(count, one_sided) / difference) ** 2
+        return count >= each * (_errors_needed(count, one_sided) / difference) ** 2
 
     if enough(MOST):
         tasks = bisect_left(range(2, MOST), True, key=enough) + 2
     return Needed(difference, trials, tasks)
 
 
-def _reach(tasks: int, one_sided: bool) -> float:
+def _errors_needed(tasks: int, one_sided: bool) -> float:
     """Standard errors that a difference must measure."""
     from scipy.special import stdtrit
 

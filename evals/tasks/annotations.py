@@ -90,7 +90,7 @@ def task_of(
         split=split,
         style=task.get("style", task.get("wording", "")),
         referring=task.get("referring", ""),
-        goals=tuple(_goal(entry, task["id"], goal) for goal in goals),
+        goals=tuple(_goal_of(entry, task["id"], goal) for goal in goals),
         expects=expects,
         picture=picture,
         must_pass=must_pass,
@@ -98,7 +98,7 @@ def task_of(
     )
 
 
-def _goal(entry: Entry, task: str, goal: Entry) -> Goal:
+def _goal_of(entry: Entry, task: str, goal: Entry) -> Goal:
     things = {
         o["id"]: Thing(o["id"], o["name"], o["polygon"], o.get("holes", []))
         for o in entry["objects"]

@@ -15,7 +15,7 @@ import yaml
 
 from ...tools.errors import InputError
 from ...tools.store import write_whole
-from ..scenes.build import entry_of, family_of, tell
+from ..scenes.stories import entry_of, family_of, story_of
 from .annotations import ANNOTATIONS, PHOTOS, SCALE, Entry, check_format, read_entries, task_of
 from .recipes.caged import caged
 from .recipes.frontier import frontier
@@ -28,7 +28,7 @@ FILE = "suite.yaml"
 """In a folder of somebody's own."""
 HERE = Path(__file__).parent
 RECIPES: dict[str, Callable[[int, float | None], Entry]] = {
-    "own": lambda seed, scale: entry_of(tell(seed)),
+    "own": lambda seed, scale: entry_of(story_of(seed)),
     "styled": styled,
     "frontier": frontier,
     "caged": lambda seed, scale: caged(seed),
@@ -57,8 +57,8 @@ def load_suite(name: str, split: str | None = None, seeds: str | None = None) ->
     """
     if split is not None and split not in SPLITS:
         raise InputError(f"Unknown split {split!r}. There are: {', '.join(SPLITS)}.")
-    path = _path(name)
-    content = annotated(path) if path.suffix == ".json" else _read(path, name)
+    path = _suite_path(name)
+    content = annotated(path) if path.suffix == ".json" else _read_yaml(path, name)
     check_format(content, schema(), f"{path} breaks the format of suites")
     if seeds is not None:
         if len(content["tasks"]) > 1 or "scenes" not in content["tasks"][0]:
@@ -134,7 +134,7 @@ def seeds_of(value: str | list[int], path: Path) -> list[int]:
     return list(range(first, last + 1))
 
 
-def _path(name: str) -> Path:
+def _suite_path(name: str) -> Path:
     if name in shipped():
         return HERE / f"{name}.yaml"
     path = Path(name)
@@ -143,7 +143,7 @@ def _path(name: str) -> Path:
     return path
 
 
-def _read(path: Path, name: str) -> Any:
+def _read_yaml(path: Path, name: str) -> Any:
     try:
         return yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError:

@@ -14,9 +14,9 @@ from shapely.geometry import Polygon
 from ...agent.report import Status
 from ...tools.geometry.outline import Outline, make_outline
 from ..experiments.trials import canonical
-from ..grading.graded import VERSION
-from ..scenes.build import tell
+from ..grading.grades import VERSION
 from ..scenes.paint import draw
+from ..scenes.stories import story_of
 from .recipes.inscribed import inscribe
 
 Split = Literal["train", "dev", "test"]
@@ -80,7 +80,7 @@ class Drawing:
 
     def image(self) -> Image.Image:
         """The picture; always the same pixels."""
-        story = tell(self.seed)
+        story = story_of(self.seed)
         drawn = draw(story.scene)
         return inscribe(drawn, story, self.inscription) if self.inscription else drawn
 

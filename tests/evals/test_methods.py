@@ -19,7 +19,7 @@ from formup.evals.experiments.methods import Method, check_method, model_of
 from formup.evals.experiments.runner import run_trials
 from formup.evals.experiments.simulated_model import DUTIES, lapses_of
 from formup.evals.experiments.trials import Trial, TrialRow
-from formup.evals.grading.reference import reference
+from formup.evals.grading.reference_answers import reference
 from formup.evals.tasks.suites import load_suite, write_suite
 from formup.prompts import load_prompt
 from formup.tools.errors import InputError, ModelError

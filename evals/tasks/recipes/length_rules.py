@@ -10,7 +10,7 @@ import shapely
 from numpy.random import Generator
 
 from ...scenes.layout import room
-from ...scenes.rules import success
+from ...scenes.success_rules import success
 from ...scenes.things import Thing
 
 LEAST = 5

@@ -17,11 +17,11 @@ import shapely
 import yaml
 from formup.evals.experiments.methods import Method
 from formup.evals.experiments.trials import TrialRow
-from formup.evals.grading.grading import grade_goals
-from formup.evals.scenes.build import CELLS, Story, entry_of, tell
-from formup.evals.scenes.choose import HIDDEN, KINDS
+from formup.evals.grading.attempts import grade_goals
 from formup.evals.scenes.families import FAMILIES, LOOSELY
 from formup.evals.scenes.paint import draw
+from formup.evals.scenes.references import HIDDEN, KINDS
+from formup.evals.scenes.stories import CELLS, Story, entry_of, story_of
 from formup.evals.scenes.things import Ground, Look
 from formup.evals.tasks.suites import load_suite
 from formup.evals.tasks.task import Drawing, Goal, Task
@@ -78,7 +78,7 @@ class Case:
 
 @cache
 def case(seed: int) -> Case:
-    story = tell(seed)
+    story = story_of(seed)
     entry, nouns = entry_of(story), LOOSELY.get(story.target.sort.noun, set[str]())
     things = [
         Seen(t.sort.noun, t.colour, Polygon(o["polygon"], o["holes"]))
@@ -114,11 +114,11 @@ def test_every_family_in_every_cell(tasks: list[Task]) -> None:
 
 def test_a_seed_is_a_picture() -> None:
     for seed in (3, 14, 28, 44):
-        image, entry = Drawing(seed).image(), entry_of(tell(seed))
+        image, entry = Drawing(seed).image(), entry_of(story_of(seed))
         assert image.mode == "RGB"
         assert image.size == (entry["width"], entry["height"])
         assert image.tobytes() == Drawing(seed).image().tobytes()
-        assert entry == entry_of(tell(seed))
+        assert entry == entry_of(story_of(seed))
     assert Drawing(3).image().tobytes() != Drawing(57).image().tobytes()
 
 

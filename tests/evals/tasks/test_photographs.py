@@ -14,7 +14,7 @@ import pytest
 from formup.evals.experiments.methods import Method
 from formup.evals.experiments.pointing import JITTERED, can_point, mode_named, pointing
 from formup.evals.experiments.trials import TrialRow
-from formup.evals.grading.grading import grade_goals
+from formup.evals.grading.attempts import grade_goals
 from formup.evals.statistics.cells import cells, chances
 from formup.evals.tasks.annotations import PHOTOS
 from formup.evals.tasks.suites import load_suite

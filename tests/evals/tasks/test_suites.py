@@ -10,11 +10,11 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
-from formup.evals.grading.grading import Attempt, grade_attempt, grade_goals
+from formup.evals.grading.attempts import Attempt, grade_attempt, grade_goals
 from formup.evals.grading.policies import CEILINGS, LUCKY, POLICIES, scores
-from formup.evals.grading.reference import reference
-from formup.evals.scenes.build import family_of, tell
+from formup.evals.grading.reference_answers import reference
 from formup.evals.scenes.paint import draw
+from formup.evals.scenes.stories import family_of, story_of
 from formup.evals.tasks.annotations import PHOTOS
 from formup.evals.tasks.heldout_ledger import look
 from formup.evals.tasks.recipes.inscribed import inscribed
@@ -212,7 +212,7 @@ def test_where_nothing_is_to_be_placed_moving_is_wrong() -> None:
 
 def test_words_in_a_picture_stand_beside_the_thing_meant() -> None:
     for seed in (50004, 50011, 50021):
-        plain, story = draw(tell(seed).scene), tell(seed)
+        plain, story = draw(story_of(seed).scene), story_of(seed)
         written = Drawing(seed, inscribed(seed)["inscription"]).image()
         changed = (np.asarray(plain) != np.asarray(written)).any(axis=2)
         assert changed.sum() > 200

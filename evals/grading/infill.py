@@ -12,13 +12,13 @@ from shapely.geometry import Polygon
 from ...tools.geometry.outline import FloatArray, distances
 from ...tools.geometry.sampling import min_spacing, nearest
 from ..tasks.task import Goal
-from .graded import STRICT_SPREAD, Part
+from .grades import STRICT_SPREAD, Part
 
 CELLS = 80
 """Cells along a length that is the square root of the area."""
 
 
-def region(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+def infill(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge an infill by `min_clearance_px`, `min_spacing_px` and `max_uncovered_px`.
 
     A robot is right if it stands deep enough inside and belongs to a set of robots that are far

@@ -81,7 +81,7 @@ def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str,
         return {
             "where": "corners",
             "side": "outside",
-            "points": [[round(x, 1), round(y, 1)] for x, y in _corners(thing)],
+            "points": [[round(x, 1), round(y, 1)] for x, y in _counted_corners(thing)],
             "tolerance_px": round(max(0.216 * size, 10), 1),
             "min_clearance_px": 0,
         }
@@ -101,7 +101,7 @@ def _hollow(thing: Thing) -> bool:
     return thing.area < 0.8 * thing.polygon.convex_hull.area
 
 
-def _corners(thing: Thing) -> list[tuple[float, float]]:
+def _counted_corners(thing: Thing) -> list[tuple[float, float]]:
     ring = thing.polygon.exterior
     if thing.sort.corners == len(ring.coords) - 1:
         return [(float(x), float(y)) for x, y in list(ring.coords)[:-1]]

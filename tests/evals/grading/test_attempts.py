@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from formup.evals.grading.grading import Attempt, grade_attempt, grade_goals
+from formup.evals.grading.attempts import Attempt, grade_attempt, grade_goals
+from formup.evals.grading.infill import separated
 from formup.evals.grading.policies import POLICIES, chance, positions
-from formup.evals.grading.reference import reference
-from formup.evals.grading.region import separated
+from formup.evals.grading.reference_answers import reference
 from formup.evals.tasks.suites import load_suite
 from formup.evals.tasks.task import Goal, Task, Thing
 from formup.tools.geometry.outline import FloatArray

@@ -13,9 +13,9 @@ from shapely.geometry import Polygon
 from ...agent.report import Status
 from ...tools.geometry.outline import FloatArray
 from ..tasks.task import Goal, Thing
-from .graded import Graded, Part, distinct
+from .grades import Graded, Part, distinct
+from .infill import infill
 from .lines import centre, corners, line_between, side
-from .region import region
 from .ring import escape_proof, ring
 
 SAME = 0.5
@@ -24,7 +24,7 @@ Rule = Callable[[Goal, FloatArray, NDArray[np.bool_]], Part]
 RULES: dict[str, Rule] = {
     "boundary": ring,
     "cage": escape_proof,
-    "inside": region,
+    "inside": infill,
     "corners": corners,
     "side": side,
     "line_between": line_between,
@@ -66,7 +66,7 @@ def grade_goals(goals: Sequence[Goal], positions: ArrayLike | None) -> Graded:
         goals: one or more, on one picture.
         positions: (m, 2) px; None where nothing was placed.
     """
-    points = _points(positions)
+    points = _point_array(positions)
     if points is None or not len(points):
         return Graded(False, 0.0, False, feedback="nothing was placed")
     robots = sum(goal.robots for goal in goals)
@@ -74,7 +74,7 @@ def grade_goals(goals: Sequence[Goal], positions: ArrayLike | None) -> Graded:
     with np.errstate(invalid="ignore"):
         in_picture = ((points >= 0) & (points <= (width - 1, height - 1))).all(axis=1)
     free = in_picture & distinct(points)
-    owned = _shared(goals, points)
+    owned = _robots_of_goals(goals, points)
     parts = [
         (goal, RULES[str(goal.success["where"]).partition(":")[0]](goal, points[own], free[own]))
         for goal, own in zip(goals, owned, strict=True)
@@ -97,7 +97,7 @@ def grade_goals(goals: Sequence[Goal], positions: ArrayLike | None) -> Graded:
         gcr=1.0 if sr else hits / max(robots, len(points)),
         strict=sr and not strict,
         feedback="; ".join([*wrong, *(p for _, part in parts for p in part.problems), *strict]),
-        measures=_measures([part for _, part in parts]),
+        measures=_named_measures([part for _, part in parts]),
         right=tuple(right.tolist()),
     )
 
@@ -108,7 +108,7 @@ def grade_attempt(goals: Sequence[Goal], expects: Sequence[Status], attempt: Att
     Args:
         goals: of the task; none where nothing is to be placed.
         expects: statuses that are right; where `deployed` is not among them, robots that moved are
-            a failure whatever was said.
+            a failure whatever the message.
         attempt: what came of it.
     """
     if "deployed" not in expects:
@@ -145,7 +145,7 @@ def _graded_refusal(expects: Sequence[Status], attempt: Attempt) -> Graded:
     return Graded(right, float(right), right, feedback=feedback)
 
 
-def _points(positions: ArrayLike | None) -> FloatArray | None:
+def _point_array(positions: ArrayLike | None) -> FloatArray | None:
     """Positions as an array; what is no number stands nowhere."""
     if positions is None:
         return None
@@ -153,7 +153,7 @@ def _points(positions: ArrayLike | None) -> FloatArray | None:
     return np.where(np.isfinite(points), points, -1e9)
 
 
-def _shared(goals: Sequence[Goal], points: FloatArray) -> list[NDArray[np.intp]]:
+def _robots_of_goals(goals: Sequence[Goal], points: FloatArray) -> list[NDArray[np.intp]]:
     """The robots of each goal by least total distance to its target; the last gets those over."""
     if len(goals) == 1:
         return [np.arange(len(points))]
@@ -178,7 +178,7 @@ def _meant(found: Sequence[Polygon], things: Sequence[Thing]) -> bool:
     )
 
 
-def _measures(parts: Sequence[Part]) -> dict[str, float]:
+def _named_measures(parts: Sequence[Part]) -> dict[str, float]:
     if len(parts) == 1:
         return dict(parts[0].measures)
     return {f"{k}_{i}": v for i, p in enumerate(parts, start=1) for k, v in p.measures.items()}
