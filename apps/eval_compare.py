@@ -11,8 +11,8 @@ from rich.text import Text
 from ..evals.experiments.compare import compare as compared
 from ..evals.experiments.comparison import Comparison, Difference, Metric, Range
 from ..evals.experiments.gate import MARGIN, Rise
-from ..evals.experiments.journal import Arm, merge, read_rows
-from ..evals.experiments.trials import TrialRow
+from ..evals.experiments.journal import merge, read_rows
+from ..evals.experiments.trials import Arm, TrialRow
 from ..evals.statistics.power import Needed
 from ..evals.tasks.stored_suite import join_stored
 from ..tools.errors import InputError
@@ -102,14 +102,14 @@ def arm_rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
     """The rows of one arm of a folder: the only one, or the one with all these words."""
     rows = read_rows(folder)
     words = named.split() if named else []
-    arms = {arm.name: arm for arm in map(Arm.of, rows)}
+    arms = {arm.name: arm for arm in (row.arm for row in rows)}
     chosen = {name for name, arm in arms.items() if all(_says(name, arm, word) for word in words)}
     if rows and len(chosen) != 1:
         what = f"{option} {named!r} fits {len(chosen)} of these" if named else f"Give {option}"
         raise InputError(
             f"{folder} holds {len(arms)} arms. {what}, words of one: {'; '.join(sorted(arms))}."
         )
-    return [row for row in rows if Arm.of(row).name in chosen]
+    return [row for row in rows if row.arm.name in chosen]
 
 
 def _says(name: str, arm: Arm, word: str) -> bool:

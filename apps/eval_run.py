@@ -15,8 +15,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from ..evals.experiments.executors import executor
-from ..evals.experiments.journal import Arm, read_rows
-from ..evals.experiments.methods import Method, check_method, model_of, trials_of
+from ..evals.experiments.journal import read_rows
+from ..evals.experiments.methods import Method, check_method, trials_of
 from ..evals.experiments.pointing import JITTERED, mode_named
 from ..evals.experiments.runner import Sweep
 from ..evals.experiments.suite_work import SuiteWork
@@ -72,10 +72,8 @@ def run_suite(
     """
     workers = inputs.whole("--jobs", jobs, least=1)
     rates = {name: n / workers for name, n in inputs.rates("--rate", rate, model or []).items()}
-    common = Method(
-        method, "", mode=mode_named(mode), planner=planner, base_url=base_url,
-        library=PromptLibrary(prompts),
-    )  # fmt: skip
+    common = Method(method, mode=mode_named(mode), planner=planner, base_url=base_url)
+    common = replace(common, library=PromptLibrary(prompts))
     arms = _arms(common, model, prompt, descriptor, rates)
     tries = trials or str(JITTERS if common.mode in JITTERED else 1)
     count, limit = inputs.whole("--trials", tries, least=1), inputs.dollars("--budget", budget)
@@ -101,7 +99,7 @@ def _arms(
         check_method(
             replace(
                 common,
-                model=model_of(common.name, model),
+                model=model or "",
                 prompt=prompt,
                 descriptor=inputs.descriptor(descriptor),
                 rate=rates.get(model or ""),
@@ -123,20 +121,20 @@ def _run_trials(
     how: dict[str, Any],
 ) -> Sweep:
     """Run so many trials of each of the tasks by every arm, and show what came of them."""
-    facts, levels = [arm.facts for arm in arms], chances(tasks)
+    identities, levels = [arm.arm for arm in arms], chances(tasks)
     attempts, held_out = folder / ATTEMPTS, split == "test"
     with ExitStack() as stack:
         place = stack.enter_context(TemporaryDirectory()) if held_out else folder / PICTURES
         pictures = _render(suite, Path(place))
         sha256 = suite.sha256({name: picture.pixels for name, picture in pictures.items()})
-        planned = trials_of(sha256, tasks, facts, count)
+        planned = trials_of(sha256, tasks, identities, count)
         if held_out:
             _note_look(folder.parent, suite.name, sha256, planned)
         (folder if held_out else attempts).mkdir(parents=True, exist_ok=True)
         work = SuiteWork(
             tasks={task.id: task for task in tasks},
             pictures={name: picture.path for name, picture in pictures.items()},
-            arms={Arm.of(trial).name: arm for trial, arm in zip(planned, arms, strict=False)},
+            arms={trial.arm.name: arm for trial, arm in zip(planned, arms, strict=False)},
             attempts=None if held_out else attempts,
         )
         store_suite(folder, suite, split, sha256, pictures, levels)
@@ -169,7 +167,7 @@ def _render(suite: Suite, folder: Path) -> dict[str, RenderedPicture]:
 
 
 def _note_look(folder: Path, suite: str, sha256: str, trials: Sequence[Trial]) -> None:
-    arms = sorted({Arm.of(trial).name for trial in trials})
+    arms = sorted({trial.arm.name for trial in trials})
     count = look(folder, suite, sha256, arms)
     text = f"formup: look {count} at the test split of {suite}, written down in {folder / LEDGER}."
     print(text, file=sys.stderr)  # noqa: T201
@@ -186,12 +184,12 @@ def _print_summary(
     keys = {trial.key for trial in planned}
     rows = [row for row in read_rows(folder) if row.key in keys]
     summary = dict[str, object]()
-    for arm in sorted({Arm.of(row).name for row in rows}):
-        own = [row for row in rows if Arm.of(row).name == arm]
+    for arm in sorted({row.arm.name for row in rows}):
+        own = [row for row in rows if row.arm.name == arm]
         found = cells(own, levels)
         summary[arm] = [asdict(cell) for cell in found]
         print_scores(f"{suite.name}, {arm}", found)
-        if own[0].model != "none":
+        if own[0].arm.model != "none":
             print_placed(found)
             print_spent(own)
             print_misses(own)

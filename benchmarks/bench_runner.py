@@ -14,9 +14,10 @@ from pathlib import Path
 
 from ..evals.experiments.executors import Executor, Pool, Serial
 from ..evals.experiments.runner import run_trials
-from ..evals.experiments.trials import Trial, TrialRow
+from ..evals.experiments.trials import Arm, Trial, TrialRow
 
 TASKS, TRIES = 150, 10
+COIN = Arm(method="coin", model="offline")
 INSPECT = Path(__file__).parent / "loop" / "peers" / "trials_inspect.py"
 """In a checkout alone."""
 
@@ -36,7 +37,7 @@ def trivial(trial: Trial) -> TrialRow:
 def trials() -> list[Trial]:
     """All tries of all tasks, in one arm."""
     return [
-        Trial(suite="0" * 64, task=f"task-{n:03d}", trial=number, method="coin", model="offline")
+        Trial(suite="0" * 64, task=f"task-{n:03d}", trial=number, arm=COIN)
         for n in range(TASKS)
         for number in range(TRIES)
     ]

@@ -31,8 +31,7 @@ from .comparison import (
     Score,
 )
 from .gate import MARGIN, Gated, Paired, gate
-from .journal import Arm
-from .trials import TrialRow
+from .trials import Arm, TrialRow
 
 SLICES = ("category", "setup")
 RELIABILITY = (1, 4, 8)
@@ -111,7 +110,7 @@ def only_arm(rows: Iterable[TrialRow]) -> Arm:
     Raises:
         InputError: there are none or several; the text names them.
     """
-    arms = {Arm.of(row).name: Arm.of(row) for row in rows}
+    arms = {row.arm.name: row.arm for row in rows}
     if len(arms) == 1:
         return next(iter(arms.values()))
     if not arms:

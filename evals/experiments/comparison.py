@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, PlainSerializer
 from ..statistics.intervals import Interval
 from ..statistics.power import Needed
 from .gate import Rise, Verdict
-from .journal import Arm
+from .trials import Arm
 
 Metric = Literal["sr", "strict", "gcr"]
 Outcome = Literal["better", "worse", "inconclusive"]

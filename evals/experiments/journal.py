@@ -17,46 +17,9 @@ from ...prompts.files import lock
 from ...tools.errors import InputError
 from ...tools.store import write_whole
 from ...tools.tool import violations
-from .trials import Name, Sha, Trial, TrialRow, canonical
+from .trials import Arm, Sha, Trial, TrialRow, canonical
 
-USUAL = "edges"
-"""The descriptor that goes without saying."""
 ROWS, MANIFEST, LOCK = "trials.jsonl", "manifest.json", ".lock"
-
-
-class Arm(BaseModel):
-    """What is compared: a method with its prompt, tools, model, descriptor and way of pointing."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    method: Name
-    prompt: Name | None
-    sha256: Sha | None
-    tools: Sha | None
-    model: Name
-    descriptor: Name | None = None
-    mode: Name = "words"
-
-    @classmethod
-    def of(cls, trial: Trial) -> Self:
-        """The arm a trial belongs to."""
-        return cls(
-            method=trial.method,
-            prompt=trial.prompt,
-            sha256=trial.prompt_sha,
-            tools=trial.tools_sha,
-            model=trial.model,
-            descriptor=trial.descriptor,
-            mode=trial.mode,
-        )
-
-    @property
-    def name(self) -> str:
-        """Method, prompt with the beginning of its hash, model; descriptor and mode if unusual."""
-        prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
-        shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
-        mode = "" if self.mode == "words" else f" {self.mode}"
-        return f"{self.method}{prompt} {self.model}{shapes}{mode}"
 
 
 class Manifest(BaseModel):
@@ -78,8 +41,7 @@ class Manifest(BaseModel):
         suites, arms = set[str](), dict[bytes, Arm]()
         for trial in trials:
             suites.add(trial.suite)
-            arm = Arm.of(trial)
-            arms[canonical(arm.model_dump())] = arm
+            arms[canonical(trial.arm.model_dump())] = trial.arm
         if len(suites) != 1:
             raise InputError(f"Trials of {len(suites)} suites cannot be one run; give one suite.")
         ordered = tuple(arms[name] for name in sorted(arms))

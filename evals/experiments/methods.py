@@ -1,10 +1,9 @@
 """Who carries tasks out, as arms of a sweep: rules, an agent, a model alone, a policy."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from ...agent.agent import Agent
 from ...agent.model import Model
@@ -14,12 +13,11 @@ from ...tools.tool import Tool
 from ...tools.world import Descriptor
 from ..grading.policies import POLICIES
 from ..tasks.task import Task
-from .journal import USUAL
 from .pointing import Mode, can_point
 from .rate_limiter import RateLimited, rate_limiter
 from .recordings import REPLAY, recordings
 from .simulated_model import SIMULATED, SimulatedModel
-from .trials import Trial, canonical
+from .trials import USUAL, Arm, Trial, canonical
 
 METHODS = ("rules", "agent", "alone", *POLICIES)
 DIRECT = "former-direct"
@@ -36,7 +34,8 @@ class Method:
 
     Attributes:
         name: one of METHODS.
-        model: of agent and alone, as Agent takes it, `simulated`, or replay:FOLDER.
+        model: of agent and alone, as Agent takes it, `simulated`, or replay:FOLDER; the others
+            have their own.
         prompt: id@vNNN, None for the current one of the model's own.
         descriptor: how shapes are described.
         mode: how things are pointed at.
@@ -47,7 +46,7 @@ class Method:
     """
 
     name: str
-    model: str
+    model: str = ""
     prompt: str | None = None
     descriptor: Descriptor = "edges"
     mode: Mode = "words"
@@ -57,8 +56,8 @@ class Method:
     rate: float | None = None
 
     @property
-    def facts(self) -> dict[str, Any]:
-        """What a trial says of its arm.
+    def arm(self) -> Arm:
+        """What the results of its trials depend on.
 
         Raises:
             InputError: no such model or prompt.
@@ -66,16 +65,17 @@ class Method:
         recorded = recordings(self.model)
         if self.name in POLICIES or recorded:
             model = recorded.name if recorded else self.model
-            return {"method": self.name, "model": model, "mode": self.mode}
+            return Arm(method=self.name, model=model, mode=self.mode)
         agent = self.agent(0)
-        return {
-            "method": self.name,
-            "mode": self.mode,
-            **_prompt_facts(agent.prompts),
-            "tools_sha": _tools_sha(agent.offered) if agent.tools else None,
-            "model": agent.model.name,
-            "descriptor": self.descriptor if self.name in WITH_TOOLS else None,
-        }
+        return Arm(
+            method=self.name,
+            prompt="+".join(prompt.name for prompt in agent.prompts) or None,
+            sha256=_prompts_sha(agent.prompts),
+            tools=_tools_sha(agent.offered) if agent.tools else None,
+            model=agent.model.name,
+            descriptor=self.descriptor if self.name in WITH_TOOLS else None,
+            mode=self.mode,
+        )
 
     def agent(self, seed: int, recording: Path | None = None) -> Agent:
         """The agent of a trial.
@@ -116,7 +116,7 @@ class Method:
 
 
 def check_method(arm: Method) -> Method:
-    """The same method, if its parts go together.
+    """The same method with its own model where none is given, if its parts go together.
 
     Raises:
         InputError: there is none of its name, or it does not go with what else is given.
@@ -124,41 +124,30 @@ def check_method(arm: Method) -> Method:
     name = arm.name
     if name not in METHODS:
         raise InputError(f"Unknown method {name!r}. There are: {', '.join(METHODS)}.")
-    if arm.descriptor != USUAL and name not in WITH_TOOLS:
-        raise InputError(f"--descriptor goes with the methods rules and agent, not with {name}.")
-    if arm.mode != "words" and name in POLICIES:
-        raise InputError(f"--mode goes with rules, agent and alone: {name} knows where things are.")
-    if arm.planner is not None and name != "agent":
-        raise InputError(f"--planner goes with the method agent, not with {name}.")
-    if name in NO_MODEL and arm.prompt is not None:
-        raise InputError(f"--prompt goes with the methods agent and alone, not with {name}.")
-    if arm.model == "offline" and name not in NO_MODEL:
+    for option, given, takers in (
+        ("--model", arm.model, ("agent", "alone")),
+        ("--prompt", arm.prompt, ("agent", "alone")),
+        ("--planner", arm.planner, ("agent",)),
+        ("--descriptor", arm.descriptor != USUAL, WITH_TOOLS),
+        ("--mode", arm.mode != "words", ("rules", "agent", "alone")),
+    ):
+        if given and name not in takers:
+            methods = f"method{'s' if len(takers) > 1 else ''} {' and '.join(takers)}"
+            raise InputError(f"{option} goes with the {methods}, not with {name}.")
+    if arm.model == "offline":
         raise InputError("The offline rules are a method of their own: --method rules.")
-    return arm
+    if not arm.model and name not in NO_MODEL:
+        raise InputError(f"The method {name} takes a --model, such as openai:NAME.")
+    return replace(arm, model=arm.model or NO_MODEL[name])
 
 
-def model_of(method: str, given: str | None) -> str:
-    """The model of a method by name: the one given, or its own.
-
-    Raises:
-        InputError: it has its own and one is given, or it has none and none is.
-    """
-    if (given is None) == (method in NO_MODEL) or method not in METHODS:
-        return given or NO_MODEL.get(method, "")
-    if given is None:
-        raise InputError(f"The method {method} takes a --model, such as openai:NAME.")
-    raise InputError(f"--model goes with the methods agent and alone, not with {method}.")
-
-
-def trials_of(
-    suite: str, tasks: Sequence[Task], arms: Sequence[Mapping[str, Any]], count: int
-) -> list[Trial]:
+def trials_of(suite: str, tasks: Sequence[Task], arms: Sequence[Arm], count: int) -> list[Trial]:
     """All trials: every task, every arm, so many tries.
 
     Args:
         suite: its hash.
         tasks: of it.
-        arms: `facts` of methods.
+        arms: of methods.
         count: tries of each.
     """
     return [
@@ -166,11 +155,11 @@ def trials_of(
             suite=suite,
             task=task.id,
             trial=number,
+            arm=arm,
             category=task.category,
             setup=task.setup,
             style=task.style,
             must_pass=task.must_pass,
-            **arm,
         )
         for number in range(count)
         for task in tasks
@@ -178,16 +167,12 @@ def trials_of(
     ]
 
 
-def _prompt_facts(prompts: Sequence[Prompt]) -> dict[str, Any]:
-    """Name and hash of the prompt, or of all of them where two models share the work."""
-    if not prompts:
-        return {}
+def _prompts_sha(prompts: Sequence[Prompt]) -> str | None:
+    """Of the prompt, or of all of them where two models share the work."""
     hashes = [prompt.sha256 for prompt in prompts]
-    joint = hashlib.sha256(canonical(hashes)).hexdigest()
-    return {
-        "prompt": "+".join(prompt.name for prompt in prompts),
-        "prompt_sha": hashes[0] if len(hashes) == 1 else joint,
-    }
+    if len(hashes) < 2:
+        return hashes[0] if hashes else None
+    return hashlib.sha256(canonical(hashes)).hexdigest()
 
 
 def _tools_sha(tools: Sequence[Tool]) -> str:

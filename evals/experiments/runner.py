@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ...tools.errors import InputError
 from .executors import Executor, Serial, Work
-from .journal import Arm, Journal, Manifest
+from .journal import Journal, Manifest
 from .trials import Trial, TrialRow
 
 IN_A_ROW = 10
@@ -105,7 +105,7 @@ def balanced(trials: Iterable[Trial]) -> list[Trial]:
     ordered = list[Trial]()
     places = sorted(cells, key=lambda cell: (cell[0], tasks[cell[1]]))
     for turn, place in enumerate(places):
-        arms = sorted(cells[place], key=lambda trial: Arm.of(trial).name)
+        arms = sorted(cells[place], key=lambda trial: trial.arm.name)
         first = turn % len(arms)
         ordered += arms[first:] + arms[:first]
     return ordered
@@ -152,12 +152,12 @@ class _Budget:
         self._running[model] += 1
 
     def ends(self, row: TrialRow) -> None:
-        self._running[row.model] -= 1
+        self._running[row.arm.model] -= 1
         self._learn(row)
 
     def _learn(self, row: TrialRow) -> None:
         if row.scored:
-            self._dearest[row.model] = max(self._dearest.get(row.model, 0.0), row.cost_usd)
+            self._dearest[row.arm.model] = max(self._dearest.get(row.arm.model, 0.0), row.cost_usd)
 
 
 @dataclass
@@ -188,7 +188,7 @@ class _Run:
         """Start what may start."""
         while self.stopped is None and self.waiting and self.running < executor.capacity:
             trial = self.waiting[0]
-            if not self.budget.allows(trial.model, self.journal.cost_usd):
+            if not self.budget.allows(trial.arm.model, self.journal.cost_usd):
                 if not self.running:
                     self.stopped = (
                         f"The next trial could exceed the budget: {self.journal.cost_usd:.4f} USD "
@@ -196,7 +196,7 @@ class _Run:
                     )
                 return
             self.waiting.popleft()
-            self.budget.begins(trial.model)
+            self.budget.begins(trial.arm.model)
             self.running += 1
             executor.submit(trial)
 

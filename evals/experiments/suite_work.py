@@ -23,7 +23,6 @@ from ..grading.attempts import Attempt, grade_attempt
 from ..grading.grades import VERSION, Graded
 from ..grading.policies import POLICIES, positions
 from ..tasks.task import Task
-from .journal import Arm
 from .methods import Method
 from .pointing import pointing
 from .recordings import file_name, recordings
@@ -54,7 +53,7 @@ class SuiteWork:
 
     def __call__(self, trial: Trial) -> TrialRow:
         """The row of a trial."""
-        task, arm = self.tasks[trial.task], self.arms[Arm.of(trial).name]
+        task, arm = self.tasks[trial.task], self.arms[trial.arm.name]
         if arm.name in POLICIES:
             attempt, run, cost = _by_policy(task, arm.name, trial.seed), None, {}
         else:

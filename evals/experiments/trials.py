@@ -17,8 +17,42 @@ Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Status = Literal["pass", "fail", "model_invalid", "infra_error"]
+USUAL = "edges"
+"""The descriptor that goes without saying."""
 UNEQUAL = frozenset({"seconds", "host"})
 """Fields that differ from run to run of the same trial."""
+
+
+class Arm(BaseModel):
+    """What is compared: a method with all that its results depend on.
+
+    Attributes:
+        method: who decides, such as agent or alone.
+        prompt: id@vNNN, None for rules that read none.
+        sha256: of the prompt's text.
+        tools: SHA-256 of the schemas of the tools offered.
+        model: provider:name, or offline.
+        descriptor: how shapes are put into words, such as edges; None where none are.
+        mode: how things are pointed at; words where they are not.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    method: Name
+    prompt: Name | None = None
+    sha256: Sha | None = None
+    tools: Sha | None = None
+    model: Name
+    descriptor: Name | None = None
+    mode: Name = "words"
+
+    @property
+    def name(self) -> str:
+        """Method, prompt with the beginning of its hash, model; descriptor and mode if unusual."""
+        prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
+        shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
+        mode = "" if self.mode == "words" else f" {self.mode}"
+        return f"{self.method}{prompt} {self.model}{shapes}{mode}"
 
 
 class Trial(BaseModel):
@@ -27,13 +61,6 @@ class Trial(BaseModel):
     Attributes:
         suite: SHA-256 of the suite of tasks.
         trial: number of the try, from 0.
-        method: who decides, such as agent or alone.
-        prompt: id@vNNN, None for rules that read none.
-        prompt_sha: SHA-256 of the prompt's text.
-        tools_sha: SHA-256 of the schemas of the tools offered.
-        model: provider:name, or offline.
-        descriptor: how shapes are put into words, such as edges; None where none are.
-        mode: how things are pointed at; words where they are not.
         category, setup, style: of the task, such as caging, hidden, fresh; results are also shown
             by each.
         must_pass: the task is one that always succeeds.
@@ -44,13 +71,7 @@ class Trial(BaseModel):
     suite: Sha
     task: Name
     trial: Count
-    method: Name
-    prompt: Name | None = None
-    prompt_sha: Sha | None = None
-    tools_sha: Sha | None = None
-    model: Name
-    descriptor: Name | None = None
-    mode: Name = "words"
+    arm: Arm
     category: str = ""
     setup: str = ""
     style: str = ""
@@ -70,8 +91,7 @@ class Trial(BaseModel):
     @property
     def order(self) -> tuple[Any, ...]:
         """By task, trial, then arm: the order of compared results."""
-        arm = (self.method, self.prompt or "", self.model, self.descriptor or "", self.mode)
-        return (self.task, self.trial, *arm, self.key)
+        return (self.task, self.trial, self.arm.name, self.key)
 
 
 _FIELDS = set(Trial.model_fields)

@@ -18,10 +18,6 @@ from .grades import Graded
 
 DRAWS = 4
 """Repetitions of the policies that draw lots, for a chance level."""
-CEILINGS = {"pile": 0.1, "scatter": 0.3, "boundary": 0.1, "circle": 0.35, "line": 0.35}
-"""Mean GCR over a suite's tasks for more than one robot that a policy may reach; tested."""
-LUCKY = 0.02
-"""Share of tasks for more than one robot that a policy may solve by chance."""
 BOX = 1.5
 """Side of the box robots are scattered in, over the side of the target's own."""
 

@@ -10,8 +10,7 @@ from statistics import median
 from ...tools.errors import InputError
 from ..experiments.compare import compare
 from ..experiments.comparison import Comparison, Difference
-from ..experiments.journal import USUAL, Arm
-from ..experiments.trials import TrialRow
+from ..experiments.trials import USUAL, Arm, TrialRow
 from ..statistics.cells import TOTAL, Cell, cell_names, cells
 from .run_folder import Side
 
@@ -48,15 +47,6 @@ class Matrix:
     rows: Sequence[MatrixRow]
 
 
-@dataclass(frozen=True)
-class VerdictText:
-    """What a comparison comes to: a word with the class of its style, and a sentence."""
-
-    word: str
-    kind: str
-    text: str
-
-
 def matrix(sides: Sequence[Side], comparison: Comparison | None = None) -> Matrix:
     """A table of all arms; where two sides are compared, with the difference.
 
@@ -85,16 +75,6 @@ def matrix(sides: Sequence[Side], comparison: Comparison | None = None) -> Matri
     chance = [MatrixCell(f"{levels[name].sr:.2f}") for name in names]
     rows.append(MatrixRow("chance", (), _cells_in_order(chance, ("", "", "")), "chance"))
     return Matrix(("who", names[0], *SPENT, *names[1:]), rows)
-
-
-def verdict(made: Comparison) -> VerdictText:
-    """What the comparison comes to, in a sentence."""
-    overall = made.overall
-    word = {"better": "B is better", "worse": "B is worse"}.get(made.outcome, "Inconclusive")
-    difference = f"{_signed_points(overall.estimate)} ({_interval(overall)}, at 95 %, of tasks like"
-    counts = f"{overall.pairs} pairs of trials of {overall.tasks} tasks"
-    text = f": B − A is {difference} these), over {counts}."
-    return VerdictText(word, made.outcome, text)
 
 
 def _arm_facts(arm: Arm) -> list[str]:
@@ -141,7 +121,7 @@ def _difference_row(
         found = known.get(name) or _difference_in(a, b, name)
         kind = found.outcome if found and name in known else "inconclusive"
         cells.append(
-            MatrixCell(_signed_points(found.estimate), _interval(found), (), kind)
+            MatrixCell(signed_points(found.estimate), interval_points(found), (), kind)
             if found
             else MatrixCell("–")
         )
@@ -160,10 +140,12 @@ def _difference_in(a: Sequence[TrialRow], b: Sequence[TrialRow], name: str) -> D
         return None
 
 
-def _signed_points(share: float) -> str:
+def signed_points(share: float) -> str:
+    """A share in points, with its sign."""
     return f"{round(100 * share, 1) + 0.0:+.1f}".replace("-", "−")
 
 
-def _interval(found: Difference) -> str:
+def interval_points(found: Difference) -> str:
+    """The interval of a difference, in points."""
     ends = (found.interval.low, found.interval.high)
     return " to ".join(f"{100 * end:+.0f}".replace("-", "−") for end in ends)

@@ -17,7 +17,7 @@ from markupsafe import Markup
 
 from ..experiments.compare import compare
 from ..experiments.journal import read_manifest
-from .matrix import matrix, verdict
+from .matrix import interval_points, matrix, signed_points
 from .pictures import pictures
 from .run_folder import Side
 from .task_cards import cards
@@ -42,7 +42,8 @@ def page(sides: Sequence[Side]) -> str:
     comparison = compare(sides[0].rows, sides[1].rows) if len(sides) == 2 else None
     version = f"suite {suite.sha256[:12]}, formup {read_manifest(sides[0].folder).formup}"
     shown = {} if suite.held_out else pictures(sides[0].folder, suite)
-    return _environment().get_template("page.html").render(
+    template = _environment().get_template("page.html")
+    return template.render(
         sides=sides,
         suite=suite,
         style=style,
@@ -53,13 +54,13 @@ def page(sides: Sequence[Side]) -> str:
         ),
         folders=[side.folder.resolve().name for side in sides],
         facts=f"Split {suite.split}, {version}; {_tasks_and_trials(sides)}.",
-        verdict=comparison and verdict(comparison),
+        comparison=comparison,
         matrix=matrix(sides, comparison),
         categories=list(dict.fromkeys(task.category for task in suite.tasks)),
         cards=[] if suite.held_out else cards(sides, shown),
         pictures=shown.values(),
         trials_open=TRIALS_OPEN,
-    )  # fmt: skip
+    )
 
 
 @cache
@@ -73,6 +74,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
         finalize=_clean,
     )
+    made.filters |= {"points": signed_points, "interval": interval_points}
     made.filters["px"] = lambda value: f"{round(float(value), 2):g}"
     return made
 

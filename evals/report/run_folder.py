@@ -13,9 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ...agent.store.folder import read_trace
 from ...tools.errors import InputError
-from ..experiments.journal import Arm
 from ..experiments.suite_work import attempt_name
-from ..experiments.trials import TrialRow
+from ..experiments.trials import Arm, TrialRow
 from ..tasks.stored_suite import ATTEMPTS, StoredSuite, read_suite
 
 Point = tuple[float, float]
@@ -79,12 +78,12 @@ class Side:
     @property
     def arms(self) -> list[Arm]:
         """In order of their names."""
-        arms = {arm.name: arm for arm in map(Arm.of, self.rows)}
+        arms = {arm.name: arm for arm in (row.arm for row in self.rows)}
         return [arms[name] for name in sorted(arms)]
 
     def of(self, arm: Arm) -> list[TrialRow]:
         """The rows of an arm."""
-        return [row for row in self.rows if Arm.of(row) == arm]
+        return [row for row in self.rows if row.arm == arm]
 
     def attempt(self, row: TrialRow) -> StoredAttempt | None:
         """What came of a trial; None where nothing can be read."""

@@ -4,7 +4,6 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ..experiments.journal import Arm
 from ..experiments.trials import TrialRow
 from ..tasks.task import Task
 from .pictures import PagePicture
@@ -67,7 +66,7 @@ def cards(sides: Sequence[Side], pictures: Mapping[str, PagePicture]) -> list[Ca
 def _number_and_arm(trial: tuple[Side, TrialRow]) -> tuple[int, str, str]:
     """Trials of a number stand together, in the order of arms."""
     side, row = trial
-    return row.trial, side.label, Arm.of(row).name
+    return row.trial, side.label, row.arm.name
 
 
 def _card(task: Task, trials: Sequence[tuple[Side, TrialRow]], picture: PagePicture) -> Card:
@@ -94,7 +93,7 @@ def _panel(task: Task, side: Side, row: TrialRow, picture: PagePicture) -> Trial
     return TrialPanel(
         row=row,
         word=WORDS[row.status],
-        who=f"{label}{Arm.of(row).name.removesuffix(' none')}, trial {row.trial}",
+        who=f"{label}{row.arm.name.removesuffix(' none')}, trial {row.trial}",
         drawing=drawing(task, attempt, picture, title),
         placed=attempt is not None and bool(attempt.observed or attempt.planned),
         figures=_figures(row),

@@ -110,6 +110,11 @@ class Thing:
         """Share of its convex hull that it fills."""
         return self.polygon.area / self.polygon.convex_hull.area
 
+    @property
+    def hollow(self) -> bool:
+        """Whether robots in a recess of it come between others when counted around its hull."""
+        return self.area < 0.8 * self.polygon.convex_hull.area
+
     def moved(self, x: float, y: float, turn: float) -> "Thing":
         """Turned by degrees about its centroid and put there."""
         c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))

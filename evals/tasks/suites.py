@@ -6,7 +6,6 @@ A folder of pictures with an annotations.json is a suite too, with a suite.yaml 
 import json
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -64,10 +63,11 @@ def load_suite(name: str, split: str | None = None, seeds: str | None = None) ->
         if len(content["tasks"]) > 1 or "scenes" not in content["tasks"][0]:
             raise InputError(f"{content['name']} is not made of one range of seeds, as scenes is.")
         content["tasks"][0]["scenes"] = seeds
-    families = _Families(content.get("splits", {}), split, path)
-    tasks = tuple(t for item in content["tasks"] for t in _tasks_of_item(item, path, families))
+    splits = content.get("splits", {})
+    items = content["tasks"]
+    tasks = tuple(task for item in items for task in _tasks_of_item(item, path, splits, split))
     if not tasks:
-        there = ", ".join(s for s in SPLITS if s in content.get("splits", {"dev": []}))
+        there = ", ".join(s for s in SPLITS if s in (splits or ["dev"]))
         raise InputError(f"{content['name']} has no tasks in the split {split}. It has: {there}.")
     repeated = sorted({t.id for t in tasks if sum(o.id == t.id for o in tasks) > 1})
     if repeated:
@@ -155,35 +155,26 @@ def _read_yaml(path: Path, name: str) -> Any:
         raise InputError(f"{path} is not YAML: {' '.join(str(error).split())[:200]}.") from None
 
 
-@dataclass(frozen=True)
-class _Families:
-    """Which split a family is in, and whether it is wanted."""
-
-    named: dict[str, list[str]]
-    wanted: str | None
-    path: Path
-
-    def split(self, family: str) -> Split | None:
-        """The split of a family; None if it is not wanted."""
-        found: Split = "dev"
-        if self.named:
-            splits: list[Split] = [s for s in SPLITS if family in self.named.get(s, ())]
-            if len(splits) != 1:
-                raise InputError(
-                    f"{self.path}: the family {family!r} is in {len(splits)} splits; every family "
-                    "of its tasks must be in one."
-                )
-            found = splits[0]
-        return found if self.wanted in (None, found) else None
+def _split_of(family: str, splits: dict[str, list[str]], path: Path) -> Split:
+    """The split of a family; dev where a suite has none."""
+    found: list[Split] = [s for s in SPLITS if family in splits.get(s, ())]
+    if splits and len(found) != 1:
+        raise InputError(
+            f"{path}: the family {family!r} is in {len(found)} splits; every family of its tasks "
+            "must be in one."
+        )
+    return found[0] if splits else "dev"
 
 
-def _tasks_of_item(item: Entry, path: Path, families: _Families) -> Iterator[Task]:
-    """The tasks of one item of a suite's list."""
+def _tasks_of_item(
+    item: Entry, path: Path, splits: dict[str, list[str]], wanted: str | None
+) -> Iterator[Task]:
+    """The tasks of one item of a suite's list that are in the split wanted, if one is."""
     must, named = bool(item.get("must_pass")), item.get("photos", "all")
     scale = {name: item[name] for name in (SCALE,) if name in item}
     for make, family, root in _entries(item, path):
-        split = families.split(family)
-        if split is None:
+        split = _split_of(family, splits, path)
+        if wanted not in (None, split):
             continue
         entry = make() | scale
         for task in entry["tasks"]:

@@ -129,7 +129,7 @@ def test_a_planted_regression_of_ten_points_is_blocked(
     more: list[Any] = ["--prompt", GOOD, "--prompt", BAD, "--prompts", forgetful]
     assert formup(*run, *more, "--trials", str(TRIALS), "--out", tmp_path / "both") == 0
     rows = read_rows(tmp_path / "both")
-    rates = {p: [bool(r.sr) for r in rows if r.prompt == p] for p in (GOOD, BAD)}
+    rates = {p: [bool(r.sr) for r in rows if r.arm.prompt == p] for p in (GOOD, BAD)}
     assert {len(successes) for successes in rates.values()} == {TRIALS * TASKS}
     assert sum(rates[GOOD]) == TRIALS * TASKS
     assert all(row.input_tokens for row in rows)

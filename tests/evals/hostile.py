@@ -9,7 +9,7 @@ from formup.agent.messages import Call, Reply
 from formup.agent.wrappers.doubles import ScriptedModel
 from formup.evals.experiments.journal import Manifest
 from formup.evals.experiments.suite_work import attempt_name
-from formup.evals.experiments.trials import Status, Trial, TrialRow
+from formup.evals.experiments.trials import Arm, Status, Trial, TrialRow
 from formup.evals.statistics.cells import Chance
 from formup.evals.tasks.rendered_pictures import RenderedPicture, hashed
 from formup.evals.tasks.stored_suite import StoredSuite
@@ -66,9 +66,11 @@ def _row(number: int, trial: int, method: str, passes: bool) -> TrialRow:
         suite=SUITE,
         task=_name(number),
         trial=trial,
-        method=f"{method}<script>alert(5)</script>",
-        prompt="</td><script>alert(6)</script>",
-        model="a:b'\"><script>alert(7)</script>",
+        arm=Arm(
+            method=f"{method}<script>alert(5)</script>",
+            prompt="</td><script>alert(6)</script>",
+            model="a:b'\"><script>alert(7)</script>",
+        ),
         category="caging" if number % 2 else "general",
         setup="single",
     )

@@ -14,11 +14,11 @@ from formup.agent.messages import Call, Reply
 from formup.agent.model import Model
 from formup.agent.wrappers.doubles import FunctionModel
 from formup.evals.experiments.executors import attempt, executor
-from formup.evals.experiments.journal import Arm, read_rows
-from formup.evals.experiments.methods import Method, check_method, model_of
+from formup.evals.experiments.journal import read_rows
+from formup.evals.experiments.methods import Method, check_method
 from formup.evals.experiments.runner import run_trials
 from formup.evals.experiments.simulated_model import DUTIES, lapses_of
-from formup.evals.experiments.trials import Trial, TrialRow
+from formup.evals.experiments.trials import Arm, Trial, TrialRow
 from formup.evals.grading.reference_answers import reference
 from formup.evals.tasks.suites import load_suite, write_suite
 from formup.prompts import load_prompt
@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 work_of: Callable[..., Any] = import_module("trying").work_of
 
-FIRST = Trial(suite="0" * 64, task="t", trial=0, method="rules", model="offline")
+FIRST = Trial(suite="0" * 64, task="t", trial=0, arm=Arm(method="rules", model="offline"))
 ASKED = {"question": "Which one?"}
 
 
@@ -71,7 +71,7 @@ def test_a_model_alone_is_graded_by_what_it_writes(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = row_of(folder, monkeypatch, "alone", Reply(text=f"Here: {written(folder)}"))
-    assert (right.status, right.gcr, right.tools_sha) == ("pass", 1.0, None)
+    assert (right.status, right.gcr, right.arm.tools) == ("pass", 1.0, None)
     few = row_of(folder, monkeypatch, "alone", Reply(text=written(folder, positions=[[1, 1]])))
     assert few.status == "fail"
     for text in ("I cannot see a square.", '{"positions": "all"}', '<tool_call>{"x": 1}'):
@@ -141,20 +141,19 @@ def test_work_can_be_given_to_other_processes(folder: Path, tmp_path: Path) -> N
 
 
 def test_a_descriptor_is_part_of_the_arm() -> None:
-    facts = [Method("rules", "offline", None, d).facts for d in ("edges", "matrix")]
-    assert [fact.pop("descriptor") for fact in facts] == ["edges", "matrix"]
-    assert facts[0] == facts[1]
-    assert Method("rules", "offline", mode="box").facts["mode"] == "box"
-    trials = [FIRST.model_copy(update={"descriptor": d}) for d in ("edges", "matrix")]
+    arms = [Method("rules", "offline", None, d).arm for d in ("edges", "matrix")]
+    assert [arm.descriptor for arm in arms] == ["edges", "matrix"]
+    assert arms[0] == arms[1].model_copy(update={"descriptor": "edges"})
+    assert Method("rules", "offline", mode="box").arm.mode == "box"
+    trials = [FIRST.model_copy(update={"arm": arm}) for arm in arms]
     assert len({Trial(**trial.model_dump()).key for trial in trials}) == 2
-    assert [Arm.of(trial).name for trial in trials] == ["rules offline", "rules offline matrix"]
-    circle = {"method": "circle", "model": "none", "mode": "words"}
-    assert Method("circle", model_of("circle", None)).facts == circle
+    assert [arm.name for arm in arms] == ["rules offline", "rules offline matrix"]
+    assert check_method(Method("circle")).arm == Arm(method="circle", model="none")
     for arm, message in (
-        (Method("circle", "none", descriptor="matrix"), "--descriptor goes with the methods rules"),
+        (Method("circle", descriptor="matrix"), "--descriptor goes with the methods rules"),
         (Method("alone", "x:y", descriptor="matrix"), "--descriptor goes with the methods rules"),
-        (Method("circle", "none", mode="box"), "circle knows where things are"),
-        (Method("rules", "offline", planner="x:y"), "--planner goes with the method agent"),
+        (Method("circle", mode="box"), "--mode goes with the methods rules and agent and alone"),
+        (Method("rules", planner="x:y"), "--planner goes with the method agent"),
     ):
         with pytest.raises(InputError, match=message):
             check_method(arm)

@@ -31,21 +31,21 @@ def result(folder: Path) -> bytes:
 
 
 def test_a_trial_is_known_by_all_it_depends_on() -> None:
-    changes: dict[str, object] = {
-        "suite": "b" * 64,
-        "task": "u",
-        "trial": 1,
+    changes: dict[str, object] = {"suite": "b" * 64, "task": "u", "trial": 1, "style": "fresh"}
+    arms: dict[str, object] = {
         "method": "alone",
         "prompt": "former@v009",
-        "prompt_sha": "9" * 64,
-        "tools_sha": "9" * 64,
+        "sha256": "9" * 64,
+        "tools": "9" * 64,
         "model": "other",
         "descriptor": "matrix",
         "mode": "box",
     }
     others = [FIRST.model_copy(update={name: value}) for name, value in changes.items()]
+    for name, value in arms.items():
+        others.append(FIRST.model_copy(update={"arm": FIRST.arm.model_copy(update={name: value})}))
     keys = {Trial.model_validate(other.model_dump()).key for other in others}
-    assert len({FIRST.key, *keys}) == 11
+    assert len({FIRST.key, *keys}) == 12
 
 
 def test_arms_meet_the_same_seed() -> None:
@@ -86,8 +86,8 @@ def test_order_is_balanced() -> None:
     ordered = balanced(sweep(3, 2))
     assert [t.trial for t in ordered] == [0] * 6 + [1] * 6
     cells = [ordered[i : i + 2] for i in range(0, 12, 2)]
-    assert all(a.task == b.task and a.prompt != b.prompt for a, b in cells)
-    firsts = [a.prompt for a, _ in cells]
+    assert all(a.task == b.task and a.arm != b.arm for a, b in cells)
+    firsts = [a.arm.prompt for a, _ in cells]
     assert firsts.count("former@v001") == firsts.count("former@v002") == 3
     shuffled = sweep(3, 2)
     random.Random(0).shuffle(shuffled)

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from formup.evals.experiments.journal import Arm
 from formup.evals.experiments.methods import Method, trials_of
 from formup.evals.experiments.suite_work import SuiteWork
 from formup.evals.experiments.trials import Trial, TrialRow
@@ -16,8 +15,8 @@ def work_of(
 ) -> tuple[SuiteWork, list[Trial]]:
     """What runs the trials of tasks, and the trials."""
     pictures = {name: made.path for name, made in render(tasks, folder).items()}
-    trials = trials_of("0" * 64, tasks, [arm.facts], count)
-    arms = {Arm.of(trial).name: arm for trial in trials}
+    trials = trials_of("0" * 64, tasks, [arm.arm], count)
+    arms = {trial.arm.name: arm for trial in trials}
     return SuiteWork({task.id: task for task in tasks}, pictures, arms, attempts), trials
 
 

@@ -67,8 +67,10 @@ def test_strict_is_to_stand_on_even_places_not_only_to_keep_the_gaps() -> None:
     for widths, even in (([1.4] * 4 + [0.6] * 4, False), ([1.2, 0.8] * 4, True)):
         stations = np.cumsum(widths) / sum(widths)
         places = square.interpolate(stations, normalized=True)
-        graded = grade_goals([replace(RING, success=RING.success | {"max_gap_px": 100})],
-                             shapely.get_coordinates(places))  # fmt: skip
+        graded = grade_goals(
+            [replace(RING, success=RING.success | {"max_gap_px": 100})],
+            shapely.get_coordinates(places),
+        )
         assert graded.sr
         assert graded.strict is even
 
