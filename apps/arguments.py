@@ -13,7 +13,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from ..agent.limits import Limits
 from ..agent.policy import Policy
-from ..evals.tasks.photographs import Task
 from ..prompts.inputs import Input
 from ..tools.context import Descriptor
 from ..tools.errors import InputError
@@ -25,7 +24,6 @@ from ..tools.perception.target_prompt import Point, TargetPrompt
 from ..tools.store import read_text
 from ..tools.tool import violations
 
-MAX_SPAN = 10_000
 """Seeds in one run."""
 
 
@@ -53,39 +51,6 @@ def whole(name: str, text: str, *, least: int, most: int = 1_000_000) -> int:
             f"{name} {text!r} cannot be used; give a whole number from {least} to {most:,}."
         )
     return value
-
-
-def span(name: str, text: str) -> tuple[int, int]:
-    """First and last of a range of whole numbers, A-B or A alone.
-
-    Raises:
-        InputError: no such range, or one of more than 10,000.
-    """
-    first, dash, last = text.strip().partition("-")
-    if not dash:
-        last = first
-    numbers = [
-        int(n) if n.isascii() and n.isdecimal() and len(n) < 10 else -1 for n in (first, last)
-    ]
-    if not 0 <= numbers[0] <= numbers[1] < numbers[0] + MAX_SPAN:
-        raise InputError(
-            f"{name} {text!r} cannot be used; give first and last seed, 0 or more, such as 0-199 "
-            f"({MAX_SPAN:,} at most)."
-        )
-    return numbers[0], numbers[1]
-
-
-def tasks(names: list[str] | None, there: list[Task]) -> list[Task]:
-    """The tasks named, or all.
-
-    Raises:
-        InputError: there is none of a name; the text lists those there are.
-    """
-    known = {task.id: task for task in there}
-    for name in names or ():
-        if name not in known:
-            raise InputError(f"Unknown task {name!r}. There are: {', '.join(known)}.")
-    return [known[name] for name in names] if names else there
 
 
 def scale(text: str | None) -> float | None:

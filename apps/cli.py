@@ -19,7 +19,7 @@ from ..prompts import PromptLibrary
 from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
-from . import arguments, deploy, eval_run, prompts, tools, trace
+from . import arguments, deploy, evaluate, prompts, tools, trace
 from . import options as o
 from .run_files import Folder, write_files
 from .terminal_session import TerminalSession
@@ -36,7 +36,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.add_typer(tools.app, name="tools", help="The tools the model sees.")
-app.add_typer(eval_run.app, name="eval", help="How good it is.")
+app.add_typer(evaluate.app, name="eval", help="How good it is.")
 app.add_typer(prompts.app, name="prompts", help="What models are told, in versions.")
 
 

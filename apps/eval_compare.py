@@ -9,11 +9,12 @@ from rich.table import Table
 from rich.text import Text
 
 from ..evals.experiments.compare import compare as compared
-from ..evals.experiments.comparison import Bounded, Comparison, Difference, Metric, Range, Settled
-from ..evals.experiments.gate import MARGIN
-from ..evals.experiments.journal import Arm, merge, read_rows
-from ..evals.experiments.trials import TrialRow
-from ..evals.tasks.stored_suite import join_kept
+from ..evals.experiments.comparison import Comparison, Difference, Metric, Range
+from ..evals.experiments.gate import MARGIN, Rise
+from ..evals.experiments.journal import merge, read_rows
+from ..evals.experiments.trials import Arm, TrialRow
+from ..evals.statistics.power import Needed
+from ..evals.tasks.stored_suite import join_stored
 from ..tools.errors import InputError
 from ..tools.store import write_whole
 from . import arguments as inputs
@@ -46,7 +47,7 @@ def _command(concluded: Callable[[Console, Comparison], int]) -> Callable[..., N
         console = Console(highlight=False, soft_wrap=True, quiet=as_json)
         if as_json:
             print(made.model_dump_json(indent=2))  # noqa: T201
-        _show(console, made)
+        _print_comparison(console, made)
         raise typer.Exit(concluded(console, made))
 
     command.__doc__ = concluded.__doc__
@@ -70,7 +71,7 @@ def gate(console: Console, made: Comparison) -> int:
 def merge_shards(shards: o.Shards, out: o.MergedFolder) -> None:
     """Put the trials of shards together in a new folder."""
     count = merge(shards, out)
-    join_kept(shards, out)
+    join_stored(shards, out)
     print(f"{count:,} trials in {out}")  # noqa: T201
 
 
@@ -81,7 +82,7 @@ def _made(
     margin: str,
     out: Path | None,
 ) -> Comparison:
-    measured, tolerated = _metric(metric), inputs.share("--margin", margin)
+    measured, tolerated = _metric_named(metric), inputs.share("--margin", margin)
     if not tolerated:
         raise InputError("--margin 0 can never be passed; give a share above 0, such as 0.05.")
     made = compared(arm_rows(*old, "--arm-a"), arm_rows(*new, "--arm-b"), measured, tolerated)
@@ -90,7 +91,7 @@ def _made(
     return made
 
 
-def _metric(text: str) -> Metric:
+def _metric_named(text: str) -> Metric:
     for known in ("sr", "strict", "gcr"):
         if text == known:
             return known
@@ -98,17 +99,17 @@ def _metric(text: str) -> Metric:
 
 
 def arm_rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
-    """The rows of one arm of a folder: the only one, or the one of which all the words are said."""
+    """The rows of one arm of a folder: the only one, or the one with all these words."""
     rows = read_rows(folder)
     words = named.split() if named else []
-    arms = {arm.name: arm for arm in map(Arm.of, rows)}
+    arms = {arm.name: arm for arm in (row.arm for row in rows)}
     chosen = {name for name, arm in arms.items() if all(_says(name, arm, word) for word in words)}
     if rows and len(chosen) != 1:
         what = f"{option} {named!r} fits {len(chosen)} of these" if named else f"Give {option}"
         raise InputError(
             f"{folder} holds {len(arms)} arms. {what}, words of one: {'; '.join(sorted(arms))}."
         )
-    return [row for row in rows if Arm.of(row).name in chosen]
+    return [row for row in rows if row.arm.name in chosen]
 
 
 def _says(name: str, arm: Arm, word: str) -> bool:
@@ -117,7 +118,7 @@ def _says(name: str, arm: Arm, word: str) -> bool:
     )
 
 
-def _show(console: Console, made: Comparison) -> None:
+def _print_comparison(console: Console, made: Comparison) -> None:
     for name, arm in (("A", made.a), ("B", made.b)):
         console.print(Text.assemble((f"{name} ", "cyan"), arm.name))
     console.print()
@@ -126,8 +127,8 @@ def _show(console: Console, made: Comparison) -> None:
     console.print(_differences(made))
     tokens = "" if made.tokens is None else f"; tokens {100 * made.tokens:+.1f} %"
     console.print(
-        f"one-sided bounds: {_bounds(made.success)} points, of invalid output "
-        f"{_bounds(made.invalid)} points{tokens}"
+        f"one-sided bounds: {_interval_points(made.success)} points, of invalid output "
+        f"{_interval_points(made.invalid)} points{tokens}"
     )
     if any(made.unpaired):
         a, b = made.unpaired
@@ -136,7 +137,7 @@ def _show(console: Console, made: Comparison) -> None:
 
 def _scores(made: Comparison) -> Table:
     """How each does; intervals at 95 %."""
-    table = _table(made.metric, "", "new tasks", "these tasks")
+    table = _plain_table(made.metric, "", "new tasks", "these tasks")
     for k in made.overall.a.pass_k:
         table.add_column(f"pass^{k}", justify="right", no_wrap=True)
     for name, score in (("A", made.overall.a), ("B", made.overall.b)):
@@ -149,16 +150,16 @@ def _scores(made: Comparison) -> Table:
 
 def _differences(made: Comparison) -> Table:
     """B minus A over all tasks and by slice, in points; intervals at 95 %."""
-    table = _table("B - A", "tasks", "points", "new tasks", "p", "these tasks", "p", "")
+    table = _plain_table("B - A", "tasks", "points", "new tasks", "p", "these tasks", "p", "")
     slices = ((n, d) for values in made.slices.values() for n, d in values.items())
     for name, found in (("all", made.overall), *slices):
         table.add_row(
             Text(name),
             str(found.tasks),
-            _points(found.estimate),
-            _bounds(found.interval),
+            _in_points(found.estimate),
+            _interval_points(found.interval),
             _p(found.p_holm),
-            "-" if found.fixed_tasks is None else _bounds(found.fixed_tasks),
+            "-" if found.fixed_tasks is None else _interval_points(found.fixed_tasks),
             _p(found.fixed_p),
             Text(found.outcome, style=STYLE[found.outcome]),
         )
@@ -167,7 +168,7 @@ def _differences(made: Comparison) -> Table:
     return table
 
 
-def _table(first: str, *titles: str) -> Table:
+def _plain_table(first: str, *titles: str) -> Table:
     table = Table(box=None, header_style="cyan", pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column(first, no_wrap=True)
     for title in titles:
@@ -179,7 +180,7 @@ def _conclude(
     console: Console,
     word: str,
     reasons: tuple[str, ...],
-    settled: Settled | None,
+    settled: Needed | None,
     overall: Difference,
 ) -> None:
     console.print(Text.assemble((word, STYLE[word]), f": {'; '.join(reasons)}" if reasons else ""))
@@ -191,19 +192,19 @@ def _conclude(
             else "",
             f"{settled.tasks:,} tasks with {each} trials of each" if settled.tasks else "",
         ]
-        told = " or ".join(filter(None, ways)) or "more tasks and trials than can be run"
-        console.print(f"to tell {100 * settled.difference:.1f} points (power .8): {told}")
+        text = " or ".join(filter(None, ways)) or "more tasks and trials than can be run"
+        console.print(f"to tell {100 * settled.difference:.1f} points (power .8): {text}")
 
 
 def _shares(found: Range | None) -> str:
     return "-" if found is None else f"{found.low:.3f} to {found.high:.3f}"
 
 
-def _bounds(found: Range | Bounded) -> str:
-    return f"{_points(found.low)} to {_points(found.high)}"
+def _interval_points(found: Range | Rise) -> str:
+    return f"{_in_points(found.low)} to {_in_points(found.high)}"
 
 
-def _points(share: float) -> str:
+def _in_points(share: float) -> str:
     return f"{round(100 * share, 1) + 0.0:+.1f}"
 
 

@@ -1,4 +1,4 @@
-"""Options of `formup eval run`, `suites`, `add` and `report`, said once."""
+"""Options of `formup eval run`, `add`, `descriptors` and `report`, each declared once."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,9 +12,18 @@ MethodName = Annotated[
     str,
     typer.Option("--method", help="rules, agent, alone, pile, scatter, boundary, circle or line."),
 ]
+ModeName = Annotated[
+    str, typer.Option("--mode", help="How to point: truth, outline, box, point or words.")
+]
+Seeds = Annotated[
+    str | None, typer.Option("--seeds", help="First and last seed of drawn scenes: 0-199.")
+]
+TaskList = Annotated[list[str] | None, typer.Option("--task", help="Only this task; repeatable.")]
 ModelList = Annotated[
     list[str] | None,
-    typer.Option("--model", help="Of agent and alone, as in formup run; repeatable."),
+    typer.Option(
+        "--model", help="Of agent and alone, as in formup run, or replay:FOLDER; repeatable."
+    ),
 ]
 PromptList = Annotated[
     list[str] | None, typer.Option("--prompt", help="ID@VERSION; repeatable, side by side.")
@@ -23,7 +32,10 @@ DescriptorList = Annotated[
     list[str] | None,
     typer.Option("--descriptor", help="edges, edges+vertices or matrix; repeatable."),
 ]
-Trials = Annotated[str, typer.Option("--trials", help="Tries of every task.")]
+Trials = Annotated[
+    str | None,
+    typer.Option("--trials", help="Tries of every task; 3 where --mode jitters it, else 1."),
+]
 Split = Annotated[str, typer.Option("--split", help="train, dev or test (scores only).")]
 RunFolder = Annotated[
     Path | None,
@@ -36,6 +48,7 @@ RateList = Annotated[
     typer.Option("--rate", help="MODEL=N: requests a minute at most, over all jobs; repeatable."),
 ]
 Jobs = Annotated[str, typer.Option("--jobs", help="Processes at once.")]
+DescribedSuite = Annotated[str, typer.Argument(metavar="[SUITE]", help="Whose things.")]
 NewFolder = Annotated[
     Path, typer.Argument(metavar="FOLDER", help="Pictures with an annotations.json.")
 ]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from ..evals.experiments.journal import read_rows
 from ..evals.report.page import page
-from ..evals.report.read import Side, side
+from ..evals.report.run_folder import Side, side
 from ..tools.errors import InputError
 from ..tools.store import write_whole
 from . import eval_options as e

@@ -1,4 +1,4 @@
-"""`formup eval run`, `suites` and `add`: a suite by a method, as counts with the chance level."""
+"""`formup eval run`: a suite by one or several methods, as counts with the chance level."""
 
 import json
 import sys
@@ -8,25 +8,26 @@ from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import typer
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
 from ..evals.experiments.executors import executor
-from ..evals.experiments.journal import Arm, read_rows
-from ..evals.experiments.methods import Method, SuiteWork, arm_key, method, trials_of
+from ..evals.experiments.journal import read_rows
+from ..evals.experiments.methods import Method, check_method, trials_of
+from ..evals.experiments.pointing import JITTERED, mode_named
 from ..evals.experiments.runner import Sweep
+from ..evals.experiments.suite_work import SuiteWork
 from ..evals.experiments.trials import Trial
-from ..evals.grading.check_tasks import check_task
-from ..evals.statistics.cells import Cell, Chance, cells, chances
+from ..evals.statistics.cells import Chance, cells, chances
 from ..evals.tasks.heldout_ledger import NAME as LEDGER
 from ..evals.tasks.heldout_ledger import look
-from ..evals.tasks.load import described, load_suite, shipped, write_suite
-from ..evals.tasks.rendered_pictures import Hung, hang
-from ..evals.tasks.stored_suite import ATTEMPTS, PICTURES, keep_suite
-from ..evals.tasks.suite_task import Suite
+from ..evals.tasks.rendered_pictures import RenderedPicture, render
+from ..evals.tasks.stored_suite import ATTEMPTS, PICTURES, store_suite
+from ..evals.tasks.suites import load_suite
+from ..evals.tasks.task import Suite, Task
 from ..prompts import PromptLibrary
 from ..tools.errors import InputError
 from ..tools.store import write_whole
@@ -34,22 +35,27 @@ from . import arguments as inputs
 from . import eval_options as e
 from . import options as o
 from .eval_progress import sweep
-from .evaluate import app
+from .eval_tables import print_misses, print_placed, print_scores, print_spent
 
 RUNS = Path("formup-runs")
 SUMMARY = "summary.json"
+JITTERS = 3
+"""Tries of a task where each points in another way."""
 
 
-@app.command("run")
 def run_suite(
     suite: e.SuiteName,
     method: e.MethodName = "rules",
+    mode: e.ModeName = "words",
+    seeds: e.Seeds = None,
+    task: e.TaskList = None,
     model: e.ModelList = None,
     base_url: o.BaseUrl = None,
+    planner: o.PlannerName = None,
     prompt: e.PromptList = None,
     prompts: o.PromptsFolder = None,
     descriptor: e.DescriptorList = None,
-    trials: e.Trials = "1",
+    trials: e.Trials = None,
     split: e.Split = "dev",
     out: e.RunFolder = None,
     shard: e.Shard = None,
@@ -60,88 +66,44 @@ def run_suite(
     """Run a suite: successes of trials by category and setup, with intervals and the chance level.
 
     Several models, prompts and descriptors are run side by side. A killed run is gone on with by
-    naming its folder again. The split test shows scores only, and each look at it is written down.
+    naming its folder again. Tasks that cannot be pointed at in the mode, or have no recording
+    where one is replayed, are left out. The split test shows scores only, and each look at it is
+    written down.
     """
     workers = inputs.whole("--jobs", jobs, least=1)
-    paces = {name: n / workers for name, n in inputs.rates("--rate", rate, model or []).items()}
-    arms = _arms(method, model, prompt, descriptor, PromptLibrary(prompts), paces)
-    made = [arm.facts(base_url) for arm in arms]  # what cannot be asked is found before the work
-    count, limit = inputs.whole("--trials", trials, least=1), inputs.dollars("--budget", budget)
-    loaded = load_suite(suite, split)
-    folder, levels = out or _fresh(loaded.name), chances(loaded.tasks)
-    with ExitStack() as stack:
-        pictures = folder / PICTURES
-        if split == "test":
-            pictures = Path(stack.enter_context(TemporaryDirectory()))
-        hung = _hung(loaded, pictures)
-        sha256 = loaded.sha256({name: picture.pixels for name, picture in hung.items()})
-        planned = trials_of(sha256, loaded.tasks, made, count)
-        if split == "test":
-            _look(folder.parent, loaded.name, sha256, planned)
-        work = SuiteWork(
-            tasks={task.id: task for task in loaded.tasks},
-            pictures={name: picture.path for name, picture in hung.items()},
-            arms={_key(planned, i): arm for i, arm in enumerate(arms)},
-            base_url=base_url,
-            keep=None if split == "test" else _made(folder / ATTEMPTS),
-        )
-        keep_suite(_made(folder), loaded, split, sha256, hung, levels)
-        runs_on = executor("serial" if workers == 1 else "pool", workers)
-        done = sweep(planned, work, folder, executor=runs_on, budget_usd=limit, shard=shard)
-    _show(loaded, folder, planned, levels)
-    _end(done)
-
-
-def _end(done: Sweep) -> None:
-    """Exit code 4 where something stopped the run before its end."""
+    rates = {name: n / workers for name, n in inputs.rates("--rate", rate, model or []).items()}
+    common = Method(method, mode=mode_named(mode), planner=planner, base_url=base_url)
+    common = replace(common, library=PromptLibrary(prompts))
+    arms = _arms(common, model, prompt, descriptor, rates)
+    tries = trials or str(JITTERS if common.mode in JITTERED else 1)
+    count, limit = inputs.whole("--trials", tries, least=1), inputs.dollars("--budget", budget)
+    loaded = load_suite(suite, split, seeds)
+    tasks, folder = _tasks_tried(loaded, arms, task), out or _new_folder(loaded.name)
+    runs_on = executor("serial" if workers == 1 else "pool", workers)
+    how = {"executor": runs_on, "budget_usd": limit, "shard": shard}
+    done = _run_trials(loaded, tasks, arms, count, split, folder, how)
     if done.stopped is not None:
         print(f"formup: stopped: {done.stopped}", file=sys.stderr)  # noqa: T201
         raise typer.Exit(4)
 
 
-@app.command()
-def suites() -> None:
-    """The suites that ship with formup."""
-    table = Table(header_style="cyan", box=None)
-    for name in ("suite", "what it is"):
-        table.add_column(name, no_wrap=name == "suite")
-    for name in shipped():
-        table.add_row(name, described(name))
-    Console(highlight=False).print(table)
-
-
-@app.command()
-def add(folder: e.NewFolder, name: e.Name = None) -> None:
-    """Make a suite of a folder of pictures in the photos' format, once its tasks hold.
-
-    Of every task a right answer must score 1 and answers without understanding less.
-    """
-    path = write_suite(folder, name or folder.resolve().name)
-    try:
-        made = load_suite(str(path))
-        problems = [problem for task in made.tasks for problem in check_task(task)]
-        if problems:
-            more = f" (and {len(problems) - 5} more)" if len(problems) > 5 else ""
-            raise InputError(f"{' '.join(problems[:5])}{more}")
-    except InputError:
-        path.unlink()
-        raise
-    print(f"{path}: {len(made.tasks)} tasks. Run them: formup eval run {folder}")  # noqa: T201
-
-
 def _arms(
-    name: str,
+    common: Method,
     models: list[str] | None,
     prompts: list[str] | None,
     descriptors: list[str] | None,
-    library: PromptLibrary,
-    paces: Mapping[str, float],
+    rates: Mapping[str, float],
 ) -> list[Method]:
     """Every model with every prompt and descriptor."""
     return [
-        replace(
-            method(name, model, prompt, inputs.descriptor(descriptor), library),
-            rate=paces.get(model or ""),
+        check_method(
+            replace(
+                common,
+                model=model or "",
+                prompt=prompt,
+                descriptor=inputs.descriptor(descriptor),
+                rate=rates.get(model or ""),
+            )
         )
         for model in models or [None]
         for prompt in prompts or [None]
@@ -149,72 +111,93 @@ def _arms(
     ]
 
 
-def _hung(suite: Suite, folder: Path) -> dict[str, Hung]:
+def _run_trials(
+    suite: Suite,
+    tasks: Sequence[Task],
+    arms: Sequence[Method],
+    count: int,
+    split: str,
+    folder: Path,
+    how: dict[str, Any],
+) -> Sweep:
+    """Run so many trials of each of the tasks by every arm, and show what came of them."""
+    identities, levels = [arm.arm for arm in arms], chances(tasks)
+    attempts, held_out = folder / ATTEMPTS, split == "test"
+    with ExitStack() as stack:
+        place = stack.enter_context(TemporaryDirectory()) if held_out else folder / PICTURES
+        pictures = _render(suite, Path(place))
+        sha256 = suite.sha256({name: picture.pixels for name, picture in pictures.items()})
+        planned = trials_of(sha256, tasks, identities, count)
+        if held_out:
+            _note_look(folder.parent, suite.name, sha256, planned)
+        (folder if held_out else attempts).mkdir(parents=True, exist_ok=True)
+        work = SuiteWork(
+            tasks={task.id: task for task in tasks},
+            pictures={name: picture.path for name, picture in pictures.items()},
+            arms={trial.arm.name: arm for trial, arm in zip(planned, arms, strict=False)},
+            attempts=None if held_out else attempts,
+        )
+        store_suite(folder, suite, split, sha256, pictures, levels)
+        done = sweep(planned, work, folder, **how)
+    _print_summary(suite, folder, planned, levels)
+    return done
+
+
+def _tasks_tried(suite: Suite, arms: Sequence[Method], names: list[str] | None) -> list[Task]:
+    """The tasks that are tried: those named, or all, as far as every arm takes them.
+
+    Raises:
+        InputError: there is none of a name, or none is left.
+    """
+    known = {task.id: task for task in suite.tasks}
+    for name in names or ():
+        if name not in known:
+            raise InputError(f"Unknown task {name!r}. There are: {', '.join(known)}.")
+    wanted = [known[name] for name in dict.fromkeys(names or known)]
+    chosen = [task for task in wanted if all(arm.takes(task) for arm in arms)]
+    if not chosen:
+        raise InputError("No task is left: none has a recording here, or is about one thing alone.")
+    return chosen
+
+
+def _render(suite: Suite, folder: Path) -> dict[str, RenderedPicture]:
     with Progress(console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("pictures", total=len(suite.tasks))
-        return hang(suite.tasks, folder, lambda: progress.advance(bar))
+        return render(suite.tasks, folder, lambda: progress.advance(bar))
 
 
-def _look(folder: Path, suite: str, sha256: str, trials: Sequence[Trial]) -> None:
-    arms = sorted({Arm.of(trial).name for trial in trials})
+def _note_look(folder: Path, suite: str, sha256: str, trials: Sequence[Trial]) -> None:
+    arms = sorted({trial.arm.name for trial in trials})
     count = look(folder, suite, sha256, arms)
     text = f"formup: look {count} at the test split of {suite}, written down in {folder / LEDGER}."
     print(text, file=sys.stderr)  # noqa: T201
 
 
-def _key(trials: Sequence[Trial], arm: int) -> str:
-    """Of the arm of that number: the trials of one task begin with all of them, in order."""
-    return arm_key(trials[arm])
-
-
-def _made(folder: Path) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
-def _fresh(suite: str) -> Path:
+def _new_folder(suite: str) -> Path:
     return RUNS / f"{suite}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
 
 
-def _show(suite: Suite, folder: Path, planned: Sequence[Trial], levels: dict[str, Chance]) -> None:
-    """A table of each arm, and all of them as JSON."""
+def _print_summary(
+    suite: Suite, folder: Path, planned: Sequence[Trial], levels: dict[str, Chance]
+) -> None:
+    """Tables of each arm, and all of them as JSON."""
     keys = {trial.key for trial in planned}
     rows = [row for row in read_rows(folder) if row.key in keys]
     summary = dict[str, object]()
-    for arm in sorted({Arm.of(row).name for row in rows}):
-        found = cells([row for row in rows if Arm.of(row).name == arm], levels)
+    for arm in sorted({row.arm.name for row in rows}):
+        own = [row for row in rows if row.arm.name == arm]
+        found = cells(own, levels)
         summary[arm] = [asdict(cell) for cell in found]
-        _print(f"{suite.name}, {arm}", found)
+        print_scores(f"{suite.name}, {arm}", found)
+        if own[0].arm.model != "none":
+            print_placed(found)
+            print_spent(own)
+            print_misses(own)
     content = {"suite": suite.name, "sha256": planned[0].suite, "arms": summary}
     write_whole(folder / SUMMARY, json.dumps(content, indent=1).encode())
     Console(highlight=False, soft_wrap=True).print(
-        "Success: k of n trials; the intervals are of these tasks alone. Thing: it was the one "
-        "meant, of those known. Chance: the best of five policies that know where the thing is and "
-        f"nothing else.\n{folder}\n"
+        "Success: k of n trials; the intervals are of these tasks alone. Right thing: it was the "
+        "one meant, of those known. Chance: the best of five policies that know where the thing is "
+        f"and nothing else.\n{folder}\n"
         f"To look at it: formup eval report {folder}"
     )
-
-
-COLUMNS = ("success", "95 %", "GCR", "strict", "thing", "chance SR", "chance GCR")
-
-
-def _print(title: str, found: Sequence[Cell]) -> None:
-    table = Table(title=title, header_style="cyan", box=None)
-    extra = [n for n in ("invalid", "lost") if any(getattr(cell, n) for cell in found)]
-    for name in ("", *COLUMNS, *extra):
-        table.add_column(name, justify="right" if name else "left", no_wrap=True)
-    for cell in found:
-        right, known = cell.right_thing
-        low, high = cell.interval
-        table.add_row(
-            cell.name,
-            f"{cell.passed}/{cell.scored}",
-            f"{low:.2f}-{high:.2f}",
-            f"{cell.gcr:.2f}",
-            f"{cell.strict}/{cell.scored}",
-            f"{right}/{known}" if known else "-",
-            f"{cell.chance.sr:.2f}",
-            f"{cell.chance.gcr:.2f}",
-            *(str(getattr(cell, name)) for name in extra),
-        )
-    Console(highlight=False).print(table)

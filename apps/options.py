@@ -145,26 +145,6 @@ Arguments = Annotated[str, typer.Option("--args", help="The tool's arguments as 
 StateFile = Annotated[Path | None, typer.Option("--state", help="Keeps the scene between calls.")]
 PlanFile = Annotated[Path, typer.Argument(help="A plan.json that formup wrote.")]
 PictureFile = Annotated[Path | None, typer.Option("--image", help="The picture to work on.")]
-DataFolder = Annotated[
-    Path | None, typer.Option("--data", help="Photographs in the format of evals/photos.")
-]
-TaskList = Annotated[list[str] | None, typer.Option("--task", help="Only this task; repeatable.")]
-Alone = Annotated[
-    bool,
-    typer.Option("--alone", help="No tools: the model writes the coordinates in its one reply."),
-]
-RecordFolder = Annotated[
-    Path | None, typer.Option("--record", help="Keep a trace of every task here.")
-]
-Mode = Annotated[
-    str, typer.Option("--mode", help="How to point: truth, outline, box, point or words.")
-]
-JsonFile = Annotated[Path | None, typer.Option("--out", help="Where to write the rows as JSON.")]
-Seeds = Annotated[str, typer.Option("--seeds", help="Jitters of every task.")]
-SceneSeeds = Annotated[str, typer.Option("--seeds", help="First and last seed: 0-199.")]
-KeepFolder = Annotated[
-    Path | None, typer.Option("--keep", help="Keep pictures and annotations.json here.")
-]
 OldRun = Annotated[Path, typer.Argument(metavar="A", help="Folder of trials: the baseline.")]
 NewRun = Annotated[Path, typer.Argument(metavar="B", help="Folder of trials: the new version.")]
 OldArm = Annotated[

@@ -19,7 +19,8 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from ..evals.tasks.photographs import load_tasks
+from ..evals.tasks.annotations import PHOTOS
+from ..evals.tasks.suites import load_suite
 from ..tools.builtin import TOOLS
 from ..tools.context import Context, Services
 from ..tools.geometry.outline import FloatArray, distances, outline_of
@@ -88,14 +89,14 @@ def _anew(context: Context) -> Context:
 
 def _with_targets(size: tuple[int, int]) -> Context:
     """The two cars at a width and height, px, the red one segmented as t1, the other as t2."""
-    task = next(t for t in load_tasks() if t.image.stem == "cars_two" and t.other)
-    photo = load_picture(task.image)
+    path = PHOTOS / "images" / "cars_two.jpg"
+    task = next(t for t in load_suite("photos").tasks if t.picture == path and len(t.things) == 2)
+    photo = load_picture(path)
     scale = np.array(size) / (photo.width, photo.height)
     context = Context.of(
         picture_from_array(np.asarray(cv2.resize(photo.pixels, size), dtype=np.uint8))
     )
-    assert task.other is not None
-    for name, thing in (("t1", task.target), ("t2", task.other)):
+    for name, thing in zip(("t1", "t2"), task.things, strict=True):
         box = np.asarray(thing.outline.bounds) * np.tile(scale, 2)
         context = _after(context, "segment", {"id": name, "box": box.tolist()})
     pointed = TargetPrompt(id="t3", box=context.world.target("t1").box)  # for locate_object

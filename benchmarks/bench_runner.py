@@ -14,9 +14,10 @@ from pathlib import Path
 
 from ..evals.experiments.executors import Executor, Pool, Serial
 from ..evals.experiments.runner import run_trials
-from ..evals.experiments.trials import Trial, TrialRow
+from ..evals.experiments.trials import Arm, Trial, TrialRow
 
 TASKS, TRIES = 150, 10
+COIN = Arm(method="coin", model="offline")
 INSPECT = Path(__file__).parent / "loop" / "peers" / "trials_inspect.py"
 """In a checkout alone."""
 
@@ -36,7 +37,7 @@ def trivial(trial: Trial) -> TrialRow:
 def trials() -> list[Trial]:
     """All tries of all tasks, in one arm."""
     return [
-        Trial(suite="0" * 64, task=f"task-{n:03d}", trial=number, method="coin", model="offline")
+        Trial(suite="0" * 64, task=f"task-{n:03d}", trial=number, arm=COIN)
         for n in range(TASKS)
         for number in range(TRIES)
     ]
@@ -58,7 +59,7 @@ def main() -> None:
             check=True,
         )
         for name, cpu, wall in json.loads(done.stdout.splitlines()[-1]):
-            _print(name, cpu, wall)
+            _print_row(name, cpu, wall)
 
 
 def _ours(name: str, executor: Executor) -> None:
@@ -68,10 +69,10 @@ def _ours(name: str, executor: Executor) -> None:
         cpu, wall = time.process_time(), time.perf_counter()
         run_trials(planned, trivial, Path(folder), executor=executor)
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
-    _print(name, cpu - _inside[0], wall)
+    _print_row(name, cpu - _inside[0], wall)
 
 
-def _print(name: str, cpu: float, wall: float) -> None:
+def _print_row(name: str, cpu: float, wall: float) -> None:
     each = 1000 * cpu / (TASKS * TRIES)
     print(f"{name:24} {cpu:8.2f} {wall:8.2f} {each:15.2f}")  # noqa: T201
 

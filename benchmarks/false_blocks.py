@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..evals.experiments.gate import Paired, gate
-from ..evals.statistics.intervals import Interval, wilson
-from ..evals.statistics.power import TASK_SD, rates
+from ..evals.statistics.intervals import ICC, Interval, wilson
+from ..tools.geometry.outline import FloatArray
 
 COMPARISONS = 2000
 SIZES = ((15, 2), (15, 10), (30, 10), (60, 10), (150, 10))
 """Tasks and trials of each."""
+MEAN, TASK_SD = 0.7, 0.05
+"""Success rate of the first version, and the spread of a version's effect between tasks."""
 INVALID = 0.02
 TOKENS, TOKENS_SD = 3000.0, 0.1
 """Mean tokens of a trial, and the relative spread of a task's mean."""
@@ -68,6 +70,12 @@ def simulate(
     return Blocked(tasks, trials, regression, blocked, passed, comparisons)
 
 
+def rates(random: np.random.Generator, shape: tuple[int, ...], mean: float = MEAN) -> FloatArray:
+    """Success rates of tasks, from the beta distribution of that mean and the ICC."""
+    weight = 1 / ICC - 1
+    return random.beta(mean * weight, (1 - mean) * weight, shape)
+
+
 def _versions(
     random: np.random.Generator, tasks: int, trials: int, regression: float, task_sd: float
 ) -> Paired:
@@ -102,11 +110,11 @@ def planted(
     none, all_right = np.zeros((2, tasks)), np.ones(tasks)
     verdicts = list[str]()
     for _ in range(comparisons):
-        kept = 1 - random.binomial(trials, share, tasks) / trials
+        still = 1 - random.binomial(trials, share, tasks) / trials
         paired = Paired(
             tasks=tuple(map(str, range(tasks))),
             pairs=np.full(tasks, float(trials)),
-            score=np.stack([all_right, kept]),
+            score=np.stack([all_right, still]),
             invalid=none,
             tokens=none + TOKENS,
             must_pass=np.zeros(tasks, dtype=bool),
@@ -122,19 +130,19 @@ def main() -> None:
     rows = [simulate(tasks, trials) for tasks, trials in SIZES]
     uneven = [simulate(*SIZES[-1], task_sd=TASK_SD), simulate(15, 10, task_sd=TASK_SD)]
     print(f"{COMPARISONS:,} comparisons each; blocks with Wilson's interval at 95 %\n")  # noqa: T201
-    _print("equal on every task", rows)
-    _print(f"equal on average, tasks differ by {TASK_SD:g}", uneven)
+    _print_rates("equal on every task", rows)
+    _print_rates(f"equal on average, tasks differ by {TASK_SD:g}", uneven)
     lost = [simulate(tasks, trials, REGRESSION) for tasks, trials in SIZES]
-    _print(f"{100 * REGRESSION:.0f} points worse on every task", lost)
+    _print_rates(f"{100 * REGRESSION:.0f} points worse on every task", lost)
     worse = [planted(tasks, trials, REGRESSION) for tasks, trials in PLANTED]
-    _print(
+    _print_rates(
         f"a lapse in {REGRESSION:.0%} of the trials of a version that else always succeeds", worse
     )
     print(f"{time.perf_counter() - began:.1f} s")  # noqa: T201
     sys.exit(int(any(row.interval.low > 0.05 for row in [*rows, *uneven])))
 
 
-def _print(title: str, rows: list[Blocked]) -> None:
+def _print_rates(title: str, rows: list[Blocked]) -> None:
     print(title)  # noqa: T201
     for row in rows:
         low, high = row.interval

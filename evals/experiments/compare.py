@@ -23,18 +23,15 @@ from ..statistics.intervals import (
 )
 from ..statistics.power import Needed, Spread, needed, spread
 from .comparison import (
-    Bounded,
     Comparison,
     Difference,
     Metric,
     Outcome,
     Range,
     Score,
-    Settled,
 )
 from .gate import MARGIN, Gated, Paired, gate
-from .journal import Arm
-from .trials import TrialRow
+from .trials import Arm, TrialRow
 
 SLICES = ("category", "setup")
 RELIABILITY = (1, 4, 8)
@@ -85,7 +82,7 @@ def compare(
         )
     tasks = _pairs(a, b, metric)
     judged = gate(_paired(tasks), margin, _unfinished(a, b), _called(metric))
-    overall = _difference(tasks, metric, margin)
+    overall = _difference_of(tasks, metric, margin)
     slices = _slices(tasks, metric, margin)
     count = sum(len(pairs.rows) for pairs in tasks.values())
     return Comparison(
@@ -97,8 +94,8 @@ def compare(
         verdict=judged.verdict,
         reasons=judged.reasons,
         outcome=overall.outcome,
-        success=Bounded.model_validate(judged.success._asdict()),
-        invalid=Bounded.model_validate(judged.invalid._asdict()),
+        success=judged.success,
+        invalid=judged.invalid,
         tokens=judged.tokens,
         overall=overall,
         slices=slices,
@@ -113,7 +110,7 @@ def only_arm(rows: Iterable[TrialRow]) -> Arm:
     Raises:
         InputError: there are none or several; the text names them.
     """
-    arms = {Arm.of(row).name: Arm.of(row) for row in rows}
+    arms = {row.arm.name: row.arm for row in rows}
     if len(arms) == 1:
         return next(iter(arms.values()))
     if not arms:
@@ -156,7 +153,7 @@ def _paired(tasks: dict[str, _Pairs]) -> Paired:
         pairs=np.array([float(len(pairs.rows)) for pairs in every]),
         score=np.array([pairs.scores.mean(axis=1) for pairs in every]).T,
         invalid=np.array([pairs.means(_is_invalid) for pairs in every]).T,
-        tokens=np.array([pairs.means(_tokens) for pairs in every]).T,
+        tokens=np.array([pairs.means(_row_tokens) for pairs in every]).T,
         must_pass=np.array([any(new.must_pass for _, new in pairs.rows) for pairs in every]),
     )
 
@@ -165,7 +162,7 @@ def _is_invalid(row: TrialRow) -> float:
     return float(row.status == "model_invalid")
 
 
-def _tokens(row: TrialRow) -> float:
+def _row_tokens(row: TrialRow) -> float:
     return float(row.input_tokens + row.output_tokens)
 
 
@@ -185,7 +182,7 @@ def _unfinished(a: Sequence[TrialRow], b: Sequence[TrialRow]) -> list[str]:
     return found
 
 
-def _difference(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Difference:
+def _difference_of(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Difference:
     differences = [pairs.differences for pairs in tasks.values()]
     means = np.array([d.mean() for d in differences])
     counts = np.array([float(len(d)) for d in differences])
@@ -193,7 +190,7 @@ def _difference(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Diff
     interval = paired_t(means, 0.95, least_error(counts.sum()))
     seen = spread(differences)
     weighted = np.concatenate([d / (len(d) * len(differences)) for d in differences])
-    outcome = _outcome(estimate, p, interval)
+    outcome = _outcome_of(estimate, p, interval)
     return Difference(
         tasks=len(means),
         pairs=int(counts.sum()),
@@ -206,13 +203,11 @@ def _difference(tasks: dict[str, _Pairs], metric: Metric, margin: float) -> Diff
         fixed_tasks=_fixed(estimate, seen),
         fixed_p=sign_flips(weighted),
         outcome=outcome,
-        settled_by=_settled(needed(seen, max(abs(estimate), margin)))
-        if outcome == "inconclusive"
-        else None,
+        settled_by=needed(seen, max(abs(estimate), margin)) if outcome == "inconclusive" else None,
     )
 
 
-def _outcome(estimate: float, p: float, interval: Interval) -> Outcome:
+def _outcome_of(estimate: float, p: float, interval: Interval) -> Outcome:
     if p >= ALPHA or interval.low <= 0 <= interval.high:
         return "inconclusive"
     return "better" if estimate > 0 else "worse"
@@ -257,7 +252,7 @@ def _slices(
         named = {task: str(getattr(pairs.rows[0][1], kind)) for task, pairs in tasks.items()}
         for value in sorted(set(named.values()) - {""}):
             chosen = {task: pairs for task, pairs in tasks.items() if named[task] == value}
-            found[kind, value] = _difference(chosen, metric, margin)
+            found[kind, value] = _difference_of(chosen, metric, margin)
     adjusted = holm([difference.p for difference in found.values()])
     slices: dict[str, dict[str, Difference]] = {}
     for ((kind, value), difference), p in zip(found.items(), adjusted, strict=True):
@@ -267,17 +262,13 @@ def _slices(
     return slices
 
 
-def _gate_settled(judged: Gated, tasks: dict[str, _Pairs], margin: float) -> Settled | None:
+def _gate_settled(judged: Gated, tasks: dict[str, _Pairs], margin: float) -> Needed | None:
     """What would tell the success from the margin, if it is that which is open."""
     low, high = judged.success.low, judged.success.high
     if judged.verdict != "inconclusive" or low > -margin or high < -margin:
         return None
     seen = spread([pairs.differences for pairs in tasks.values()])
-    return _settled(needed(seen, abs(judged.success.estimate + margin), one_sided=True))
-
-
-def _settled(found: Needed) -> Settled:
-    return Settled(difference=found.difference, trials=found.trials, tasks=found.tasks)
+    return needed(seen, abs(judged.success.estimate + margin), one_sided=True)
 
 
 def _called(metric: Metric) -> str:

@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, PlainSerializer
 
 from ..statistics.intervals import Interval
-from .gate import Verdict
-from .journal import Arm
+from ..statistics.power import Needed
+from .gate import Rise, Verdict
+from .trials import Arm
 
 Metric = Literal["sr", "strict", "gcr"]
 Outcome = Literal["better", "worse", "inconclusive"]
@@ -47,18 +48,6 @@ class Score(_Value):
     pass_k: dict[int, Rounded]
 
 
-class Settled(_Value):
-    """What would settle it: `trials` of each task, or `tasks` of as many trials as now.
-
-    Attributes:
-        difference: that is then told with power .8, as a share.
-    """
-
-    difference: Rounded
-    trials: int | None
-    tasks: int | None
-
-
 class Difference(_Value):
     """The new version minus the old, on some of the tasks.
 
@@ -79,15 +68,7 @@ class Difference(_Value):
     fixed_tasks: Range | None
     fixed_p: Rounded
     outcome: Outcome
-    settled_by: Settled | None
-
-
-class Bounded(_Value):
-    """A rise and its one-sided bounds at 95 %."""
-
-    estimate: Rounded
-    low: Rounded
-    high: Rounded
+    settled_by: Needed | None
 
 
 class Comparison(_Value):
@@ -110,10 +91,10 @@ class Comparison(_Value):
     verdict: Verdict
     reasons: tuple[str, ...]
     outcome: Outcome
-    success: Bounded
-    invalid: Bounded
+    success: Rise
+    invalid: Rise
     tokens: Rounded | None
     overall: Difference
     slices: dict[str, dict[str, Difference]]
     unpaired: tuple[int, int]
-    settled_by: Settled | None
+    settled_by: Needed | None

@@ -1,12 +1,13 @@
 """How many tokens the three descriptors of a shape cost a model, on the same shapes.
 
 The paper compares edges, edges with vertices, and a binary matrix (its Table III); here the things
-are those of the shipped photographs, each by its true outline.
+are those that a suite's tasks are about, each by its true outline.
 """
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
 from typing import get_args
 
@@ -14,7 +15,7 @@ from ...tools.builtin import TOOLS
 from ...tools.context import Context, Descriptor
 from ...tools.perception.image import load_picture
 from ...tools.world import Target, World
-from ..tasks.photographs import Task
+from ..tasks.task import Task, Thing
 from .tokens import text_tokens
 
 
@@ -32,26 +33,34 @@ class DescriptorCost:
     overhead: float
 
 
-def descriptor_costs(tasks: Iterable[Task]) -> list[DescriptorCost]:
-    """The cost of each descriptor over the things that tasks are about, each thing once."""
-    things = {(t.image, t.target.id): t for t in tasks}
-    counts = {d: [_tokens(t, d) for t in things.values()] for d in get_args(Descriptor)}
+def descriptor_costs(tasks: Iterable[Task], pictures: Mapping[str, Path]) -> list[DescriptorCost]:
+    """The cost of each descriptor over the things that tasks are about, each thing once.
+
+    Args:
+        tasks: of a suite.
+        pictures: file of each, by the task's id.
+    """
+    things = {(pictures[task.id], t.id): t for task in tasks for t in task.things}
+    counts = {
+        d: [_described_tokens(path, thing, d) for (path, _), thing in things.items()]
+        for d in get_args(Descriptor)
+    }
     least = sum(counts["edges"])
     return [DescriptorCost(d, median(n), max(n), sum(n) / least - 1) for d, n in counts.items()]
 
 
-def _tokens(task: Task, descriptor: str) -> int:
-    outline = task.target.outline
+def _described_tokens(picture: Path, thing: Thing, descriptor: str) -> int:
+    outline = thing.outline
     target = Target(
         id="t1",
-        label=task.target.name,
+        label=thing.name,
         box=outline.bounds,
         confidence=1.0,
         outline=outline,
         prompt="truth",
     )
-    picture = load_picture(task.image)
-    context = Context.of(picture, world=World.of(picture, targets=(target,)))
+    shown = load_picture(picture)
+    context = Context.of(shown, world=World.of(shown, targets=(target,)))
     describe = next(tool for tool in TOOLS if tool.name == "describe_shape")
     made = asyncio.run(describe.call(context, {"target": "t1", "descriptor": descriptor}))
     return text_tokens(made.text)

@@ -40,8 +40,8 @@ class Executor(Protocol):
         """Take on a trial."""
         ...
 
-    def collect(self, timeout: float | None) -> list[TrialRow]:
-        """Rows that are done; waits up to `timeout` seconds for the first, None for ever."""
+    def collect(self) -> list[TrialRow]:
+        """Rows that are done; waits for the first."""
         ...
 
     def close(self) -> None:
@@ -81,7 +81,7 @@ class Serial:
         """Take on a trial."""
         self._waiting.append(trial)
 
-    def collect(self, timeout: float | None) -> list[TrialRow]:
+    def collect(self) -> list[TrialRow]:
         """Run what was submitted."""
         waiting, self._waiting = self._waiting, []
         return [attempt(self._work, trial) for trial in waiting]
@@ -122,13 +122,13 @@ class Pool:
         except BrokenProcessPool:
             raise _died() from None
 
-    def collect(self, timeout: float | None) -> list[TrialRow]:
+    def collect(self) -> list[TrialRow]:
         """What is done.
 
         Raises:
             FormupError: a process of the pool died.
         """
-        done, self._running = wait(self._running, timeout, FIRST_COMPLETED)
+        done, self._running = wait(self._running, return_when=FIRST_COMPLETED)
         try:
             return [future.result() for future in done]
         except BrokenProcessPool:
@@ -177,11 +177,9 @@ class Ray:
         """Hand a trial to the cluster."""
         self._running.append(self._attempt.remote(self._work, trial))
 
-    def collect(self, timeout: float | None) -> list[TrialRow]:
+    def collect(self) -> list[TrialRow]:
         """What is done."""
-        done, self._running = self._ray.wait(
-            self._running, num_returns=1, timeout=timeout, fetch_local=True
-        )
+        done, self._running = self._ray.wait(self._running, num_returns=1, fetch_local=True)
         return list(self._ray.get(done))
 
     def close(self) -> None:

@@ -7,13 +7,13 @@ the invalid output and the tokens alike, so that versions that are equal are har
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...tools.geometry.outline import FloatArray
-from ..statistics.intervals import TINY, Interval, least_error, paired_t
+from ..statistics.intervals import TINY, least_error, paired_t
 
 MARGIN = 0.05
 """Loss of success that is tolerated: a share, 5 points."""
@@ -50,12 +50,20 @@ class Paired:
     must_pass: NDArray[np.bool_]
 
 
-class Rise(NamedTuple):
+@dataclass(frozen=True)
+class Rise:
     """New minus old: the estimate and its one-sided bounds at 95 %."""
 
     estimate: float
     low: float
     high: float
+
+    @property
+    def words(self) -> str:
+        """The same in points."""
+        values = (self.estimate, self.low, self.high)
+        estimate, low, high = (f"{round(100 * value, 1) + 0.0:+.1f}" for value in values)
+        return f"{estimate} points, bounds {low} and {high}"
 
 
 @dataclass(frozen=True)
@@ -87,12 +95,12 @@ def gate(
     """
     least = least_error(float(paired.pairs.sum()))
     success, invalid = _rise(paired.score, least), _rise(paired.invalid, least)
-    tokens, dearer = _tokens(paired)
+    tokens, dearer = _token_rise(paired)
     blocks, doubts = list[str](), list[str]()
     if success.high < -margin:
-        blocks.append(f"{scale} falls by more than {_points(margin)}: {_bounds(success)}")
+        blocks.append(f"{scale} falls by more than {_in_points(margin)}: {success.words}")
     elif not success.low > -margin:
-        doubts.append(f"{scale} may fall by more than {_points(margin)}: {_bounds(success)}")
+        doubts.append(f"{scale} may fall by more than {_in_points(margin)}: {success.words}")
     failing = paired.must_pass & (paired.score[1] < MUST_PASS) & (paired.score[0] >= MUST_PASS)
     if failing.any():
         names = [name for name, fails in zip(paired.tasks, failing, strict=True) if fails]
@@ -100,7 +108,7 @@ def gate(
         blocks.append(f"below 9 of 10 on what must pass: {', '.join(names[:NAMED])}{more}")
     if invalid.estimate > INVALID_MARGIN + TINY:
         shown = invalid.low > INVALID_MARGIN
-        text = f"invalid output rises by more than {_points(INVALID_MARGIN)}: {_bounds(invalid)}"
+        text = f"invalid output rises by more than {_in_points(INVALID_MARGIN)}: {invalid.words}"
         (blocks if shown else doubts).append(text if shown else f"perhaps {text}")
     if tokens is not None and tokens > TOKENS_MARGIN and not success.low > 0:
         text = f"tokens rise by {100 * tokens:.0f} % without a gain that is shown"
@@ -114,11 +122,11 @@ def gate(
 def _rise(values: FloatArray, least: float) -> Rise:
     """Of shares, (2, T)."""
     differences = values[1] - values[0]
-    bounds = _within(paired_t(differences, ONE_SIDED, least))
-    return Rise(float(differences.mean()), *bounds)
+    found = paired_t(differences, ONE_SIDED, least)
+    return Rise(float(differences.mean()), max(-1.0, found.low), min(1.0, found.high))
 
 
-def _tokens(paired: Paired) -> tuple[float | None, bool]:
+def _token_rise(paired: Paired) -> tuple[float | None, bool]:
     """The rise of the tokens, and whether it is shown to be above the margin."""
     before, after = paired.tokens
     if before.sum() < TINY:
@@ -127,14 +135,5 @@ def _tokens(paired: Paired) -> tuple[float | None, bool]:
     return rise, paired_t(after - (1 + TOKENS_MARGIN) * before, ONE_SIDED).low > 0
 
 
-def _within(interval: Interval) -> Interval:
-    return Interval(max(-1.0, interval.low), min(1.0, interval.high))
-
-
-def _points(share: float) -> str:
+def _in_points(share: float) -> str:
     return f"{100 * share:g} points"
-
-
-def _bounds(rise: Rise) -> str:
-    estimate, low, high = (f"{round(100 * value, 1) + 0.0:+.1f}" for value in rise)
-    return f"{estimate} points, bounds {low} and {high}"

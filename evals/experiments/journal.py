@@ -17,43 +17,9 @@ from ...prompts.files import lock
 from ...tools.errors import InputError
 from ...tools.store import write_whole
 from ...tools.tool import violations
-from .trials import Name, Sha, Trial, TrialRow, canonical
+from .trials import Arm, Sha, Trial, TrialRow, canonical
 
-USUAL = "edges"
-"""The descriptor that goes without saying."""
 ROWS, MANIFEST, LOCK = "trials.jsonl", "manifest.json", ".lock"
-
-
-class Arm(BaseModel):
-    """What is compared: a method with its prompt, tools, model and descriptor of shapes."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    method: Name
-    prompt: Name | None
-    sha256: Sha | None
-    tools: Sha | None
-    model: Name
-    descriptor: Name | None = None
-
-    @classmethod
-    def of(cls, trial: Trial) -> Self:
-        """The arm a trial belongs to."""
-        return cls(
-            method=trial.method,
-            prompt=trial.prompt,
-            sha256=trial.prompt_sha,
-            tools=trial.tools_sha,
-            model=trial.model,
-            descriptor=trial.descriptor,
-        )
-
-    @property
-    def name(self) -> str:
-        """Method, prompt with the beginning of its hash, model, descriptor if not the usual one."""
-        told = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
-        shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
-        return f"{self.method}{told} {self.model}{shapes}"
 
 
 class Manifest(BaseModel):
@@ -75,8 +41,7 @@ class Manifest(BaseModel):
         suites, arms = set[str](), dict[bytes, Arm]()
         for trial in trials:
             suites.add(trial.suite)
-            arm = Arm.of(trial)
-            arms[canonical(arm.model_dump())] = arm
+            arms[canonical(trial.arm.model_dump())] = trial.arm
         if len(suites) != 1:
             raise InputError(f"Trials of {len(suites)} suites cannot be one run; give one suite.")
         ordered = tuple(arms[name] for name in sorted(arms))
@@ -235,7 +200,7 @@ def merge(shards: Sequence[Path], into: Path) -> int:
         manifest = read_manifest(shards[0])
         for folder in shards[1:]:
             manifest = manifest.joined(read_manifest(folder), folder)
-        kept = list[TrialRow]()
+        merged = list[TrialRow]()
         done = dict[str, TrialRow]()
         for row in (row for folder in shards for row in all_rows(folder)):
             before = done.get(row.key)
@@ -247,14 +212,14 @@ def merge(shards: Sequence[Path], into: Path) -> int:
             if row.scored:
                 done[row.key] = row
             if before is None:
-                kept.append(row)
+                merged.append(row)
         stack.enter_context(held(into))
         if (into / ROWS).exists():
             raise InputError(f"{into} has trials already; merge into a new folder.")
-        kept.sort(key=lambda row: (row.order, row.scored))
+        merged.sort(key=lambda row: (row.order, row.scored))
         write_whole(into / MANIFEST, manifest.model_dump_json(indent=1).encode())
-        write_whole(into / ROWS, b"".join(row.line for row in kept))
-    return len({row.key for row in kept})
+        write_whole(into / ROWS, b"".join(row.line for row in merged))
+    return len({row.key for row in merged})
 
 
 @contextmanager

@@ -45,15 +45,17 @@ def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
     Raises:
         InputError: it is no such report, is about other texts, or did not pass; all that is wrong.
     """
-    report = _read(path)
+    report = _read_comparison(path)
     sides = (("a", report.a, current, "current"), ("b", report.b, promoted, "promoted"))
     wrong: list[str] = []
     for name, side, prompt, role in sides:
         if side.prompt != prompt.name:
             wrong.append(f"its {name} is {side.prompt}, not {prompt.name}, the {role} version")
         elif side.sha256 != prompt.sha256:
-            said, is_ = side.sha256[:12], prompt.sha256[:12]
-            wrong.append(f"its {name} is another text of {prompt.name} ({said}, not {is_})")
+            reported, current_sha = side.sha256[:12], prompt.sha256[:12]
+            wrong.append(
+                f"its {name} is another text of {prompt.name} ({reported}, not {current_sha})"
+            )
     if report.verdict != "pass":
         wrong.append(f"its verdict is {report.verdict!r}, not 'pass'")
     if wrong:
@@ -64,7 +66,7 @@ def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
     return f"passed on {report.suite} against {current.name}"
 
 
-def _read(path: Path) -> Comparison:
+def _read_comparison(path: Path) -> Comparison:
     try:
         return Comparison.model_validate(json.loads(read_text(path)))
     except ValidationError as error:

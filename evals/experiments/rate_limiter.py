@@ -1,6 +1,6 @@
 """Requests to a model no faster than its provider allows.
 
-Each process keeps its own pace, so that a sweep divides what is allowed among its processes.
+Each process has its own limit, so that a sweep divides what is allowed among its processes.
 """
 
 import asyncio
@@ -13,7 +13,7 @@ from ...agent.messages import Reply
 from ...agent.model import Model, Request
 
 
-class Pace:
+class RateLimiter:
     """Turns that are a fixed time apart.
 
     Args:
@@ -38,16 +38,16 @@ class Pace:
 
 
 @lru_cache
-def pace_of(model: str, per_minute: float) -> Pace:
-    """The pace of a model in this process, the same one for all trials."""
-    return Pace(per_minute)
+def rate_limiter(model: str, per_minute: float) -> RateLimiter:
+    """The rate limiter of a model in this process, the same one for all trials."""
+    return RateLimiter(per_minute)
 
 
-class Paced:
+class RateLimited:
     """A model that waits for its turn before each reply; all else of it stays its own."""
 
-    def __init__(self, model: Model, pace: Pace) -> None:
-        self._model, self._pace = model, pace
+    def __init__(self, model: Model, limiter: RateLimiter) -> None:
+        self._model, self._limiter = model, limiter
 
     @property
     def name(self) -> str:
@@ -56,7 +56,7 @@ class Paced:
 
     async def reply(self, request: Request) -> Reply:
         """The model's, in its turn."""
-        await asyncio.sleep(self._pace.wait(time.monotonic()))
+        await asyncio.sleep(self._limiter.wait(time.monotonic()))
         return await self._model.reply(request)
 
     def __getattr__(self, name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Runs the trials of a sweep that its folder does not hold yet, within a budget and rate limits.
+"""Runs the trials of a sweep that its folder does not hold yet, within a budget.
 
 A trial is named by its key; a killed run is gone on with by running it again. Order: every task
 gets its first trial in every arm before any gets its second, arms side by side, so that a sweep
@@ -6,15 +6,14 @@ that stops is balanced and a model that drifts drifts under all arms alike.
 """
 
 import re
-import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ...tools.errors import InputError
 from .executors import Executor, Serial, Work
-from .journal import Arm, Journal, Manifest
+from .journal import Journal, Manifest
 from .trials import Trial, TrialRow
 
 IN_A_ROW = 10
@@ -48,7 +47,6 @@ def run_trials(
     *,
     executor: Executor | None = None,
     budget_usd: float | None = None,
-    rate: Mapping[str, float] | None = None,
     shard: str | None = None,
     done: Callable[[Progress], None] = lambda progress: None,
 ) -> Sweep:
@@ -60,9 +58,8 @@ def run_trials(
         executor: Serial by default.
         budget_usd: over all rows of the folder. No trial starts that could exceed it if it cost
             what the dearest of its model did; the first of a model runs alone.
-        rate: trials begun per minute, by model; none stands for no limit.
         shard: i/n runs the i-th of n parts, 1/n to n/n.
-        done: told at the start and after every row.
+        done: called at the start and after every row.
 
     Raises:
         InputError: several suites or trials of one key, a folder of another suite or in use.
@@ -70,17 +67,17 @@ def run_trials(
     manifest, mine = Manifest.of(trials), part(balanced(trials), shard)
     if budget_usd is not None and not budget_usd > 0:
         raise InputError(f"A budget of {budget_usd:g} USD buys nothing; give one above 0.")
-    queue = Queue(rate or {})
+    waiting = deque[Trial]()
     with Journal(folder, manifest) as journal:
-        run = _Run(queue, journal, _Purse(budget_usd, journal.rows.values()), len(mine), done)
+        run = _Run(waiting, journal, _Budget(budget_usd, journal.rows.values()), len(mine), done)
         for trial in mine:
             row = journal.rows.get(trial.key)
             if row is not None and row.scored:
                 run.scored += 1
             else:
-                queue.add(trial)
-        run.tell(None)
-        if queue:
+                waiting.append(trial)
+        run.report(None)
+        if waiting:
             runs_on = executor or Serial()
             runs_on.start(work)
             try:
@@ -108,7 +105,7 @@ def balanced(trials: Iterable[Trial]) -> list[Trial]:
     ordered = list[Trial]()
     places = sorted(cells, key=lambda cell: (cell[0], tasks[cell[1]]))
     for turn, place in enumerate(places):
-        arms = sorted(cells[place], key=lambda trial: Arm.of(trial).name)
+        arms = sorted(cells[place], key=lambda trial: trial.arm.name)
         first = turn % len(arms)
         ordered += arms[first:] + arms[:first]
     return ordered
@@ -129,52 +126,7 @@ def part(trials: Sequence[Trial], shard: str | None) -> list[Trial]:
     return [trial for trial in trials if int(trial.key, 16) % count == index - 1]
 
 
-class Queue:
-    """Trials that wait, in order; those of a model start no faster than its rate.
-
-    Args:
-        rate: trials per minute, by model.
-    """
-
-    def __init__(self, rate: Mapping[str, float]) -> None:
-        for model, limit in rate.items():
-            if not limit > 0:
-                raise InputError(f"The rate of {model} is {limit:g}; give trials per minute.")
-        self._rate = rate
-        self._waiting: dict[str, deque[tuple[int, Trial]]] = {}
-        self._free_at: dict[str, float] = {}
-        self._added = 0
-
-    def __len__(self) -> int:
-        return sum(map(len, self._waiting.values()))
-
-    def add(self, trial: Trial) -> None:
-        """Put a trial last."""
-        self._waiting.setdefault(trial.model, deque()).append((self._added, trial))
-        self._added += 1
-
-    def first(self, now: float) -> Trial | None:
-        """The first whose model may be asked at `now`, seconds on a steady clock."""
-        free = [
-            waiting[0]
-            for model, waiting in self._waiting.items()
-            if waiting and self._free_at.get(model, now) <= now
-        ]
-        return min(free, key=lambda entry: entry[0])[1] if free else None
-
-    def take(self, trial: Trial, now: float) -> None:
-        """Take out a trial that `first` gave, which starts at `now`."""
-        self._waiting[trial.model].popleft()
-        if trial.model in self._rate:
-            self._free_at[trial.model] = now + 60 / self._rate[trial.model]
-
-    def wait(self, now: float) -> float | None:
-        """Seconds until `first` gives one; None if nothing waits."""
-        free = [self._free_at.get(model, now) for model, w in self._waiting.items() if w]
-        return max(0.0, min(free) - now) if free else None
-
-
-class _Purse:
+class _Budget:
     """What may still be spent, with what is under way reserved."""
 
     def __init__(self, budget: float | None, rows: Iterable[TrialRow]) -> None:
@@ -200,19 +152,19 @@ class _Purse:
         self._running[model] += 1
 
     def ends(self, row: TrialRow) -> None:
-        self._running[row.model] -= 1
+        self._running[row.arm.model] -= 1
         self._learn(row)
 
     def _learn(self, row: TrialRow) -> None:
         if row.scored:
-            self._dearest[row.model] = max(self._dearest.get(row.model, 0.0), row.cost_usd)
+            self._dearest[row.arm.model] = max(self._dearest.get(row.arm.model, 0.0), row.cost_usd)
 
 
 @dataclass
 class _Run:
-    queue: Queue
+    waiting: deque[Trial]
     journal: Journal
-    purse: _Purse
+    budget: _Budget
     total: int
     done: Callable[[Progress], None]
     scored: int = 0
@@ -221,46 +173,39 @@ class _Run:
     stopped: str | None = None
 
     def through(self, executor: Executor) -> None:
-        """Run the queue until it is empty, or something stops it."""
-        while True:
-            pause = self._fill(executor)
-            if self.running:
-                for row in executor.collect(pause):
-                    self._take(row)
-            elif pause is None:
-                return
-            else:
-                time.sleep(pause)
+        """Run what waits until there is nothing left, or something stops it."""
+        self._start(executor)
+        while self.running:
+            for row in executor.collect():
+                self._take(row)
+            self._start(executor)
 
-    def tell(self, row: TrialRow | None) -> None:
+    def report(self, row: TrialRow | None) -> None:
+        """Say how far it is."""
         self.done(Progress(self.scored, self.total, self.journal.cost_usd, row))
 
-    def _fill(self, executor: Executor) -> float | None:
-        """Start what may start; seconds until more may, None if that takes a row, or is never."""
-        while self.stopped is None and self.running < executor.capacity:
-            now = time.monotonic()
-            trial = self.queue.first(now)
-            if trial is None:
-                return self.queue.wait(now)
-            if not self.purse.allows(trial.model, self.journal.cost_usd):
+    def _start(self, executor: Executor) -> None:
+        """Start what may start."""
+        while self.stopped is None and self.waiting and self.running < executor.capacity:
+            trial = self.waiting[0]
+            if not self.budget.allows(trial.arm.model, self.journal.cost_usd):
                 if not self.running:
                     self.stopped = (
                         f"The next trial could exceed the budget: {self.journal.cost_usd:.4f} USD "
-                        f"are spent, {len(self.queue)} of {self.total} trials are left."
+                        f"are spent, {len(self.waiting)} of {self.total} trials are left."
                     )
-                return None
-            self.queue.take(trial, now)
-            self.purse.begins(trial.model)
+                return
+            self.waiting.popleft()
+            self.budget.begins(trial.arm.model)
             self.running += 1
             executor.submit(trial)
-        return None
 
     def _take(self, row: TrialRow) -> None:
         self.journal.append(row)
-        self.purse.ends(row)
+        self.budget.ends(row)
         self.running -= 1
         self.scored += row.scored
         self.failing = 0 if row.scored else self.failing + 1
         if self.failing == IN_A_ROW:
             self.stopped = f"{IN_A_ROW} infrastructure errors in a row; the last: {row.feedback}"
-        self.tell(row)
+        self.report(row)

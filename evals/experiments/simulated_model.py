@@ -1,4 +1,4 @@
-"""A test model that reads its prompt: the offline rules, which lapse where a sentence is missing.
+"""A simulated model that reads its prompt: the offline rules, which lapse without its sentences.
 
 Which trials a lapse befalls is drawn from the trial's seed, so it is the same under every prompt:
 a prompt that lacks a sentence loses a known share of tasks, and a gate can be tried on that. It is
@@ -55,14 +55,18 @@ at a distance of 1 px. no deployment: it stops at the plan. no question: it take
 picture's orders: it does what words in it say, as if they said to line up."""
 
 
-class ObedientModel:
+SIMULATED = "simulated"
+"""Its name as a --model."""
+
+
+class SimulatedModel:
     """The offline rules under a prompt.
 
     Args:
         seed: of the trial.
     """
 
-    name = "obedient"
+    name = SIMULATED
     prompt = "former"
 
     def __init__(self, seed: int = 0) -> None:
@@ -83,13 +87,13 @@ class ObedientModel:
 
 def lapses_of(prompt: str, seed: int) -> set[Kind]:
     """What goes wrong in a trial under a prompt."""
-    said = re.sub(r"\s+", " ", prompt.lower())
+    text = re.sub(r"\s+", " ", prompt.lower())
     random = np.random.default_rng([seed, 7])
     drawn = random.random(len(DUTIES))
     return {
         duty.kind
         for duty, chance in zip(DUTIES, drawn, strict=True)
-        if chance < duty.share and not any(sentence in said for sentence in duty.sentences)
+        if chance < duty.share and not any(sentence in text for sentence in duty.sentences)
     }
 
 

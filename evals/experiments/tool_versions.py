@@ -1,4 +1,4 @@
-"""Which tools a prompt was released for: what a model is told of them may have changed since."""
+"""Which tools a prompt was released for: their descriptions may have changed since."""
 
 import hashlib
 import json
@@ -11,9 +11,9 @@ from ...tools.tool import Tool
 
 
 def tool_hashes(prompt: Prompt, tools: tuple[Tool, ...] = TOOLS) -> dict[str, str]:
-    """Hashes of what is told of the tools offered with a prompt, by name."""
-    told = [t for t in tools if not prompt.tools or t.name in prompt.tools]
-    return {tool.name: _hash(tool) for tool in told}
+    """Hashes of the descriptions and schemas of the tools offered with a prompt, by name."""
+    offered = [t for t in tools if not prompt.tools or t.name in prompt.tools]
+    return {tool.name: _hash(tool) for tool in offered}
 
 
 def retooled(

@@ -13,11 +13,46 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Sha = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 Name = Annotated[str, Field(min_length=1)]
+Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Status = Literal["pass", "fail", "model_invalid", "infra_error"]
+USUAL = "edges"
+"""The descriptor that goes without saying."""
 UNEQUAL = frozenset({"seconds", "host"})
 """Fields that differ from run to run of the same trial."""
+
+
+class Arm(BaseModel):
+    """What is compared: a method with all that its results depend on.
+
+    Attributes:
+        method: who decides, such as agent or alone.
+        prompt: id@vNNN, None for rules that read none.
+        sha256: of the prompt's text.
+        tools: SHA-256 of the schemas of the tools offered.
+        model: provider:name, or offline.
+        descriptor: how shapes are put into words, such as edges; None where none are.
+        mode: how things are pointed at; words where they are not.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    method: Name
+    prompt: Name | None = None
+    sha256: Sha | None = None
+    tools: Sha | None = None
+    model: Name
+    descriptor: Name | None = None
+    mode: Name = "words"
+
+    @property
+    def name(self) -> str:
+        """Method, prompt with the beginning of its hash, model; descriptor and mode if unusual."""
+        prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
+        shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
+        mode = "" if self.mode == "words" else f" {self.mode}"
+        return f"{self.method}{prompt} {self.model}{shapes}{mode}"
 
 
 class Trial(BaseModel):
@@ -26,14 +61,8 @@ class Trial(BaseModel):
     Attributes:
         suite: SHA-256 of the suite of tasks.
         trial: number of the try, from 0.
-        method: who decides, such as agent or alone.
-        prompt: id@vNNN, None for rules that read none.
-        prompt_sha: SHA-256 of the prompt's text.
-        tools_sha: SHA-256 of the schemas of the tools offered.
-        model: provider:name, or offline.
-        descriptor: how shapes are put into words, such as edges; None where none are.
-        category: of the task, such as caging; results are also told by it.
-        setup: of the task, such as hidden; results are also told by it.
+        category, setup, style: of the task, such as caging, hidden, fresh; results are also shown
+            by each.
         must_pass: the task is one that always succeeds.
     """
 
@@ -41,15 +70,11 @@ class Trial(BaseModel):
 
     suite: Sha
     task: Name
-    trial: Annotated[int, Field(ge=0)]
-    method: Name
-    prompt: Name | None = None
-    prompt_sha: Sha | None = None
-    tools_sha: Sha | None = None
-    model: Name
-    descriptor: Name | None = None
+    trial: Count
+    arm: Arm
     category: str = ""
     setup: str = ""
+    style: str = ""
     must_pass: bool = False
 
     @cached_property
@@ -66,8 +91,7 @@ class Trial(BaseModel):
     @property
     def order(self) -> tuple[Any, ...]:
         """By task, trial, then arm: the order of compared results."""
-        arm = (self.method, self.prompt or "", self.model, self.descriptor or "")
-        return (self.task, self.trial, *arm, self.key)
+        return (self.task, self.trial, self.arm.name, self.key)
 
 
 _FIELDS = set(Trial.model_fields)
@@ -77,21 +101,28 @@ class TrialRow(Trial):
     """A trial with what came of it.
 
     Attributes:
+        outcome: status the run ended with, such as deployed or question.
         sr: success; None for an infrastructure error, as gcr and strict.
         gcr: goal conditions recall, the share of robots that stand right.
         strict: success at the tighter tolerances.
         object_correct: whether it was about the right thing; None if that was not graded.
+        iou: overlap of the best outline measured with the true one; None where none was.
         feedback: what was wrong, in a sentence.
+        cached_tokens: input in tokens of full price, with the prompt and the tools in the cache.
     """
 
     status: Status
+    outcome: str = ""
     sr: bool | None = None
     gcr: Share | None = None
     strict: bool | None = None
     object_correct: bool | None = None
+    iou: Share | None = None
     feedback: str = ""
-    input_tokens: Annotated[int, Field(ge=0)] = 0
-    output_tokens: Annotated[int, Field(ge=0)] = 0
+    requests: Count = 0
+    input_tokens: Count = 0
+    cached_tokens: Count = 0
+    output_tokens: Count = 0
     cost_usd: Amount = 0.0
     seconds: Amount = 0.0
     host: str = ""
@@ -116,6 +147,11 @@ class TrialRow(Trial):
     def scored(self) -> bool:
         """Whether it says anything about the arm."""
         return self.status != "infra_error"
+
+    @property
+    def placed(self) -> bool:
+        """Whether robots stand where they were sent."""
+        return self.outcome == "deployed"
 
     @property
     def line(self) -> bytes:

@@ -6,13 +6,13 @@ A wrong truth is found out late and by everybody at once; this finds it before a
 import numpy as np
 
 from ...tools.errors import ToolError
-from ..tasks.suite_task import SuiteTask
-from .grading import grade_goals
+from ..tasks.task import Task
+from .attempts import grade_goals
 from .policies import POLICIES, scores
-from .reference import reference
+from .reference_answers import reference
 
 
-def check_task(task: SuiteTask) -> list[str]:
+def check_task(task: Task) -> list[str]:
     """What is wrong with a task, as sentences; none if it holds."""
     if not task.goals:
         return []

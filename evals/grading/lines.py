@@ -1,35 +1,30 @@
 """Corners, one side, a line between two things, a centre: each robot against its place."""
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 from shapely.geometry import LineString, Polygon
 
 from ...tools.geometry.outline import FloatArray, distances
-from ..tasks.photographs import Task
-from .graded import Part
-from .photo_rules import STRICT_SHARE, beyond
+from ..tasks.task import Goal
+from .grades import EVEN, STRICT_SHARE, Part
 from .slots import even_along, matched
 
 OFF = 0.1
 """Strict: how far off the target a robot stands at a corner, as a share of the tolerance."""
-EVEN = 0.25
-"""Strict: how far off its even place a robot may stand along a line, as a share of a gap."""
 
 
-def corners(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+def corners(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge one robot at each of `points`, outside the target.
 
-    The rule of the photographs matches by least fourth powers, this one by most corners held: it
-    can only find more. It agrees on whether all are.
-
     Args:
-        task: with the rule.
+        goal: with the rule.
         points: (m, 2), px.
         free: which of them can be right at all, (m,).
     """
-    rule = task.success
+    rule = goal.success
     slots, most = np.asarray(rule["points"], dtype=float), rule["tolerance_px"]
-    near = distances(Polygon(task.target.polygon, task.target.holes), points)
+    near = distances(Polygon(goal.target.polygon, goal.target.holes), points)
     stands = free & (near > 0) & (near >= rule.get("min_clearance_px", 0))
     held = np.full(len(points), -1, dtype=np.intp)
     held[stands] = matched(points[stands], slots, most)
@@ -45,19 +40,19 @@ def corners(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     return Part(held >= 0, 1.0, tuple(problems), strict)
 
 
-def side(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+def side(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge a row on one side by `band_px` and `min_span_frac`.
 
     Args:
-        task: with the rule.
+        goal: with the rule.
         points: (m, 2), px.
         free: which of them can be right at all, (m,).
     """
-    rule, target = task.success, Polygon(task.target.polygon)
+    rule, target = goal.success, Polygon(goal.target.polygon)
     name, (low, high) = rule["where"].partition(":")[2], rule["band_px"]
     axis = 0 if name in ("top", "bottom") else 1
     off = distances(target, points)
-    there = np.array([beyond(target, point[None], name) for point in points], dtype=bool)
+    there = _on_side(target, points, name)
     right = free & (off >= low) & (off <= high) & there
     problems = list[str]()
     if not there.all():
@@ -66,7 +61,7 @@ def side(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
         problems.append(
             f"{off.min():.0f} to {off.max():.0f} px from the target, {low}-{high} wanted"
         )
-    wanted = rule["min_span_frac"] * float(np.ptp(np.asarray(task.target.polygon)[:, axis]))
+    wanted = rule["min_span_frac"] * float(np.ptp(np.asarray(goal.target.polygon)[:, axis]))
     span = float(np.ptp(points[right][:, axis])) if right.any() else 0.0
     if float(np.ptp(points[:, axis])) < wanted:
         problems.append(f"spans {span:.0f} px, {wanted:.0f} needed")
@@ -75,16 +70,16 @@ def side(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     return Part(right, whole, tuple(problems), strict, {"span_px": span})
 
 
-def line_between(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+def line_between(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge robots on the segment between `points`.
 
     Args:
-        task: with the rule.
+        goal: with the rule.
         points: (m, 2), px.
         free: which of them can be right at all, (m,).
     """
-    a, b = np.asarray(task.success["points"], dtype=float)
-    most = task.success["tolerance_px"]
+    a, b = np.asarray(goal.success["points"], dtype=float)
+    most = goal.success["tolerance_px"]
     off = distances(LineString([a, b]), points)
     problems = (f"{off.max():.1f} px off the line, {most} allowed",) if (off > most).any() else ()
     strict = [*_uneven((points - a) @ (b - a) / float(np.linalg.norm(b - a)))]
@@ -93,15 +88,15 @@ def line_between(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Par
     return Part(free & (off <= most), 1.0, problems, tuple(strict))
 
 
-def centre(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+def centre(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge robots at the first of `points`.
 
     Args:
-        task: with the rule.
+        goal: with the rule.
         points: (m, 2), px.
         free: which of them can be right at all, (m,).
     """
-    middle, most = np.asarray(task.success["points"][0]), task.success["tolerance_px"]
+    middle, most = np.asarray(goal.success["points"][0]), goal.success["tolerance_px"]
     off = np.linalg.norm(points - middle, axis=1)
     problems, strict = (), ()
     if (off > most).any():
@@ -116,3 +111,11 @@ def _uneven(stations: FloatArray) -> tuple[str, ...]:
         return ()
     even = even_along(stations, EVEN)
     return () if even == len(stations) else (f"uneven: {even} of {len(stations)} on even places",)
+
+
+def _on_side(target: Polygon, points: FloatArray, name: str) -> NDArray[np.bool_]:
+    """Which robots have nothing of the target between them and the picture's border that side."""
+    far = 1e5
+    way = {"left": (-far, 0), "right": (far, 0), "top": (0, -far), "bottom": (0, far)}[name]
+    rays = shapely.linestrings(np.stack([points, points + way], axis=1))
+    return ~np.asarray(shapely.intersects(rays, target), dtype=bool)

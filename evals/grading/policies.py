@@ -12,26 +12,22 @@ from numpy.random import Generator
 from shapely.geometry import LineString
 
 from ...tools.geometry.outline import FloatArray
-from ..tasks.photographs import Task
-from .graded import Graded
-from .grading import grade_goals
+from ..tasks.task import Goal
+from .attempts import grade_goals
+from .grades import Graded
 
 DRAWS = 4
 """Repetitions of the policies that draw lots, for a chance level."""
-CEILINGS = {"pile": 0.1, "scatter": 0.3, "boundary": 0.1, "circle": 0.35, "line": 0.35}
-"""Mean GCR over a suite's tasks for more than one robot that a policy may reach; tested."""
-LUCKY = 0.02
-"""Share of tasks for more than one robot that a policy may solve by chance."""
 BOX = 1.5
 """Side of the box robots are scattered in, over the side of the target's own."""
 
 
-def pile(goal: Task, random: Generator) -> FloatArray:
+def pile(goal: Goal, random: Generator) -> FloatArray:
     """All at the centroid."""
     return np.tile(_centroid(goal), (goal.robots, 1))
 
 
-def scatter(goal: Task, random: Generator) -> FloatArray:
+def scatter(goal: Goal, random: Generator) -> FloatArray:
     """At random in a box half as large again as the target's."""
     x0, y0, x1, y1 = goal.target.outline.bounds
     middle, half = np.array([x0 + x1, y0 + y1]) / 2, np.array([x1 - x0, y1 - y0]) / 2 * BOX
@@ -40,27 +36,27 @@ def scatter(goal: Task, random: Generator) -> FloatArray:
     return random.uniform(low, high, (goal.robots, 2))
 
 
-def boundary(goal: Task, random: Generator) -> FloatArray:
+def boundary(goal: Goal, random: Generator) -> FloatArray:
     """At random on the target's boundary."""
     line = LineString(goal.target.outline.polygon.exterior.coords)
     stations = random.uniform(0, line.length, goal.robots)
     return shapely.get_coordinates(shapely.line_interpolate_point(line, stations))
 
 
-def circle(goal: Task, random: Generator) -> FloatArray:
+def circle(goal: Goal, random: Generator) -> FloatArray:
     """Evenly on a circle about the centroid that has the target's area."""
     turns = 2 * np.pi * np.arange(goal.robots) / goal.robots
     radius = goal.target.outline.size / np.sqrt(np.pi)
     return _centroid(goal) + radius * np.stack([np.cos(turns), np.sin(turns)], axis=1)
 
 
-def line(goal: Task, random: Generator) -> FloatArray:
+def line(goal: Goal, random: Generator) -> FloatArray:
     """Evenly on a straight line through the centroid along the target's long axis."""
     unit, length, _ = goal.target.outline.long_axis
     return _centroid(goal) + np.linspace(-0.5, 0.5, goal.robots)[:, None] * length * unit
 
 
-Policy = Callable[[Task, Generator], FloatArray]
+Policy = Callable[[Goal, Generator], FloatArray]
 POLICIES: dict[str, Policy] = {
     "pile": pile,
     "scatter": scatter,
@@ -70,13 +66,13 @@ POLICIES: dict[str, Policy] = {
 }
 
 
-def positions(name: str, goals: Sequence[Task], seed: int) -> FloatArray:
+def positions(name: str, goals: Sequence[Goal], seed: int) -> FloatArray:
     """Where a policy puts the robots of all goals, (N, 2) px."""
     random = np.random.default_rng(seed)
     return np.concatenate([POLICIES[name](goal, random) for goal in goals])
 
 
-def scores(name: str, goals: Sequence[Task], draws: int = DRAWS) -> tuple[float, float]:
+def scores(name: str, goals: Sequence[Goal], draws: int = DRAWS) -> tuple[float, float]:
     """Mean SR and GCR of a policy on a task; where nothing is to be placed, moving is wrong."""
     if not goals:
         return 0.0, 0.0
@@ -85,11 +81,11 @@ def scores(name: str, goals: Sequence[Task], draws: int = DRAWS) -> tuple[float,
     return float(np.mean([g.sr for g in graded])), float(np.mean([g.gcr for g in graded]))
 
 
-def chance(tasks: Sequence[Sequence[Task]], draws: int = DRAWS) -> tuple[float, float]:
+def chance(tasks: Sequence[Sequence[Goal]], draws: int = DRAWS) -> tuple[float, float]:
     """SR and GCR of the best policy over tasks, each the goals of one: the chance level."""
     means = [np.mean([scores(name, goals, draws) for goals in tasks], axis=0) for name in POLICIES]
     return float(max(m[0] for m in means)), float(max(m[1] for m in means))
 
 
-def _centroid(goal: Task) -> FloatArray:
+def _centroid(goal: Goal) -> FloatArray:
     return shapely.get_coordinates(goal.target.outline.polygon.centroid)[0]

@@ -12,52 +12,49 @@ from shapely.geometry import LineString, Polygon
 
 from ...tools.geometry.cages.cages import THOROUGH, Cage, cage
 from ...tools.geometry.outline import FloatArray, distances
-from ..tasks.photographs import Task
-from .graded import Part
-from .photo_rules import around, gaps, goes_round, middle_line, stations
+from ..tasks.task import Goal
+from .grades import EVEN, Part
 from .slots import even_along, phase_free
 
-EVEN = 0.25
-"""Strict: how far off its slot a robot may stand along the loop, as a share of a gap."""
 WAYS = ("right", "lower right", "bottom", "lower left", "left", "upper left", "top", "upper right")
 
 
-def ring(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+def ring(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge a ring by `band_px` and `max_gap_px`.
 
     A robot is right if it stands in the band and at least one of the gaps beside it is closed. Of
     the whole, the share of the way round that lies in closed gaps counts.
 
     Args:
-        task: with the rule.
+        goal: with the rule.
         points: (m, 2), px.
         free: which of them can be right at all, (m,).
     """
-    target = Polygon(task.target.polygon)
-    stands, problems = _in_band(task, points, free)
+    target = Polygon(goal.target.polygon)
+    stands, problems = _in_band(goal, points, free)
     right = np.zeros(len(points), dtype=bool)
     if stands.sum() < 2:
         problems.append("no ring: fewer than 2 robots stand in the band")
         return Part(right, 0.0, tuple(problems))
-    order = np.flatnonzero(stands)[around(target, points[stands])]
+    order = np.flatnonzero(stands)[_order_around(target, points[stands])]
     loop = points[order]
-    wide = gaps(loop)
-    closed = wide <= task.success["max_gap_px"]
+    wide = _gaps_of_loop(loop)
+    closed = wide <= goal.success["max_gap_px"]
     right[order] = closed | np.roll(closed, 1)
     measures = {"worst_gap_px": float(wide.max())}
     if not closed.all():
-        problems.append(_widest(task, loop, wide))
+        problems.append(_widest(goal, loop, wide))
     whole = _closed_share(target, loop, closed)
-    if not goes_round(task.target.outline.centre, loop):
+    if not _goes_round(goal.target.outline.centre, loop):
         problems.insert(0, "the robots do not go round it")
-        whole = min(whole, _reach(target, loop))
-    even, share = _even(task, target, loop)
+        whole = min(whole, _share_reached(target, loop))
+    even, share = _even_places(goal, target, loop)
     measures["even_share"] = share
     strict = () if even else (f"uneven: {share:.0%} of the robots on even places",)
     return Part(right, whole, tuple(problems), strict, measures)
 
 
-def escape_proof(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+def escape_proof(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge a cage by `band_px` and a certificate that the target cannot get out of it.
 
     A robot is right if it stands in the band. The whole is done where those that do certainly
@@ -65,82 +62,82 @@ def escape_proof(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Par
     is not asked for, so strict is the same.
 
     Args:
-        task: with the rule.
+        goal: with the rule.
         points: (m, 2), px.
         free: which of them can be right at all, (m,).
     """
-    stands, problems = _in_band(task, points, free)
-    complete = len(points) == task.robots and bool(stands.all())
-    found = cage(task.target.outline.filled, points[stands], levels=THOROUGH if complete else 0)
+    stands, problems = _in_band(goal, points, free)
+    complete = len(points) == goal.robots and bool(stands.all())
+    found = cage(goal.target.outline.filled, points[stands], levels=THOROUGH if complete else 0)
     measures = {"certified": float(found.state == "caged")}
     if found.state == "caged":
         return Part(stands, 1.0, tuple(problems), (), measures)
-    spread = _reach(Polygon(task.target.polygon), points[stands]) if stands.any() else 0.0
+    spread = _share_reached(Polygon(goal.target.polygon), points[stands]) if stands.any() else 0.0
     return Part(stands, spread, (*problems, _loose(found)), (), measures)
 
 
 def _in_band(
-    task: Task, points: FloatArray, free: NDArray[np.bool_]
+    goal: Goal, points: FloatArray, free: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], list[str]]:
     """Which robots stand in the band, and what is wrong with the others."""
-    target, (low, high) = Polygon(task.target.polygon), task.success["band_px"]
+    target, (low, high) = Polygon(goal.target.polygon), goal.success["band_px"]
     near, far = distances(target, points), distances(target.convex_hull, points)
     problems: list[str] = []
     if (near < low).any():
-        problems.append(f"{_count(near < low)} too near: {near.min():.1f} px, {low} needed")
+        problems.append(f"{_robots_are(near < low)} too near: {near.min():.1f} px, {low} needed")
     if (far > high).any():
-        problems.append(f"{_count(far > high)} too far: {far.max():.1f} px, {high} allowed")
+        problems.append(f"{_robots_are(far > high)} too far: {far.max():.1f} px, {high} allowed")
     return free & (near >= low) & (far <= high), problems
 
 
 def _loose(found: Cage) -> str:
-    said = (
+    text = (
         "it can get out, on a way that was checked"
         if found.state == "escape"
         else "it is not certified that it cannot get out"
     )
     gap = "" if found.widest_gap is None else f": a gap of {found.widest_gap:.0f} px"
-    return f"{said}{gap}; gaps below {found.inscribed_diameter:.0f} px certainly hold it"
+    return f"{text}{gap}; gaps below {found.inscribed_diameter:.0f} px certainly hold it"
 
 
-def _count(flags: NDArray[np.bool_]) -> str:
+def _robots_are(flags: NDArray[np.bool_]) -> str:
     count = int(flags.sum())
     return "1 robot is" if count == 1 else f"{count} robots are"
 
 
-def _widest(task: Task, loop: FloatArray, wide: FloatArray) -> str:
+def _widest(goal: Goal, loop: FloatArray, wide: FloatArray) -> str:
     worst = int(np.argmax(wide))
-    x, y = (loop[worst] + loop[(worst + 1) % len(loop)]) / 2 - task.target.outline.centre
+    x, y = (loop[worst] + loop[(worst + 1) % len(loop)]) / 2 - goal.target.outline.centre
     way = WAYS[round(float(np.degrees(np.arctan2(y, x))) / 45) % 8]
-    return f"a gap of {wide[worst]:.0f} px at the {way}, {task.success['max_gap_px']} allowed"
+    return f"a gap of {wide[worst]:.0f} px at the {way}, {goal.success['max_gap_px']} allowed"
 
 
 def _closed_share(target: Polygon, loop: FloatArray, closed: NDArray[np.bool_]) -> float:
     """Share of the convex hull's length that lies in no open gap."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
-    station = stations(hull, loop)
+    station = _stations_along(hull, loop)
     open_ends = zip(station[~closed], np.roll(station, -1)[~closed], strict=True)
     bare = sum((end - start) % hull.length for start, end in open_ends)
     return float(np.clip(1 - bare / hull.length, 0, 1))
 
 
-def _reach(target: Polygon, loop: FloatArray) -> float:
+def _share_reached(target: Polygon, loop: FloatArray) -> float:
     """Share of the convex hull's length that the robots are spread along."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
-    station = np.sort(stations(hull, loop))
+    station = np.sort(_stations_along(hull, loop))
     return 1 - float(np.diff(station, append=station[0] + hull.length).max() / hull.length)
 
 
-def _even(task: Task, target: Polygon, loop: FloatArray) -> tuple[bool, float]:
+def _even_places(goal: Goal, target: Polygon, loop: FloatArray) -> tuple[bool, float]:
     """Whether all stand on even places of a loop in mid band whose start is free; which share.
 
     Where the picture cuts the loop, the places are even along the rest of it.
     """
-    if not task.success.get("even") or len(loop) < 3:
+    if not goal.success.get("even") or len(loop) < 3:
         return True, 1.0
-    middle = middle_line(target, loop)
-    station = stations(middle, loop)
-    width, height = task.size
+    middle = _middle_line(target, loop)
+    station = _stations_along(middle, loop)
+    width, height = goal.size
     n = len(loop)
     if shapely.box(0, 0, width - 1, height - 1).contains(middle):
         hits = phase_free(station, middle.length, n, EVEN * middle.length / n)
@@ -150,3 +147,38 @@ def _even(task: Task, target: Polygon, loop: FloatArray) -> tuple[bool, float]:
         start = ordered[(cut + 1) % n]
         hits = even_along((ordered - start) % middle.length, EVEN)
     return hits == n, hits / n
+
+
+def _order_around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
+    """Order of robots around a target: along its outline or its hull, which closes better.
+
+    Along the outline, taken at their mean distance from it, robots that follow a recess come in
+    turn; along the convex hull those that bridge one.
+    """
+    lines = (_middle_line(target, points), LineString(shapely.get_coordinates(target.convex_hull)))
+    orders = [
+        np.lexsort((distances(line, points), _stations_along(line, points))) for line in lines
+    ]
+    return min(orders, key=lambda order: float(_gaps_of_loop(points[order]).max(initial=0.0)))
+
+
+def _middle_line(target: Polygon, points: FloatArray) -> LineString:
+    """The outline at the mean distance of points from it."""
+    return target.buffer(max(float(np.mean(distances(target, points))), 1.0)).exterior
+
+
+def _stations_along(line: LineString, points: FloatArray) -> FloatArray:
+    """Arc length of the place of a line that is nearest to each point, (m,), px."""
+    return np.asarray(shapely.line_locate_point(line, shapely.points(points)), dtype=float)
+
+
+def _gaps_of_loop(loop: FloatArray) -> FloatArray:
+    """Distance of each robot of a loop to the next, the last one's to the first, (m,), px."""
+    return np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+
+
+def _goes_round(centre: tuple[float, float], loop: FloatArray) -> bool:
+    """Whether the polygon of the robots winds round a point of the target: a crowd does not."""
+    x, y = (loop - centre).T
+    turns = np.diff(np.arctan2(y, x), append=np.arctan2(y[0], x[0]))
+    return round(float(((turns + np.pi) % (2 * np.pi) - np.pi).sum() / (2 * np.pi))) != 0

@@ -1,1 +1,1 @@
-"""A run as one HTML file that needs nothing else: counts, pictures, what was said."""
+"""A run as one HTML file that needs nothing else: counts, pictures, transcripts."""

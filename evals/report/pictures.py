@@ -9,9 +9,9 @@ from PIL import Image
 
 from ...tools.errors import ImageError
 from ...tools.perception.image import load_picture
-from ..tasks.rendered_pictures import hashed
-from ..tasks.stored_suite import KeptSuite, KeptTask
-from .markup import Html, joined, tag
+from ..tasks.rendered_pictures import RenderedPicture, hashed
+from ..tasks.stored_suite import StoredSuite
+from ..tasks.task import Task
 
 LONG = 900
 """Most pixels along the longer side."""
@@ -21,7 +21,7 @@ MARGIN = 20
 
 
 @dataclass(frozen=True)
-class Shown:
+class PagePicture:
     """A picture that the page holds.
 
     Attributes:
@@ -34,54 +34,42 @@ class Shown:
     size: tuple[int, int]
     data: bytes = b""
 
+    @property
+    def url(self) -> str:
+        """The file itself as a URL."""
+        return f"data:image/jpeg;base64,{base64.b64encode(self.data).decode()}"
 
-def pictures(folder: Path, suite: KeptSuite) -> dict[str, Shown]:
+
+def pictures(folder: Path, suite: StoredSuite) -> dict[str, PagePicture]:
     """The pictures of a suite's tasks by the hash of their pixels.
 
     One that is missing, or is not what it was, is left blank.
     """
-    found: dict[str, Shown] = {}
+    found: dict[str, PagePicture] = {}
     for task in suite.tasks:
-        if task.pixels not in found:
-            found[task.pixels] = _shown(folder, task, f"picture-{len(found) + 1}")
+        source = suite.pictures[task.id]
+        if source.pixels not in found:
+            name = f"picture-{len(found) + 1}"
+            found[source.pixels] = _page_picture(folder, source, task, name)
     return found
 
 
-def sprite(shown: dict[str, Shown]) -> Html:
-    """All pictures, each once and not to be seen here: drawings name them."""
-    images = [
-        tag(
-            "image",
-            id=picture.id,
-            x=-0.5,
-            y=-0.5,
-            width=picture.size[0],
-            height=picture.size[1],
-            preserveAspectRatio="none",
-            href=f"data:image/jpeg;base64,{base64.b64encode(picture.data).decode()}",
-        )
-        for picture in shown.values()
-        if picture.id
-    ]
-    return tag("svg", tag("defs", joined(images)), class_="sprite", aria_hidden="true")
-
-
-def _shown(folder: Path, task: KeptTask, name: str) -> Shown:
+def _page_picture(folder: Path, source: RenderedPicture, task: Task, name: str) -> PagePicture:
     try:
-        picture = load_picture(folder / task.picture)
+        picture = load_picture(folder / source.path)
     except ImageError:
-        return Shown("", _extent(task))
-    if hashed(picture) != task.pixels:
-        return Shown("", picture.size)
+        return PagePicture("", _extent(task))
+    if hashed(picture) != source.pixels:
+        return PagePicture("", picture.size)
     image = Image.fromarray(picture.pixels)
     image.thumbnail((LONG, LONG), Image.Resampling.LANCZOS)
     file = io.BytesIO()
     image.save(file, "JPEG", quality=QUALITY, optimize=True)
-    return Shown(name, picture.size, file.getvalue())
+    return PagePicture(name, picture.size, file.getvalue())
 
 
-def _extent(task: KeptTask) -> tuple[int, int]:
+def _extent(task: Task) -> tuple[int, int]:
     """As much as the true outlines take, where there is no picture to measure."""
-    points = [p for goal in task.goals for thing in goal.things for p in thing.outline]
+    points = [point for thing in task.things for point in thing.polygon]
     right, low = (int(max((p[axis] for p in points), default=99.0)) for axis in (0, 1))
     return right + MARGIN, low + MARGIN

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.random import Generator
 
 from . import ground as grounds
-from .choose import HIDDEN, goes_by
 from .layout import Point, Rows, rows, scatter
 from .palette import VISIBLE, difference, lit, shade
+from .references import HIDDEN, goes_by
 from .things import Family, Ground, Look, Scene, Sort, Thing, make
 
 Choice = tuple[Sort, str]
@@ -58,7 +58,7 @@ def compose(random: Generator, seed: int, where: Stage, kind: str, setup: str) -
     choices = where.visible(random)
     solid = [choice for choice in choices if not choice[0].encloses]
     if setup == "single":
-        things = _one(random, where, solid)
+        things = _single_thing(random, where, solid)
     elif kind in HIDDEN:
         things = _odd(random, where, solid, kind)
     else:
@@ -107,17 +107,19 @@ def _some(
     return same[random.integers(len(same))]
 
 
-def _one(random: Generator, where: Stage, solid: list[Choice]) -> list[Thing] | Rows | None:
+def _single_thing(
+    random: Generator, where: Stage, solid: list[Choice]
+) -> list[Thing] | Rows | None:
     picked = _some(random, solid)
     if picked is None:
         return None
     share = math.exp(random.uniform(math.log(0.012), math.log(0.14)))
     thing = make(random, *picked, where.base(share))
-    base, turns = _turns(random, where, 1)
+    base, turns = _turns_of_things(random, where, 1)
     return _arranged(random, where, [thing], base, turns, where.family.rows)
 
 
-def _turns(random: Generator, where: Stage, count: int) -> tuple[float, list[float]]:
+def _turns_of_things(random: Generator, where: Stage, count: int) -> tuple[float, list[float]]:
     """A direction of the whole and each thing's turn against it, degrees."""
     style = where.family.turns
     if style == "either":
@@ -178,7 +180,7 @@ def _odd(
     ]
     if kind == "alone":
         return _cluster(random, where, things)
-    base, turns = _turns(random, where, count)
+    base, turns = _turns_of_things(random, where, count)
     if turned or usual[0].upright:
         turns = [float(v) for v in random.uniform(-2, 2, count)]
     if turned:
@@ -224,7 +226,7 @@ def _cluster(random: Generator, where: Stage, things: list[Thing]) -> list[Thing
         part, rest = (x0, y0, x1, cut), (x0, y0 + (share + 0.1) * (y1 - y0), x1, y1)
         if flipped:
             part, rest = (x0, y1 - cut, x1, y1), (x0, y0, x1, y1 - rest[1])
-    base, turns = _turns(random, where, len(things))
+    base, turns = _turns_of_things(random, where, len(things))
     turns = [base + turn for turn in turns]
     near = rows(random, part, things[1:], base, [t - base for t in turns[1:]])
     many = near.things if near else scatter(random, part, things[1:], turns[1:], {})
@@ -239,7 +241,7 @@ def _many(
 ) -> list[Thing] | Rows | None:
     """Things of a few sorts in a few colours, the first of them meant to be told by the kind."""
     count = int(random.integers(4, 13))
-    palette = _palette(random, [c for c in choices if not c[0].encloses], kind, count)
+    palette = _choices_for(random, [c for c in choices if not c[0].encloses], kind, count)
     if palette is None:
         return None
     share = math.exp(random.uniform(math.log(0.006), math.log(max(0.25 / count, 0.008))))
@@ -253,19 +255,21 @@ def _many(
         make(random, *choice, float(s * choice[0].scale))
         for choice, s in zip(palette, sizes, strict=True)
     ]
-    base, turns = _turns(random, where, count)
+    base, turns = _turns_of_things(random, where, count)
     turned = [base + turn for turn in turns]
     if kind == "inside":
         return _enclosed(random, where, choices, things, turned)
     if kind in BESIDE and random.random() < 0.8:
-        return _beside(random, where, things, turned, *BESIDE[kind])
+        return _on_one_side(random, where, things, turned, *BESIDE[kind])
     anchors = _anchors(random, where, kind)
     if anchors:
         return scatter(random, where.area, things, turned, anchors)
     return _arranged(random, where, things, base, turns, where.family.rows)
 
 
-def _palette(random: Generator, solid: list[Choice], kind: str, count: int) -> list[Choice] | None:
+def _choices_for(
+    random: Generator, solid: list[Choice], kind: str, count: int
+) -> list[Choice] | None:
     """What each thing is. The first is alone in what the kind names, those it names are too."""
     pool = [_some(random, solid) for _ in range(int(random.integers(2, 5)))]
     nouns, colours = {c[0].noun for c in pool if c}, {c[1] for c in pool if c}
@@ -290,7 +294,7 @@ _NAMED = {"left_of": 1, "right_of": 1, "above": 1, "below": 1, "nearest": 1, "be
 
 def _confused(a: Choice, b: Choice) -> bool:
     """Whether colour and noun do not tell them apart."""
-    return a[0] is b[0] and (a[1] == b[1] or not a[0].told)
+    return a[0] is b[0] and (a[1] == b[1] or not a[0].by_colour)
 
 
 def _clash(named: Sequence[Choice | None]) -> bool:
@@ -321,7 +325,7 @@ BESIDE = {"left_of": (0, -1), "right_of": (0, 1), "above": (1, -1), "below": (1,
 """Axis and direction."""
 
 
-def _beside(
+def _on_one_side(
     random: Generator, where: Stage, things: list[Thing], turns: list[float], axis: int, sign: int
 ) -> list[Thing] | None:
     """The first thing on one side of the second; of its own sort, no other on that side."""
@@ -339,8 +343,8 @@ def _beside(
     beyond[axis if sign < 0 else axis + 2] = spots[1][axis] - sign * 10
     own = random.random() < 0.5
     free = [i for i in range(2, len(things)) if own and things[i].sort is not things[0].sort]
-    kept = [i for i in range(2, len(things)) if i not in free]
-    for group, area in ((kept, tuple(beyond)), (free, where.area)):
+    others = [i for i in range(2, len(things)) if i not in free]
+    for group, area in ((others, tuple(beyond)), (free, where.area)):
         some = [things[i] for i in group]
         x0, y0, x1, y1 = area
         pair += scatter(random, (x0, y0, x1, y1), some, [turns[i] for i in group], {}, pair) or []

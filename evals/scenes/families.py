@@ -40,7 +40,7 @@ TABLE = Family(
         Sort(
             "plate", ("white", "blue", "green", "red", "yellow", "black"), indoors.plate, scale=1.3
         ),
-        Sort("coin", ("grey", "yellow", "orange"), indoors.coin, told=False, scale=0.75),
+        Sort("coin", ("grey", "yellow", "orange"), indoors.coin, by_colour=False, scale=0.75),
         Sort("card", ("white", "blue", "pink", "yellow", "green"), indoors.card, 4, upright=True),
         Sort("mug", ("red", "white", "blue", "green", "orange", "purple"), indoors.mug),
         Sort(
@@ -78,7 +78,7 @@ GARDEN = Family(
         Sort("pond", ("blue",), outdoors.pond, scale=1.6),
         Sort("bush", ("green",), outdoors.bush, plural="bushes"),
         Sort("stone", ("grey", "white"), outdoors.stone, scale=0.8),
-        Sort("flower bed", ("brown",), outdoors.bed, 4, told=False, upright=True, scale=1.3),
+        Sort("flower bed", ("brown",), outdoors.bed, 4, by_colour=False, upright=True, scale=1.3),
         Sort("parasol", ("red", "blue", "yellow", "white", "orange"), outdoors.parasol, scale=1.1),
         Sort("pot", ("orange", "blue", "white", "purple"), outdoors.pot, scale=0.8),
         Sort("bench", ("brown", "white", "red"), outdoors.bench, 4, upright=True),
@@ -105,7 +105,7 @@ HARBOUR = Family(
 )
 
 
-def _shape(
+def _plain_shape(
     word: str,
     polygon: Callable[[Generator], Polygon],
     corners: int = 0,
@@ -130,24 +130,24 @@ def _shape(
 SHAPES = Family(
     "shapes",
     (
-        _shape("circle", lambda r: shapes.circle(), upright=False),
-        _shape("square", lambda r: shapes.rectangle(1), 4),
-        _shape("rectangle", lambda r: shapes.rectangle(r.uniform(1.7, 2.3)), 4),
-        _shape("triangle", lambda r: shapes.regular(3), 3),
-        _shape("pentagon", lambda r: shapes.regular(5), 5),
-        _shape("hexagon", lambda r: shapes.regular(6), 6, upright=False),
-        _shape("star", lambda r: shapes.star(5, r.uniform(0.42, 0.5))),
-        _shape("cross", lambda r: shapes.cross(r.uniform(0.55, 0.75)), plural="crosses"),
-        _shape("L shape", lambda r: shapes.ell(r.uniform(0.55, 0.75))),
-        _shape("T shape", lambda r: shapes.tee(r.uniform(0.55, 0.75))),
-        _shape("C shape", lambda r: shapes.cee(r.uniform(0.38, 0.5), r.uniform(60, 110))),
-        _shape("ring", lambda r: shapes.annulus(r.uniform(0.45, 0.6)), upright=False),
-        _shape("oval", lambda r: shapes.oval(r.uniform(1.6, 1.9))),
-        _shape("arrow", lambda r: shapes.arrow(r.uniform(0.5, 0.7))),
-        _shape("heart", lambda r: shapes.heart()),
-        _shape("crescent", lambda r: shapes.crescent(r.uniform(0.3, 0.45))),
-        _shape("frame", lambda r: shapes.frame(r.uniform(1, 1.3), 0.17), 4),
-        _shape("hoop", _hoop, upright=False, encloses=True),
+        _plain_shape("circle", lambda r: shapes.circle(), upright=False),
+        _plain_shape("square", lambda r: shapes.rectangle(1), 4),
+        _plain_shape("rectangle", lambda r: shapes.rectangle(r.uniform(1.7, 2.3)), 4),
+        _plain_shape("triangle", lambda r: shapes.regular(3), 3),
+        _plain_shape("pentagon", lambda r: shapes.regular(5), 5),
+        _plain_shape("hexagon", lambda r: shapes.regular(6), 6, upright=False),
+        _plain_shape("star", lambda r: shapes.star(5, r.uniform(0.42, 0.5))),
+        _plain_shape("cross", lambda r: shapes.cross(r.uniform(0.55, 0.75)), plural="crosses"),
+        _plain_shape("L shape", lambda r: shapes.ell(r.uniform(0.55, 0.75))),
+        _plain_shape("T shape", lambda r: shapes.tee(r.uniform(0.55, 0.75))),
+        _plain_shape("C shape", lambda r: shapes.cee(r.uniform(0.38, 0.5), r.uniform(60, 110))),
+        _plain_shape("ring", lambda r: shapes.annulus(r.uniform(0.45, 0.6)), upright=False),
+        _plain_shape("oval", lambda r: shapes.oval(r.uniform(1.6, 1.9))),
+        _plain_shape("arrow", lambda r: shapes.arrow(r.uniform(0.5, 0.7))),
+        _plain_shape("heart", lambda r: shapes.heart()),
+        _plain_shape("crescent", lambda r: shapes.crescent(r.uniform(0.3, 0.45))),
+        _plain_shape("frame", lambda r: shapes.frame(r.uniform(1, 1.3), 0.17), 4),
+        _plain_shape("hoop", _hoop, upright=False, encloses=True),
     ),
     ground.sheet,
     turns="either",

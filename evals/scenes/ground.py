@@ -18,7 +18,7 @@ def _grey(random: Generator, low: float, high: float) -> RGB:
     return level + warm, level, level - warm
 
 
-def _near(random: Generator, colour: RGB, spread: float) -> RGB:
+def _near_colour(random: Generator, colour: RGB, spread: float) -> RGB:
     red, green, blue = (channel * random.uniform(1 - spread, 1 + spread) for channel in colour)
     return lit((red, green, blue), 1)
 
@@ -45,7 +45,7 @@ def table(random: Generator, size: Size) -> Ground:
         (60, 70, 100),
         (190, 180, 140),
     ]
-    colour = _near(random, _one_of(random, woods if texture == "wood" else cloths), 0.08)
+    colour = _near_colour(random, _one_of(random, woods if texture == "wood" else cloths), 0.08)
     crumbs = _specks(random, size, lit(colour, 1.25), 1.5) if random.random() < 0.4 else ()
     return Ground(texture, colour, crumbs)
 
@@ -64,15 +64,15 @@ def floor(random: Generator, size: Size) -> Ground:
 def lawn(random: Generator, size: Size) -> Ground:
     """Grass, sometimes gravel, with a few fallen leaves."""
     if random.random() < 0.2:
-        return Ground("gravel", _near(random, (190, 178, 155), 0.06))
-    colour = _near(random, (112, 142, 78), 0.1)
+        return Ground("gravel", _near_colour(random, (190, 178, 155), 0.06))
+    colour = _near_colour(random, (112, 142, 78), 0.1)
     return Ground("grass", colour, _specks(random, size, (190, 170, 80), 1.8))
 
 
 def water(random: Generator, size: Size) -> Ground:
     """Water of a harbour, with flecks of foam."""
     waters: list[RGB] = [(52, 96, 128), (40, 110, 120), (90, 135, 150), (38, 66, 96)]
-    colour = _near(random, _one_of(random, waters), 0.08)
+    colour = _near_colour(random, _one_of(random, waters), 0.08)
     return Ground("water", colour, _specks(random, size, lit(colour, 1.3), 2))
 
 
@@ -90,7 +90,7 @@ def sheet(random: Generator, size: Size) -> Ground:
         (150, 160, 150),
     ]
     texture = str(random.choice(["flat", "paper", "paper", "tiles", "checks"]))
-    colour = _near(random, _one_of(random, sheets), 0.03)
+    colour = _near_colour(random, _one_of(random, sheets), 0.03)
     dust = _specks(random, size, lit(colour, 0.7), 1.3) if random.random() < 0.25 else ()
     return Ground(texture, colour, dust)
 

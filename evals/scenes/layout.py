@@ -64,7 +64,7 @@ def scatter(
     order = sorted(range(len(things)), key=lambda i: (i not in anchors, -things[i].size))
     for i in order:
         turned = things[i].moved(0, 0, turns[i])
-        low, high = _span(turned, area)
+        low, high = _free_span(turned, area)
         if i in anchors:
             spots = np.asarray([anchors[i]])
         elif (low < high).all():
@@ -82,7 +82,7 @@ def scatter(
     return [placed[i] for i in sorted(placed)]
 
 
-def _span(thing: Thing, area: Box) -> tuple[np.ndarray, np.ndarray]:
+def _free_span(thing: Thing, area: Box) -> tuple[np.ndarray, np.ndarray]:
     x0, y0, x1, y1 = thing.polygon.bounds
     off = clearance(thing) + 3
     low = np.array([area[0] - x0 + off, area[1] - y0 + off])

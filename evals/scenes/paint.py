@@ -91,10 +91,10 @@ def _light(size: Size, look: Look) -> Floats:
 
 def _camera(random: Generator, canvas: Floats, look: Look) -> Image.Image:
     if look.blur:
-        image = _image(canvas).filter(ImageFilter.GaussianBlur(look.blur))
+        image = _to_image(canvas).filter(ImageFilter.GaussianBlur(look.blur))
         canvas = np.asarray(image, dtype=np.float32)
     noise = random.standard_normal(canvas.shape, dtype=np.float32)
-    image = _image(canvas + look.noise * noise)
+    image = _to_image(canvas + look.noise * noise)
     if look.jpeg:
         stored = io.BytesIO()
         image.save(stored, "JPEG", quality=look.jpeg)
@@ -102,7 +102,7 @@ def _camera(random: Generator, canvas: Floats, look: Look) -> Image.Image:
     return image
 
 
-def _image(canvas: Floats) -> Image.Image:
+def _to_image(canvas: Floats) -> Image.Image:
     return Image.fromarray(np.clip(np.rint(canvas), 0, 255).astype(np.uint8))
 
 

@@ -46,7 +46,7 @@ def rectangle(ratio: float) -> Polygon:
 
 def rounded(polygon: Polygon, radius: float) -> Polygon:
     """The polygon with its convex corners rounded off."""
-    return _one(polygon.buffer(-radius).buffer(radius, quad_segs=6))
+    return _one_polygon(polygon.buffer(-radius).buffer(radius, quad_segs=6))
 
 
 def star(points: int, waist: float) -> Polygon:
@@ -86,7 +86,7 @@ def heart() -> Polygon:
 
 def crescent(depth: float) -> Polygon:
     """A moon: a disc less a smaller one that starts `depth` from its far side."""
-    return _one(circle().difference(circle(0.85, 0.15 + depth, 0)))
+    return _one_polygon(circle().difference(circle(0.85, 0.15 + depth, 0)))
 
 
 def annulus(hole: float) -> Polygon:
@@ -110,7 +110,7 @@ def cee(width: float, mouth: float) -> Polygon:
             (3 * math.cos(half), 3 * math.sin(half)),
         ]
     )
-    return _one(annulus(1 - width).difference(wedge))
+    return _one_polygon(annulus(1 - width).difference(wedge))
 
 
 def capsule(ratio: float) -> Polygon:
@@ -144,9 +144,9 @@ def scalloped(bumps: int, depth: float) -> Polygon:
 
 def union(polygons: Iterable[Polygon]) -> Polygon:
     """All of them as one, which they must be."""
-    return _one(shapely.union_all(list(polygons)))
+    return _one_polygon(shapely.union_all(list(polygons)))
 
 
-def _one(geometry: shapely.Geometry) -> Polygon:
+def _one_polygon(geometry: shapely.Geometry) -> Polygon:
     assert isinstance(geometry, Polygon)
     return geometry

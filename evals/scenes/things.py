@@ -30,7 +30,7 @@ class Sort:
     Attributes:
         draw: makes the parts from a colour, in units of their own; the first one is the outline.
         corners: how many a person would count; 0 where that is no sensible question.
-        told: whether a person would tell it by its colour.
+        by_colour: whether a person would name it by its colour.
         upright: whether one sees how it is turned.
         scale: its usual size against other things of the scene.
         shape: the word for its shape, where that is what it is.
@@ -40,7 +40,7 @@ class Sort:
     colours: tuple[str, ...]
     draw: Callable[[Generator, RGB], list[Part]]
     corners: int = 0
-    told: bool = True
+    by_colour: bool = True
     upright: bool = False
     scale: float = 1.0
     shape: str = ""
@@ -109,6 +109,11 @@ class Thing:
     def solidity(self) -> float:
         """Share of its convex hull that it fills."""
         return self.polygon.area / self.polygon.convex_hull.area
+
+    @property
+    def hollow(self) -> bool:
+        """Whether robots in a recess of it come between others when counted around its hull."""
+        return self.area < 0.8 * self.polygon.convex_hull.area
 
     def moved(self, x: float, y: float, turn: float) -> "Thing":
         """Turned by degrees about its centroid and put there."""

@@ -1,20 +1,23 @@
-"""The results of a suite by cell (category x setup): counts first, intervals, and the chance level.
+"""The results of a suite by cell (category x setup) and style: counts, intervals, chance levels.
 
 Intervals are Wilson's: of these tasks, not of new ones. Infrastructure errors are left out and
 counted.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..experiments.trials import TrialRow
+import numpy as np
+
+from ..experiments.trials import Trial, TrialRow
 from ..grading.policies import chance
-from ..tasks.suite_task import SuiteTask
+from ..tasks.task import Task
 from .intervals import Interval, wilson
 
 CATEGORIES = ("general", "infill", "caging")
 SETUPS = ("single", "multi", "hidden")
 TOTAL = "total"
+ORDER = (*(f"{c} {s}" for c in CATEGORIES for s in SETUPS), *CATEGORIES, *SETUPS)
 
 
 @dataclass(frozen=True)
@@ -30,15 +33,16 @@ class Cell:
     """Trials that belong together.
 
     Attributes:
-        name: category and setup, one of them, or total.
+        name: category and setup, one of them, a style, or total.
         tasks: how many.
         passed: successes, k.
         scored: trials, n.
         interval: of the success rate at 95 %, of these tasks.
         gcr: mean.
         strict: successes at the tighter tolerances.
-        right_thing: of the trials of which it is known, those about the thing meant; and how many
-            these are.
+        placed: trials in which robots were placed; of these passed, and of those of which it is
+            known about the thing meant: (right, known).
+        iou: mean overlap of the outlines measured with the true ones.
         invalid: trials whose output could not be used.
         lost: infrastructure errors.
         chance: of these tasks.
@@ -51,57 +55,55 @@ class Cell:
     interval: Interval
     gcr: float
     strict: int
+    placed: int
+    placed_passed: int
     right_thing: tuple[int, int]
+    iou: float | None
     invalid: int
     lost: int
     chance: Chance
 
 
-def chances(tasks: Sequence[SuiteTask]) -> dict[str, Chance]:
+def chances(tasks: Sequence[Task]) -> dict[str, Chance]:
     """The chance level of every cell that has tasks, by name."""
     return {
-        name: Chance(*chance([task.goals for task in tasks if holds(*task.cell)]))
-        for name, holds in _groups(task.cell for task in tasks).items()
+        name: Chance(*chance([task.goals for task in tasks if name in cell_names(task)]))
+        for name in _ordered_names(tasks)
     }
 
 
 def cells(rows: Sequence[TrialRow], levels: dict[str, Chance]) -> list[Cell]:
-    """The cells of one arm's rows, those of nothing left out.
+    """The cells of one arm's rows that have any.
 
     Args:
         rows: of one arm.
         levels: chance by name of cell.
     """
-    groups = _groups((row.category, row.setup) for row in rows)
     return [
-        _cell(name, [row for row in rows if holds(row.category, row.setup)], levels[name])
-        for name, holds in groups.items()
+        _cell(name, [row for row in rows if name in cell_names(row)], levels[name])
+        for name in _ordered_names(rows)
     ]
 
 
-def _groups(there: Iterable[tuple[str, str]]) -> dict[str, Callable[[str, str], bool]]:
-    """Which cells are told of, in order, and what belongs to each."""
-    known = set(there)
-    groups: dict[str, Callable[[str, str], bool]] = {}
-    for category in CATEGORIES:
-        for setup in SETUPS:
-            if (category, setup) in known:
-                cell = (category, setup)
-                groups[f"{category} {setup}"] = lambda c, s, cell=cell: (c, s) == cell
-    for category in CATEGORIES:
-        if any(c == category for c, _ in known):
-            groups[category] = lambda c, s, category=category: c == category
-    for setup in SETUPS:
-        if any(s == setup for _, s in known):
-            groups[setup] = lambda c, s, setup=setup: s == setup
-    groups[TOTAL] = lambda c, s: True
-    return groups
+def cell_names(of: Task | Trial) -> list[str]:
+    """The cells that a task or trial belongs to."""
+    both = f"{of.category} {of.setup}"
+    return [name for name in (both, of.category, of.setup, of.style, TOTAL) if name]
+
+
+def _ordered_names(there: Iterable[Task | Trial]) -> list[str]:
+    """All cells: the paper's, then styles, then the total."""
+    names = {name for of in there for name in cell_names(of)} - {TOTAL}
+    known = [name for name in ORDER if name in names]
+    return [*known, *sorted(names.difference(known)), TOTAL]
 
 
 def _cell(name: str, rows: Sequence[TrialRow], level: Chance) -> Cell:
     scored = [row for row in rows if row.scored]
+    placed = [row for row in scored if row.placed]
     passed = sum(bool(row.sr) for row in scored)
-    known = [row.object_correct for row in scored if row.object_correct is not None]
+    known = [row.object_correct for row in placed if row.object_correct is not None]
+    overlaps = [row.iou for row in scored if row.iou is not None]
     return Cell(
         name=name,
         tasks=len({row.task for row in rows}),
@@ -110,7 +112,10 @@ def _cell(name: str, rows: Sequence[TrialRow], level: Chance) -> Cell:
         interval=wilson(passed, len(scored)) if scored else Interval(0.0, 1.0),
         gcr=sum(row.gcr or 0.0 for row in scored) / max(len(scored), 1),
         strict=sum(bool(row.strict) for row in scored),
+        placed=len(placed),
+        placed_passed=sum(bool(row.sr) for row in placed),
         right_thing=(sum(known), len(known)),
+        iou=float(np.mean(overlaps)) if overlaps else None,
         invalid=sum(row.status == "model_invalid" for row in scored),
         lost=len(rows) - len(scored),
         chance=level,

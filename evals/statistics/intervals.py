@@ -1,6 +1,6 @@
 """Intervals, tests and reliability for success over tasks that are each tried several times.
 
-Two questions are kept apart. New tasks: the task is the sampling unit, as trials of one task are
+Two questions are distinct. New tasks: the task is the sampling unit, as trials of one task are
 alike. Fixed tasks: only the luck of a trial varies. Bounds at the edges (0 or all successes) stay
 bounds: nothing here claims certainty from few trials.
 """
@@ -115,17 +115,17 @@ def sign_flips(differences: FloatArray, seed: int = 0) -> float:
     Args:
         differences: (n,), weighted so that their sum is the statistic.
     """
-    kept = differences[np.abs(differences) > TINY]
-    if not len(kept):
+    nonzero = differences[np.abs(differences) > TINY]
+    if not len(nonzero):
         return 1.0
-    least = abs(float(kept.sum())) - TINY * float(np.abs(kept).sum())
-    if len(kept) <= EXACT:
-        bits = (np.arange(1 << len(kept))[:, None] >> np.arange(len(kept))) & 1
-        return float((np.abs((1.0 - 2.0 * bits) @ kept) >= least).mean())
+    least = abs(float(nonzero.sum())) - TINY * float(np.abs(nonzero).sum())
+    if len(nonzero) <= EXACT:
+        bits = (np.arange(1 << len(nonzero))[:, None] >> np.arange(len(nonzero))) & 1
+        return float((np.abs((1.0 - 2.0 * bits) @ nonzero) >= least).mean())
     random, hits = np.random.default_rng(seed), 0
     for _ in range(DRAWS // CHUNK):
-        signs = np.where(random.random((CHUNK, len(kept))) < 0.5, 1.0, -1.0)
-        hits += int((np.abs(signs @ kept) >= least).sum())
+        signs = np.where(random.random((CHUNK, len(nonzero))) < 0.5, 1.0, -1.0)
+        hits += int((np.abs(signs @ nonzero) >= least).sum())
     return (1 + hits) / (1 + DRAWS)
 
 
@@ -156,15 +156,6 @@ def pass_k(successes: FloatArray, counts: FloatArray, k: int) -> float:
     if not 1 <= k <= counts.min():
         raise ValueError(f"pass^{k} needs at least {k} trials of every task.")
     return float(np.mean(comb(successes, k) / comb(counts, k)))
-
-
-def chance_corrected(score: float, chance: float) -> float:
-    """A score on the scale where guessing is 0 and all right is 1.
-
-    Args:
-        chance: what guessing scores, below 1.
-    """
-    return (score - chance) / (1 - chance)
 
 
 @lru_cache(maxsize=1024)

@@ -1,8 +1,4 @@
-"""How many tasks and trials it takes to see a difference: by simulation, and from a comparison.
-
-Model: a task's success rate is drawn from a beta distribution, so that `icc` of a trial's variance
-is the task's; a version changes each task's rate by the effect and a deviation of its own.
-"""
+"""How many tasks and trials it takes to see a difference as spread as a comparison shows it."""
 
 import math
 from bisect import bisect_left
@@ -11,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...tools.geometry.outline import FloatArray
-from .intervals import ICC, least_error
+from .intervals import least_error
 
-MEAN, TASK_SD = 0.7, 0.05
-"""Success rate of the first version, and the spread of a version's effect between tasks."""
 ALPHA, POWER = 0.05, 0.8
 MOST = 100_000
 """More tasks or trials per task than anybody runs."""
@@ -48,7 +42,7 @@ class Needed:
     """Either of the two settles a question: more trials of these tasks, or more tasks.
 
     Attributes:
-        difference: that can then be told, 0 to 1.
+        difference: that can then be seen, 0 to 1.
         trials: per task with the tasks there are; None where no number of trials is enough.
         tasks: with as many trials of each as now; None where none is enough.
     """
@@ -56,35 +50,6 @@ class Needed:
     difference: float
     trials: int | None
     tasks: int | None
-
-
-def rates(random: np.random.Generator, shape: tuple[int, ...], mean: float = MEAN) -> FloatArray:
-    """Success rates of tasks, from the beta distribution of that mean and the ICC."""
-    weight = 1 / ICC - 1
-    return random.beta(mean * weight, (1 - mean) * weight, shape)
-
-
-def power(tasks: int, trials: int, effect: float, draws: int = 2000, seed: int = 0) -> float:
-    """Share of comparisons whose paired t test on task means finds a difference, at .05 two-sided.
-
-    Rates end at 0 and 1: of +5 points on a mean of .70, 4.4 are left.
-
-    Args:
-        trials: of each task and version.
-        effect: what the second version adds to every rate, before the ends.
-    """
-    from scipy.special import stdtrit
-
-    random = np.random.default_rng(seed)
-    before = rates(random, (draws, tasks))
-    change = effect + random.normal(0, TASK_SD, before.shape)
-    after = np.clip(before + change, 0, 1)
-    won: list[FloatArray] = [random.binomial(trials, rate) / trials for rate in (before, after)]
-    gained = won[1] - won[0]
-    errors: FloatArray = gained.std(axis=1, ddof=1) / math.sqrt(tasks)
-    means: FloatArray = gained.mean(axis=1)
-    reach = float(stdtrit(tasks - 1, 1 - ALPHA / 2))
-    return float((np.abs(means) > reach * errors).mean())
 
 
 def spread(differences: list[FloatArray]) -> Spread:
@@ -115,20 +80,20 @@ def needed(seen: Spread, difference: float, *, one_sided: bool = False) -> Neede
         return Needed(difference, None, None)
     trials = tasks = None
     if seen.tasks > 1 and seen.within > 0:
-        error = difference / _reach(seen.tasks, one_sided)
+        error = difference / _errors_needed(seen.tasks, one_sided)
         left = error**2 * seen.tasks - seen.between
         trials = math.ceil(seen.within / left) if left > seen.within / MOST else None
     each = seen.between + seen.within / seen.trials
 
     def enough(count: int) -> bool:
-        return count >= each * (_reach(count, one_sided) / difference) ** 2
+        return count >= each * (_errors_needed(count, one_sided) / difference) ** 2
 
     if enough(MOST):
         tasks = bisect_left(range(2, MOST), True, key=enough) + 2
     return Needed(difference, trials, tasks)
 
 
-def _reach(tasks: int, one_sided: bool) -> float:
+def _errors_needed(tasks: int, one_sided: bool) -> float:
     """Standard errors that a difference must measure."""
     from scipy.special import stdtrit
 

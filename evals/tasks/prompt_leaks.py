@@ -11,8 +11,9 @@ from typing import Any, cast
 
 from ...prompts import Prompt
 from ...prompts.lint import Finding
-from ..scenes.build import wordings
-from .photographs import Task, load_tasks, photos_folder
+from ..scenes.stories import wordings
+from .suites import load_suite
+from .task import Task
 
 WORDS = 5
 """As many words in a row that stand in a task are no chance."""
@@ -22,26 +23,26 @@ _PAIR = re.compile(r"[\[(]?\b([0-9]+(?:\.[0-9]+)?)\s*,\s*([0-9]+(?:\.[0-9]+)?)\b
 def leaks(prompt: Prompt) -> list[Finding]:
     """Words and coordinates of the shipped suites that stand in a prompt or its examples."""
     given = prompt.front.inputs.values()
-    said = "\n".join([prompt.text, *(str(v) for i in given for v in (i.example, i.default) if v)])
-    texts, places = _known()
-    copied = sorted(_runs(said) & texts)
+    text = "\n".join([prompt.text, *(str(v) for i in given for v in (i.example, i.default) if v)])
+    texts, places = _known_content()
+    copied = sorted(_word_runs(text) & texts)
     found = [f"It has words of a task: {' '.join(run)!r}." for run in copied]
-    for match in _PAIR.finditer(said):
+    for match in _PAIR.finditer(text):
         if (float(match[1]), float(match[2])) in places:
             found.append(f"It has a place in a picture of a task: {match[0].strip('[(')}.")
     return [Finding(prompt.name, "leak", "error", sentence) for sentence in found]
 
 
 @cache
-def _known() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[float, float]]]:
+def _known_content() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[float, float]]]:
     """Runs of words, and places (x, y) in px, of the tasks that ship with formup."""
-    tasks = load_tasks() + load_tasks(photos_folder() / "many.json")
+    tasks = [task for name in ("photos", "many") for task in load_suite(name).tasks]
     texts = [task.instruction for task in tasks] + list(_strings(wordings()))
-    runs = {run for text in texts for run in _runs(text)}
+    runs = {run for text in texts for run in _word_runs(text)}
     return frozenset(runs), frozenset(place for task in tasks for place in _places(task))
 
 
-def _runs(text: str) -> set[tuple[str, ...]]:
+def _word_runs(text: str) -> set[tuple[str, ...]]:
     """All five words in a row of a text; a slot such as {thing} is a word of its own."""
     words = re.findall(r"\{?\w+\}?", text.lower())
     return {tuple(words[i : i + WORDS]) for i in range(len(words) - WORDS + 1)}
@@ -49,9 +50,9 @@ def _runs(text: str) -> set[tuple[str, ...]]:
 
 def _places(task: Task) -> Iterable[tuple[float, float]]:
     """Where robots should stand, and the outline of what is meant and of its box."""
-    for point in task.success.get("points", ()):
+    for point in (point for goal in task.goals for point in goal.success.get("points", ())):
         yield float(point[0]), float(point[1])
-    for thing in filter(None, [task.target, task.other]):
+    for thing in task.things:
         x0, y0, x1, y1 = thing.outline.bounds
         yield from ((x, y) for ring in (thing.polygon, *thing.holes) for x, y in ring)
         yield from ((x, y) for x in (x0, x1) for y in (y0, y1))
@@ -61,11 +62,11 @@ def _strings(value: Any) -> Iterable[str]:
     """All texts of a nested value."""
     if isinstance(value, str):
         yield value
-    for part in _parts(value):
+    for part in _parts_of_value(value):
         yield from _strings(part)
 
 
-def _parts(value: Any) -> Iterable[Any]:
+def _parts_of_value(value: Any) -> Iterable[Any]:
     if isinstance(value, dict):
         return cast(dict[str, Any], value).values()
     return cast(list[Any], value) if isinstance(value, list) else ()

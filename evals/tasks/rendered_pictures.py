@@ -6,33 +6,33 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...tools.perception.image import Picture, load_picture
-from .suite_task import Drawing, SuiteTask
+from .task import Drawing, Task
 
 
 @dataclass(frozen=True)
-class Hung:
+class RenderedPicture:
     """A picture's file and the hash of its pixels."""
 
     path: Path
     pixels: str
 
 
-def hang(
-    tasks: Sequence[SuiteTask], folder: Path, told: Callable[[], None] = lambda: None
-) -> dict[str, Hung]:
+def render(
+    tasks: Sequence[Task], folder: Path, done: Callable[[], None] = lambda: None
+) -> dict[str, RenderedPicture]:
     """The picture of each task, by its id.
 
     Args:
         tasks: whose pictures are wanted.
         folder: for those that are drawn; what is there already is used, and hashed as it is.
-        told: called after each.
+        done: called after each.
 
     Raises:
         ImageError: a file is no picture.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    found: dict[Path, Hung] = {}
-    hung: dict[str, Hung] = {}
+    found: dict[Path, RenderedPicture] = {}
+    rendered: dict[str, RenderedPicture] = {}
     for task in tasks:
         path = task.picture
         if isinstance(path, Drawing):
@@ -42,10 +42,10 @@ def hang(
                 part = path.with_suffix(".part")
                 task.picture.image().save(part, format="PNG", compress_level=1)
                 part.replace(path)
-            found[path] = Hung(path, hashed(load_picture(path)))
-        hung[task.id] = found[path]
-        told()
-    return hung
+            found[path] = RenderedPicture(path, hashed(load_picture(path)))
+        rendered[task.id] = found[path]
+        done()
+    return rendered
 
 
 def hashed(picture: Picture) -> str:

@@ -213,12 +213,15 @@ def test_tools_by_hand_say_what_is_wrong(cli: Cli, picture: Path) -> None:
 
 
 def test_eval_says_what_is_wrong(cli: Cli, tmp_path: Path) -> None:
-    refused(cli("eval", "photos", "--mode", "psychic"), "'psychic'", "outline")
-    refused(cli("eval", "photos", "--data", tmp_path), "annotations.json")
-    refused(cli("eval", "photos", "--seeds", 0), "--seeds '0'")
-    refused(cli("eval", "photos", "--model", f"replay:{tmp_path}"), "none has a recording here")
+    refused(cli("eval", "run", "photos", "--mode", "psychic"), "'psychic'", "outline")
+    refused(cli("eval", "run", tmp_path), "annotations.json")
+    refused(cli("eval", "run", "photos", "--trials", 0), "--trials '0'")
+    refused(cli("eval", "run", "scenes", "--seeds", "9-3"), "'9-3'", "0-199")
+    refused(cli("eval", "run", "smoke", "--seeds", "0-3"), "not made of one range of seeds")
+    replay = ("--method", "agent", "--model", f"replay:{tmp_path}")
+    refused(cli("eval", "run", "photos", *replay), "none has a recording here")
     (tmp_path / "annotations.json").write_text("[{}]")
-    refused(cli("eval", "photos", "--data", tmp_path), "required")
+    refused(cli("eval", "run", tmp_path), "required")
 
 
 @pytest.mark.parametrize("scale", ["0", "-1", "nan", "inf", "1e9", "5 cm", ""])

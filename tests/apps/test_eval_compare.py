@@ -12,7 +12,7 @@ from formup.evals.experiments.comparison import Comparison
 from formup.evals.experiments.executors import Work
 from formup.evals.experiments.journal import equal_lines, read_rows
 from formup.evals.experiments.runner import run_trials
-from formup.evals.experiments.trials import Trial, TrialRow
+from formup.evals.experiments.trials import Arm, Trial, TrialRow
 from formup.tools.errors import InputError
 from rich.console import Console
 
@@ -23,10 +23,12 @@ def planned(*prompts: int, tasks: int = 12) -> list[Trial]:
             suite="5" * 64,
             task=f"t{task:02d}",
             trial=number,
-            method="agent",
-            prompt=f"former@v{version:03d}",
-            prompt_sha=f"{version:064x}",
-            model="offline",
+            arm=Arm(
+                method="agent",
+                prompt=f"former@v{version:03d}",
+                sha256=f"{version:064x}",
+                model="offline",
+            ),
             category=("caging", "infill")[task % 2],
         )
         for version in prompts
@@ -39,7 +41,7 @@ def passing(**counts: int) -> Work:
     """So many of ten trials pass, by prompt."""
 
     def work(trial: Trial) -> TrialRow:
-        enough = counts[str(trial.prompt)[-4:]] + int(trial.task[1:]) % 3 - 1
+        enough = counts[str(trial.arm.prompt)[-4:]] + int(trial.task[1:]) % 3 - 1
         return TrialRow.of(trial, "pass" if trial.trial < enough else "fail", cost_usd=0.5)
 
     return work

@@ -126,11 +126,11 @@ def test_a_planted_regression_of_ten_points_is_blocked(
     assert lost == REGRESSION == 0.1
     assert (TASKS, TRIALS) in PLANTED
     assert planted(TASKS, TRIALS, lost, comparisons=400).blocked > 0.75 * 400  # power .8
-    run: list[Any] = ["eval", "run", suite, "--method", "agent", "--model", "obedient"]
+    run: list[Any] = ["eval", "run", suite, "--method", "agent", "--model", "simulated"]
     more: list[Any] = ["--prompt", GOOD, "--prompt", BAD, "--prompts", forgetful]
     assert formup(*run, *more, "--trials", str(TRIALS), "--out", tmp_path / "both") == 0
     rows = read_rows(tmp_path / "both")
-    rates = {p: [bool(r.sr) for r in rows if r.prompt == p] for p in (GOOD, BAD)}
+    rates = {p: [bool(r.sr) for r in rows if r.arm.prompt == p] for p in (GOOD, BAD)}
     assert {len(successes) for successes in rates.values()} == {TRIALS * TASKS}
     assert sum(rates[GOOD]) == TRIALS * TASKS
     assert all(row.input_tokens for row in rows)
@@ -179,15 +179,15 @@ def test_a_task_with_a_wrong_truth_is_not_added(tmp_path: Path) -> None:
         (["--method", "magic"], "There are: rules, agent, alone, pile"),
         (["--method", "agent"], "takes a --model"),
         (["--method", "alone", "--model", "offline"], "--method rules"),
-        (["--method", "alone", "--model", "obedient"], "writes no coordinates alone"),
+        (["--method", "alone", "--model", "simulated"], "writes no coordinates alone"),
         (["--method", "rules", "--prompt", GOOD], "--prompt goes with"),
-        (["--method", "agent", "--model", "obedient", "--prompt", "x@v001"], "Unknown prompt"),
+        (["--method", "agent", "--model", "simulated", "--prompt", "x@v001"], "Unknown prompt"),
         (["--trials", "0"], "--trials '0'"),
         (["--budget", "-1"], "--budget '-1'"),
         (["--shard", "3/2"], "--shard '3/2'"),
         (["--descriptor", "poem"], "poem"),
         (["--rate", "x=5"], "--rate 'x=5' cannot be used; give MODEL=N.*run: none"),
-        (["--method", "agent", "--model", "obedient", "--rate", "obedient=0"], "N above 0"),
+        (["--method", "agent", "--model", "simulated", "--rate", "simulated=0"], "N above 0"),
     ],
 )
 def test_what_cannot_be_run_is_said(

@@ -8,10 +8,12 @@ from formup.agent.agent import Agent
 from formup.agent.messages import Call, Reply
 from formup.agent.wrappers.doubles import ScriptedModel
 from formup.evals.experiments.journal import Manifest
-from formup.evals.experiments.methods import kept_as
-from formup.evals.experiments.trials import Status, Trial, TrialRow
-from formup.evals.tasks.rendered_pictures import hashed
-from formup.evals.tasks.stored_suite import KeptGoal, KeptSuite, KeptTask, KeptThing
+from formup.evals.experiments.suite_work import attempt_name
+from formup.evals.experiments.trials import Arm, Status, Trial, TrialRow
+from formup.evals.statistics.cells import Chance
+from formup.evals.tasks.rendered_pictures import RenderedPicture, hashed
+from formup.evals.tasks.stored_suite import StoredSuite
+from formup.evals.tasks.task import Goal, Task, Thing
 from formup.tools.perception.image import load_picture
 from PIL import Image
 
@@ -33,15 +35,19 @@ def write_run(folder: Path, method: str, *, passing: int, split: str = "dev") ->
     pixels[40:80, 60:100] = (200, 40, 40)
     Image.fromarray(pixels).save(folder / "square.png")
     rows = [_row(i, n, method, i < passing) for i in range(TASKS) for n in range(2)]
-    suite = KeptSuite(
+    pixels_hash = hashed(load_picture(folder / "square.png"))
+    picture = RenderedPicture(Path("square.png"), pixels_hash)
+    suite = StoredSuite(
         name="hostile",
         description=EVIL.replace("\ud800", ""),
         split=split,
         sha256=SUITE,
         chance=dict.fromkeys(
-            ("total", "general", "caging", "single", "general single", "caging single"), (0.1, 0.2)
+            ("total", "general", "caging", "single", "general single", "caging single"),
+            Chance(0.1, 0.2),
         ),
         tasks=tuple(_task(i, folder) for i in range(TASKS)),
+        pictures={_name(i): picture for i in range(TASKS)},
     )
     (folder / "suite.json").write_text(suite.model_dump_json(), "utf-8")
     (folder / "manifest.json").write_text(Manifest.of(rows).model_dump_json(), "utf-8")
@@ -60,9 +66,11 @@ def _row(number: int, trial: int, method: str, passes: bool) -> TrialRow:
         suite=SUITE,
         task=_name(number),
         trial=trial,
-        method=f"{method}<script>alert(5)</script>",
-        prompt="</td><script>alert(6)</script>",
-        model="a:b'\"><script>alert(7)</script>",
+        arm=Arm(
+            method=f"{method}<script>alert(5)</script>",
+            prompt="</td><script>alert(6)</script>",
+            model="a:b'\"><script>alert(7)</script>",
+        ),
         category="caging" if number % 2 else "general",
         setup="single",
     )
@@ -80,22 +88,24 @@ def _row(number: int, trial: int, method: str, passes: bool) -> TrialRow:
     )
 
 
-def _task(number: int, folder: Path) -> KeptTask:
-    ring = ((60.0, 40.0), (100.0, 40.0), (100.0, 80.0), (60.0, 80.0))
-    thing = KeptThing(name=EVIL.replace("\ud800", ""), outline=ring, holes=())
-    corners = {"where": "corners", "points": [list(p) for p in ring], "tolerance_px": 6}
+def _task(number: int, folder: Path) -> Task:
+    ring = [[60.0, 40.0], [100.0, 40.0], [100.0, 80.0], [60.0, 80.0]]
+    thing = Thing("square", EVIL.replace("\ud800", ""), ring, [])
+    corners = {"where": "corners", "points": ring, "tolerance_px": 6}
     band = {"where": "boundary", "band_px": [3, 20], "max_gap_px": 70}
-    return KeptTask(
+    return Task(
         id=_name(number),
         instruction=f"{SECRET} {EVIL}".replace("\ud800", ""),
+        robots=4,
         category="caging" if number % 2 else "general",
         setup="single",
+        family="",
+        split="dev",
         style="plain",
-        robots=4,
+        referring="",
+        goals=(Goal(4, (160, 120), thing, band if number % 2 else corners),),
         expects=("deployed",),
-        goals=(KeptGoal(robots=4, things=(thing,), success=band if number % 2 else corners),),
-        picture="square.png",
-        pixels=hashed(load_picture(folder / "square.png")),
+        picture=folder / "square.png",
     )
 
 
@@ -105,13 +115,13 @@ def _keep(folder: Path, row: TrialRow) -> None:
     if not row.sr:
         points[3] = [900.0, -50.0]
     kept = {
-        "said": EVIL,
+        "message": EVIL,
         "planned": points,
         "observed": points,
         "found": [[[61.0, 41.0], [99.0, 41.0], [99.0, 79.0]]],
         "graded": {"right": [True, True, True, bool(row.sr)]},
     }
-    path = folder / "attempts" / kept_as(row)
+    path = folder / "attempts" / attempt_name(row)
     path.with_suffix(".json").write_text(json.dumps(kept), "utf-8")
     if row.trial == 0:
         calls = (Call(id="1", name=EVIL[:60], arguments={"x": EVIL.replace("\ud800", "")}),)

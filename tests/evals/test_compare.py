@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from formup.evals.experiments.compare import compare
 from formup.evals.experiments.comparison import Comparison
-from formup.evals.experiments.trials import Status, TrialRow
+from formup.evals.experiments.trials import Arm, Status, TrialRow
 from formup.tools.errors import InputError
 
 SUITE = "5" * 64
@@ -17,10 +17,12 @@ def row(task: str, trial: int, status: Status, version: int = 1, **facts: Any) -
         suite=facts.pop("suite", SUITE),
         task=task,
         trial=trial,
-        method="agent",
-        prompt=f"former@v{version:03d}",
-        prompt_sha=f"{version:064x}",
-        model="offline",
+        arm=Arm(
+            method="agent",
+            prompt=f"former@v{version:03d}",
+            sha256=f"{version:064x}",
+            model="offline",
+        ),
         status=status,
         sr=None if status == "infra_error" else status == "pass",
         **facts,
@@ -81,6 +83,7 @@ def test_the_report_is_what_promotion_reads() -> None:
         "tools": None,
         "model": "offline",
         "descriptor": None,
+        "mode": "words",
     }
     assert report["b"]["prompt"] == "former@v002"
     assert (report["suite"], report["verdict"]) == (SUITE, "pass")

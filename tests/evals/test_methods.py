@@ -14,35 +14,26 @@ from formup.agent.messages import Call, Reply
 from formup.agent.model import Model
 from formup.agent.wrappers.doubles import FunctionModel
 from formup.evals.experiments.executors import attempt, executor
-from formup.evals.experiments.journal import Arm, read_rows
-from formup.evals.experiments.methods import Method, SuiteWork, arm_key, method, trials_of
+from formup.evals.experiments.journal import read_rows
+from formup.evals.experiments.methods import Method, check_method
 from formup.evals.experiments.runner import run_trials
 from formup.evals.experiments.simulated_model import DUTIES, lapses_of
-from formup.evals.experiments.trials import Trial, TrialRow
-from formup.evals.grading.reference import reference
-from formup.evals.tasks.load import load_suite, write_suite
-from formup.evals.tasks.rendered_pictures import hang
+from formup.evals.experiments.trials import Arm, Trial, TrialRow
+from formup.evals.grading.reference_answers import reference
+from formup.evals.tasks.suites import load_suite, write_suite
 from formup.prompts import load_prompt
 from formup.tools.errors import InputError, ModelError
 
 sys.path.insert(0, str(Path(__file__).parent))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
+work_of: Callable[..., Any] = import_module("trying").work_of
 
-FIRST = Trial(suite="0" * 64, task="t", trial=0, method="rules", model="offline")
+FIRST = Trial(suite="0" * 64, task="t", trial=0, arm=Arm(method="rules", model="offline"))
 ASKED = {"question": "Which one?"}
 
 
-def work_of(folder: Path, arm: Method, keep: Path | None = None) -> tuple[SuiteWork, list[Trial]]:
-    suite = load_suite(str(folder))
-    hung = hang(suite.tasks, folder)
-    trials = trials_of("0" * 64, suite.tasks, [arm.facts(None)], 1)
-    work = SuiteWork(
-        {t.id: t for t in suite.tasks},
-        {name: picture.path for name, picture in hung.items()},
-        {arm_key(trials[0]): arm},
-        keep=keep,
-    )
-    return work, trials
+def work_for(folder: Path, arm: Method, attempts: Path | None = None) -> Any:
+    return work_of(load_suite(str(folder)).tasks, arm, folder, 1, attempts)
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +58,7 @@ def row_of(
 
     monkeypatch.setattr(agent_module, "model_named", named)
     arm = Method(name, "openai:x", "former-direct@v001")
-    work, trials = work_of(folder, arm, folder)
+    work, trials = work_for(folder, arm, folder)
     return attempt(work, trials[0])
 
 
@@ -80,7 +71,7 @@ def test_a_model_alone_is_graded_by_what_it_writes(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = row_of(folder, monkeypatch, "alone", Reply(text=f"Here: {written(folder)}"))
-    assert (right.status, right.gcr, right.tools_sha) == ("pass", 1.0, None)
+    assert (right.status, right.gcr, right.arm.tools) == ("pass", 1.0, None)
     few = row_of(folder, monkeypatch, "alone", Reply(text=written(folder, positions=[[1, 1]])))
     assert few.status == "fail"
     for text in ("I cannot see a square.", '{"positions": "all"}', '<tool_call>{"x": 1}'):
@@ -132,8 +123,8 @@ def test_requests_to_a_model_keep_its_pace(folder: Path, monkeypatch: pytest.Mon
         slept.append(seconds)
 
     monkeypatch.setattr("formup.evals.experiments.rate_limiter.asyncio.sleep", sleep)
-    arm = Method("agent", "obedient", "former@v003", rate=0.01)
-    work, trials = work_of(folder, arm)
+    arm = Method("agent", "simulated", "former@v003", rate=0.01)
+    work, trials = work_for(folder, arm)
     assert [work(trial).status for trial in trials[:2]] == ["pass", "pass"]
     assert slept[0] == 0
     assert len(slept) >= 6  # replies of both trials, one after the other
@@ -142,7 +133,7 @@ def test_requests_to_a_model_keep_its_pace(folder: Path, monkeypatch: pytest.Mon
 
 
 def test_work_can_be_given_to_other_processes(folder: Path, tmp_path: Path) -> None:
-    work, trials = work_of(folder, method("circle", None, None, "edges"))
+    work, trials = work_for(folder, Method("circle", "none"))
     again = pickle.loads(pickle.dumps(work))
     assert again(trials[0]) == work(trials[0])
     run_trials(trials, work, tmp_path, executor=executor("pool", 1))
@@ -150,19 +141,22 @@ def test_work_can_be_given_to_other_processes(folder: Path, tmp_path: Path) -> N
 
 
 def test_a_descriptor_is_part_of_the_arm() -> None:
-    facts = [Method("rules", "offline", None, d).facts(None) for d in ("edges", "matrix")]
-    assert [fact.pop("descriptor") for fact in facts] == ["edges", "matrix"]
-    assert facts[0] == facts[1]
-    trials = [FIRST.model_copy(update={"descriptor": d}) for d in ("edges", "matrix")]
+    arms = [Method("rules", "offline", None, d).arm for d in ("edges", "matrix")]
+    assert [arm.descriptor for arm in arms] == ["edges", "matrix"]
+    assert arms[0] == arms[1].model_copy(update={"descriptor": "edges"})
+    assert Method("rules", "offline", mode="box").arm.mode == "box"
+    trials = [FIRST.model_copy(update={"arm": arm}) for arm in arms]
     assert len({Trial(**trial.model_dump()).key for trial in trials}) == 2
-    assert [Arm.of(trial).name for trial in trials] == ["rules offline", "rules offline matrix"]
-    assert method("circle", None, None, "edges").facts(None) == {
-        "method": "circle",
-        "model": "none",
-    }
-    for name in ("circle", "alone"):
-        with pytest.raises(InputError, match="--descriptor goes with the methods rules and agent"):
-            method(name, None, None, "matrix")
+    assert [arm.name for arm in arms] == ["rules offline", "rules offline matrix"]
+    assert check_method(Method("circle")).arm == Arm(method="circle", model="none")
+    for arm, message in (
+        (Method("circle", descriptor="matrix"), "--descriptor goes with the methods rules"),
+        (Method("alone", "x:y", descriptor="matrix"), "--descriptor goes with the methods rules"),
+        (Method("circle", mode="box"), "--mode goes with the methods rules and agent and alone"),
+        (Method("rules", planner="x:y"), "--planner goes with the method agent"),
+    ):
+        with pytest.raises(InputError, match=message):
+            check_method(arm)
 
 
 def test_the_test_model_goes_by_the_sentences_of_its_prompt() -> None:

@@ -1,52 +1,71 @@
 """Conversations with somebody who saw what a model sees, replayed: every one comes out the same."""
 
-from dataclasses import dataclass
+import json
+import sys
+from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from formup.agent.agent import Agent
 from formup.agent.store.folder import read_trace
-from formup.evals.experiments.pointed import Row, evaluate
-from formup.evals.tasks.photographs import load_tasks, photos_folder
+from formup.evals.experiments.methods import Method
+from formup.evals.experiments.recordings import Recordings
+from formup.evals.experiments.trials import TrialRow
+from formup.evals.tasks.suites import load_suite
+from formup.tools.errors import InputError
+
+sys.path.insert(0, str(Path(__file__).parent))
+trying = import_module("trying")
+tried: Callable[..., list[TrialRow]] = trying.tried
 
 RECORDED = Path(__file__).parent.parent / "recordings"
-TASKS = {t.id: t for t in (*load_tasks(), *load_tasks(photos_folder() / "many.json"))}
+TASKS = {t.id: t for name in ("photos", "many") for t in load_suite(name).tasks}
 
 
 def recordings(*folders: str) -> list[Path]:
     return sorted(path for name in folders for path in (RECORDED / name).glob("*.jsonl"))
 
 
-ALL = recordings("photos", "many", "two-stages", "direct")
-
-
-@dataclass(frozen=True)
-class Replayed:
-    row: Row
-    end: dict[str, Any]
+ALL = recordings("photos", "many", "two-stages")
 
 
 @cache
-def replay(path: Path) -> Replayed:
-    """A recording, replayed once by each process that asks for it."""
-    end = read_trace(path).end
-    assert end is not None
-    (row,) = evaluate([TASKS[path.stem]], "words", 1, agent=lambda task: Agent(f"replay:{path}"))
-    return Replayed(row, end)
+def replay(path: Path) -> tuple[TrialRow, dict[str, Any]]:
+    """The row and the attempt of a recording, replayed once by each process that asks for it."""
+    arm = Method("agent", f"replay:{path.parent}")
+    with TemporaryDirectory() as folder:
+        (row,) = tried([TASKS[path.stem]], arm, Path(folder))
+        (attempt,) = Path(folder).glob("*.json")
+        return row, json.loads(attempt.read_bytes())
 
 
-def rows(folder: str) -> list[Row]:
-    return [replay(path).row for path in recordings(folder)]
+def rows(folder: str) -> list[TrialRow]:
+    return [replay(path)[0] for path in recordings(folder)]
 
 
 @pytest.mark.parametrize("path", ALL, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_ends_as_recorded(path: Path) -> None:
-    row, end = replay(path).row, replay(path).end
-    assert (row.status, row.message) == (end["status"], end["message"])
+    row, attempt = replay(path)
+    end = read_trace(path).end
+    assert end is not None
+    assert (row.outcome, attempt["message"]) == (end["status"], end["message"])
     assert row.requests == end["usage"]["requests"]
+
+
+def test_the_attempts_of_a_run_are_recordings_too(tmp_path: Path) -> None:
+    (path, *_) = recordings("photos")
+    for name in (f"{path.stem}-0-0123456789ab", f"{path.stem}-1-ba9876543210"):
+        (tmp_path / f"{name}.jsonl").write_bytes(path.read_bytes())
+    found = Recordings(tmp_path)
+    assert str(found.of(path.stem, 1)).endswith("ba9876543210.jsonl")
+    assert found.of(path.stem, 2) is None
+    (tmp_path / f"{path.stem}-1-another.jsonl").touch()
+    with pytest.raises(InputError, match="keep those of one arm"):
+        found.of(path.stem, 1)
 
 
 def test_a_clear_case_takes_few_requests() -> None:
@@ -59,15 +78,15 @@ def test_a_clear_case_takes_few_requests() -> None:
 
 def test_nearly_all_are_strictly_right() -> None:
     found = rows("photos")
-    assert sum(row.strict for row in found) >= 0.95 * len(found)
-    assert all(row.right for row in found)
+    assert sum(bool(row.strict) for row in found) >= 0.95 * len(found)
+    assert all(row.object_correct for row in found)
 
 
 def test_many_robots_at_a_stated_clearance() -> None:
     """One of twelve is not: docs/seeing.md says why."""
     found = rows("many")
     assert len(found) == 12
-    assert all(24 <= TASKS[row.task].robots <= 40 for row in found)
+    assert all(24 <= (TASKS[row.task].robots or 0) <= 40 for row in found)
     missed = {row.task for row in found if not row.strict}
     assert missed == {"cars_two_many"}
     assert median(row.requests for row in found) <= 3

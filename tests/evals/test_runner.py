@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from formup.evals.experiments.executors import Executor, Pool, Ray, Serial, executor
 from formup.evals.experiments.journal import MANIFEST, ROWS, equal_lines, held, merge, read_rows
-from formup.evals.experiments.runner import Progress, Queue, balanced, part, run_trials
+from formup.evals.experiments.runner import Progress, balanced, part, run_trials
 from formup.evals.experiments.trials import Trial, TrialRow
 from formup.tools.errors import InputError, ModelError
 from pydantic import ValidationError
@@ -31,20 +31,21 @@ def result(folder: Path) -> bytes:
 
 
 def test_a_trial_is_known_by_all_it_depends_on() -> None:
-    changes: dict[str, object] = {
-        "suite": "b" * 64,
-        "task": "u",
-        "trial": 1,
+    changes: dict[str, object] = {"suite": "b" * 64, "task": "u", "trial": 1, "style": "fresh"}
+    arms: dict[str, object] = {
         "method": "alone",
         "prompt": "former@v009",
-        "prompt_sha": "9" * 64,
-        "tools_sha": "9" * 64,
+        "sha256": "9" * 64,
+        "tools": "9" * 64,
         "model": "other",
         "descriptor": "matrix",
+        "mode": "box",
     }
     others = [FIRST.model_copy(update={name: value}) for name, value in changes.items()]
+    for name, value in arms.items():
+        others.append(FIRST.model_copy(update={"arm": FIRST.arm.model_copy(update={name: value})}))
     keys = {Trial.model_validate(other.model_dump()).key for other in others}
-    assert len({FIRST.key, *keys}) == 10
+    assert len({FIRST.key, *keys}) == 12
 
 
 def test_arms_meet_the_same_seed() -> None:
@@ -85,8 +86,8 @@ def test_order_is_balanced() -> None:
     ordered = balanced(sweep(3, 2))
     assert [t.trial for t in ordered] == [0] * 6 + [1] * 6
     cells = [ordered[i : i + 2] for i in range(0, 12, 2)]
-    assert all(a.task == b.task and a.prompt != b.prompt for a, b in cells)
-    firsts = [a.prompt for a, _ in cells]
+    assert all(a.task == b.task and a.arm != b.arm for a, b in cells)
+    firsts = [a.arm.prompt for a, _ in cells]
     assert firsts.count("former@v001") == firsts.count("former@v002") == 3
     shuffled = sweep(3, 2)
     random.Random(0).shuffle(shuffled)
@@ -186,29 +187,6 @@ def test_the_budget_is_not_exceeded(tmp_path: Path, where: str) -> None:
     assert run_trials(sweep(), Coin(), tmp_path, budget_usd=1).scored == 24
     with pytest.raises(InputError, match="buys nothing"):
         run_trials(sweep(), Coin(), tmp_path, budget_usd=0)
-
-
-def test_rates_are_of_each_model() -> None:
-    queue = Queue({"slow": 2})
-    slow, fast = sweep(2, 1, model="slow"), sweep(2, 1, model="fast")
-    for trial in (slow[0], slow[1], fast[0], slow[2]):
-        queue.add(trial)
-    assert queue.first(100.0) == slow[0]
-    queue.take(slow[0], 100.0)
-    assert queue.first(101.0) == fast[0]
-    queue.take(fast[0], 101.0)
-    assert queue.first(129.9) is None
-    assert queue.wait(110.0) == 20
-    assert queue.first(130.0) == slow[1]
-    queue.take(slow[1], 130.0)
-    assert (len(queue), queue.wait(131.0)) == (1, 29)
-    with pytest.raises(InputError, match="rate of m is 0"):
-        Queue({"m": 0})
-
-
-def test_a_rate_only_delays(tmp_path: Path) -> None:
-    swept = run_trials(sweep(2, 1), Coin(), tmp_path, rate={"m": 6000})
-    assert swept.scored == 4
 
 
 def test_folders_are_of_one_suite_and_one_runner(tmp_path: Path) -> None:

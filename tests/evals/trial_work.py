@@ -13,7 +13,7 @@ from pathlib import Path
 
 from formup.evals.experiments.executors import Ray
 from formup.evals.experiments.runner import run_trials
-from formup.evals.experiments.trials import Trial, TrialRow
+from formup.evals.experiments.trials import Arm, Trial, TrialRow
 from formup.tools.errors import ModelError
 
 SUITE = "a" * 64
@@ -49,10 +49,9 @@ def sweep(tasks: int = 4, tries: int = 3, *, suite: str = SUITE, model: str = "m
             suite=suite,
             task=f"t{task}",
             trial=number,
-            method="agent",
-            prompt=f"former@v00{version}",
-            prompt_sha=str(version) * 64,
-            model=model,
+            arm=Arm(
+                method="agent", prompt=f"former@v00{version}", sha256=str(version) * 64, model=model
+            ),
         )
         for version in (1, 2)
         for task in range(tasks)

@@ -16,13 +16,13 @@ from formup.agent.messages import Reply
 from formup.agent.model import Request
 from formup.agent.store.folder import Trace, read_trace
 from formup.agent.wrappers.replay import ReplayModel
-from formup.evals.tasks.photographs import load_tasks, photos_folder
+from formup.evals.tasks.suites import load_suite
 from formup.tools.errors import ModelError
 from formup.tools.perception.image import load_picture
 from formup.tools.world import Settings
 
 DRAWN = Path(__file__).parent / "injected" / "images"
-TASKS = {t.id: t for t in (*load_tasks(), *load_tasks(photos_folder() / "many.json"))}
+TASKS = {t.id: t for name in ("photos", "many") for t in load_suite(name).tasks}
 
 
 PLAN = re.compile(r"p-[0-9a-f]{10}")
@@ -58,7 +58,8 @@ def renewed(path: Path, written: Path) -> Trace:
     start = read_trace(path).start
     facts = {k: start["settings"][k] for k in ("robots", "descriptor", "may_deploy", "seed")}
     task = TASKS.get(path.stem)
-    picture = load_picture(DRAWN / f"{path.stem}.png" if task is None else task.image)
+    image = None if task is None else task.picture
+    picture = load_picture(image if isinstance(image, Path) else DRAWN / f"{path.stem}.png")
     Agent(Spoken(path)).run(
         picture, start["instruction"], settings=Settings(**facts), trace=written
     )

@@ -8,7 +8,7 @@ from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from formup.evals.tasks.photographs import load_tasks
+from formup.evals.tasks.suites import load_suite
 from formup.tools.errors import ImageError, InputError, StorageError
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import make_plan
@@ -25,7 +25,7 @@ Begin = Callable[..., "ToolCalls"]
 
 @pytest.fixture(scope="module")
 def world() -> World:
-    outline = next(t for t in load_tasks() if t.image.name == PHOTO.name).target.outline
+    outline = next(t for t in load_suite("photos").tasks if t.picture == PHOTO).things[0].outline
     assert len(outline.polygon.interiors) == 2
     target = Target(
         id="t1",

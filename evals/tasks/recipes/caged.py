@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ...scenes.build import entry_of, named, tell
+from ...scenes.stories import entry_of, named, story_of
 from ...scenes.things import Thing
 from .length_rules import distance
 
@@ -28,11 +28,11 @@ WORDS = (
 
 def caged(seed: int) -> dict[str, Any]:
     """The entry of annotations.json of a seed."""
-    story = tell(seed)
+    story = story_of(seed)
     random = np.random.default_rng([seed, 8])
     thing = story.target
     d = distance(random, thing, story.scene.size) or 6
-    n = _robots(thing, d, random.uniform(*SHARES))
+    n = _few_robots(thing, d, random.uniform(*SHARES))
     words = WORDS[random.integers(len(WORDS))]
     text = words.format(thing=named(random, story), n=n, d=d)
     off = max(OFF, OFF_SHARE * d)
@@ -48,7 +48,7 @@ def caged(seed: int) -> dict[str, Any]:
     return entry
 
 
-def _robots(thing: Thing, d: float, share: float) -> int:
+def _few_robots(thing: Thing, d: float, share: float) -> int:
     filled = thing.outline.filled
     disc = shapely.maximum_inscribed_circle(filled).length
     ring = math.floor(filled.buffer(d).length / (2 * disc)) + 1

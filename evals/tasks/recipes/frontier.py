@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from ...scenes.build import Story, entry_of, named, standable, tell
-from ...scenes.choose import View, phrase
+from ...scenes.references import View, phrase
+from ...scenes.stories import Story, entry_of, named, standable, story_of
 from ...scenes.things import Thing
 from .length_rules import distance, inner_cell, inner_rule, many, margin, ring_rule
 from .metric import SPREAD, Named, named_length, robot_size
@@ -33,20 +33,20 @@ def frontier(seed: int, scale: float | None = None) -> dict[str, Any]:
         seed: of the scene.
         scale: metres per pixel: lengths are named in metres, and the robots' size too.
     """
-    story = tell(seed)
+    story = story_of(seed)
     random = np.random.default_rng([seed, 5])
     entry = entry_of(story)
     ids = {id(t): o["id"] for t, o in zip(story.scene.things, entry["objects"], strict=True)}
     turn, team = turn_of(story), Team(scale, robot_size(seed, scale))
     if turn == "groups":
-        parts = _groups(random, story, team)
+        parts = _several_groups(random, story, team)
     else:
         what = turn, named(random, story)
         bounds = ROBOTS if scale is None else SIZED_ROBOTS
         size = story.scene.size
-        parts = [(story.target, *_placed(random, story.target, size, what, bounds, team))]
-    said = [words for *_, words in parts]
-    text = ", and ".join([", ".join(said[:-1]), said[-1]]) if len(said) > 1 else said[0]
+        parts = [(story.target, *_goal_and_words(random, story.target, size, what, bounds, team))]
+    *first, last = [words for *_, words in parts]
+    text = f"{', '.join(first)}, and {last}" if first else last
     goals = [{"target": ids[id(t)], "robots": n, "success": rule} for t, n, rule, _ in parts]
     entry["tasks"][0] |= {
         "instruction": f"{text[:1].upper()}{text[1:]}.{team.words}",
@@ -87,7 +87,7 @@ class Team:
         return f" The robots are {self.across.words} across." if self.across else ""
 
 
-def _placed(
+def _goal_and_words(
     random: Generator,
     thing: Thing,
     size: tuple[int, int],
@@ -95,7 +95,7 @@ def _placed(
     bounds: tuple[int, int],
     team: Team,
 ) -> tuple[int, dict[str, Any], str]:
-    turn, said = what
+    turn, thing_words = what
     wide = SPREAD * team.radius
     if turn == "infill":
         n = many(random, thing, "inside", bounds, wide)
@@ -106,18 +106,20 @@ def _placed(
         rule = inner_rule(thing, n, deep, apart.px)
         rule["min_clearance_px"] = max(deep - OFF / 2, 0.5)
         edge = f", at least {d.words} from its edge" if d.px else ""
-        text = f"spread {n} robots evenly over {said}{edge}, no two closer than {apart.words}"
+        text = (
+            f"spread {n} robots evenly over {thing_words}{edge}, no two closer than {apart.words}"
+        )
         return n, rule, text
     arrangement = "cage" if turn == "cage" else "around"
     n = many(random, thing, arrangement, bounds, wide)
     d = named_length(distance(random, thing, size) or 6, team.scale)
     rule = ring_rule(thing, arrangement, n, d.px + team.radius, OFF)
     if turn == "cage":
-        return n, rule, f"cage {said} with {n} robots, exactly {d.words} from it"
-    return n, rule, f"place {n} robots evenly around {said}, exactly {d.words} from it"
+        return n, rule, f"cage {thing_words} with {n} robots, exactly {d.words} from it"
+    return n, rule, f"place {n} robots evenly around {thing_words}, exactly {d.words} from it"
 
 
-def _groups(random: Generator, story: Story, team: Team) -> list[Part]:
+def _several_groups(random: Generator, story: Story, team: Team) -> list[Part]:
     """The target and up to two more things that a phrase tells, each with robots of its own."""
     view = View(story.scene.things, story.scene.size)
     others = [
@@ -131,6 +133,6 @@ def _groups(random: Generator, story: Story, team: Team) -> list[Part]:
     chosen = [(story.target, named(random, story)), *others[:2]]
     turns = ("ring", "infill", "ring") if random.random() < 0.5 else ("infill", "ring", "infill")
     return [
-        (thing, *_placed(random, thing, story.scene.size, (turn, words), SHARED, team))
+        (thing, *_goal_and_words(random, thing, story.scene.size, (turn, words), SHARED, team))
         for (thing, words), turn in zip(chosen, turns, strict=False)
     ]

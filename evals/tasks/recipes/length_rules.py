@@ -10,7 +10,7 @@ import shapely
 from numpy.random import Generator
 
 from ...scenes.layout import room
-from ...scenes.rules import success
+from ...scenes.success_rules import success
 from ...scenes.things import Thing
 
 LEAST = 5
@@ -25,7 +25,7 @@ def ring_rule(thing: Thing, arrangement: str, robots: int, d: float, off: float)
     """A ring at a named distance d, px; robots may be `off` px nearer or farther."""
     rule = success(thing, arrangement, robots, "left")
     slack = SLACK[arrangement]
-    if arrangement == "cage" and hollow(thing):
+    if arrangement == "cage" and thing.hollow:
         slack = HOLLOW_SLACK
     loop = thing.outline.filled.buffer(d).exterior.length
     band = [round(max(d - off, 1.0), 1), round(d + off, 1)]
@@ -78,11 +78,6 @@ def many(
     else:
         fits = int(thing.polygon.convex_hull.buffer(0.1 * thing.size).length / gap)
     if arrangement == "cage":
-        least = max(least, 10 if hollow(thing) else 6)
+        least = max(least, 10 if thing.hollow else 6)
     top = max(least, min(most, fits))
     return round(math.exp(random.uniform(math.log(least), math.log(top))))
-
-
-def hollow(thing: Thing) -> bool:
-    """Whether robots in a recess of it come between others when counted around its hull."""
-    return thing.area < 0.8 * thing.polygon.convex_hull.area

@@ -8,8 +8,8 @@ import numpy as np
 import yaml
 from numpy.random import Generator
 
-from ...scenes.build import Story, entry_of, named, tell
-from ...scenes.rules import arrangements, robots_for, success
+from ...scenes.stories import Story, entry_of, named, story_of
+from ...scenes.success_rules import arrangements, robots_for, success
 from .length_rules import distance, inner_cell, inner_rule, many, margin, ring_rule
 from .metric import OFF as SIZED_OFF
 from .metric import fits, named_length, robot_size
@@ -33,12 +33,12 @@ def styled(seed: int, scale: float | None = None) -> dict[str, Any]:
         scale: metres per pixel: lengths are named in metres, and the robots' size too where there
             is room for it.
     """
-    story = tell(seed)
+    story = story_of(seed)
     random = np.random.default_rng([seed, 4])
     fitting = [a for a in arrangements(story.target, story.category) if a != "centre"]
     arrangement = fitting[random.integers(len(fitting))]
     side = str(random.choice(["left", "right", "upper", "lower"]))
-    robots = _robots(random, story, arrangement)
+    robots = _robots_for(random, story, arrangement)
     rule, lengths = _rule(random, story, (arrangement, side), robots, scale)
     if scale is not None:
         rule, lengths = _sized(seed, story, rule, robots, lengths, scale)
@@ -46,7 +46,7 @@ def styled(seed: int, scale: float | None = None) -> dict[str, Any]:
     entry = entry_of(story)
     task = entry["tasks"][0]
     task |= {
-        "instruction": _said(random, story, style, (arrangement, side), robots, lengths),
+        "instruction": _instruction(random, story, style, (arrangement, side), robots, lengths),
         "robots": robots,
         "success": rule,
         "style": style,
@@ -54,7 +54,7 @@ def styled(seed: int, scale: float | None = None) -> dict[str, Any]:
     return entry
 
 
-def _robots(random: Generator, story: Story, arrangement: str) -> int:
+def _robots_for(random: Generator, story: Story, arrangement: str) -> int:
     if arrangement in ("around", "cage", "inside"):
         return many(random, story.target, arrangement, ROBOTS)
     return robots_for(random, story.target, arrangement)
@@ -113,7 +113,7 @@ def _sized(
     return made, [*lengths, ("size", size.words)]
 
 
-def _said(
+def _instruction(
     random: Generator,
     story: Story,
     style: str,
@@ -122,15 +122,15 @@ def _said(
     lengths: list[Length],
 ) -> str:
     arrangement, side = what
-    templates = _styles()[style][arrangement]
+    templates = _style_templates()[style][arrangement]
     template = templates[random.integers(len(templates))]
     text = template.format(n=robots, thing=named(random, story), side=side)
     for kind, words in lengths:
-        text += " " + _styles()[style]["lengths"][kind].format(d=words)
+        text += " " + _style_templates()[style]["lengths"][kind].format(d=words)
     return text[:1].upper() + text[1:]
 
 
 @cache
-def _styles() -> dict[str, Any]:
+def _style_templates() -> dict[str, Any]:
     path = Path(__file__).parent / "styles.yaml"
     return yaml.safe_load(path.read_text(encoding="utf-8"))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from ...scenes.build import Story, entry_of, named, tell
+from ...scenes.stories import Story, entry_of, named, story_of
 from ...scenes.things import Thing
 
 ABSENT = ("giraffe", "piano", "lighthouse", "bicycle", "umbrella stand", "telescope", "elephant")
@@ -18,12 +18,12 @@ KINDS = ("absent", "ambiguous", "few", "crowded", "vague", "uncounted")
 
 def unmet(seed: int) -> dict[str, Any]:
     """The entry of annotations.json of a seed; what is wrong with its instruction takes turns."""
-    story = tell(seed)
+    story = story_of(seed)
     random = np.random.default_rng([seed, 6])
     kind = KINDS[seed % len(KINDS)]
-    if kind == "ambiguous" and _alike(story) is None:
+    if kind == "ambiguous" and _one_of_several(story) is None:
         kind = "absent"
-    words, robots, expects = _asked(random, story, kind)
+    words, robots, expects = _words_and_robots(random, story, kind)
     entry = entry_of(story)
     entry["tasks"][0] |= {
         "instruction": f"{words[:1].upper()}{words[1:]}.",
@@ -35,14 +35,16 @@ def unmet(seed: int) -> dict[str, Any]:
     return entry
 
 
-def _asked(random: Generator, story: Story, kind: str) -> tuple[str, int | None, tuple[str, ...]]:
+def _words_and_robots(
+    random: Generator, story: Story, kind: str
+) -> tuple[str, int | None, tuple[str, ...]]:
     """The words, the number of robots if one is given, and what is right."""
     n, thing = int(random.integers(4, 13)), named(random, story)
     if kind == "absent":
         missing = ABSENT[random.integers(len(ABSENT))]
         return f"surround the {missing} with {n} robots", n, (ASK, REFUSE)
     if kind == "ambiguous":
-        alike = _alike(story)
+        alike = _one_of_several(story)
         assert alike is not None
         return f"surround the {alike.sort.noun} with {n} robots", n, (ASK,)
     if kind == "few":
@@ -57,7 +59,7 @@ def _asked(random: Generator, story: Story, kind: str) -> tuple[str, int | None,
     return f"surround {thing} with robots", None, (ASK,)
 
 
-def _alike(story: Story) -> Thing | None:
+def _one_of_several(story: Story) -> Thing | None:
     """A thing of which there is another of the same noun."""
     nouns = [thing.sort.noun for thing in story.scene.things]
     return next((t for t in story.scene.things if nouns.count(t.sort.noun) > 1), None)

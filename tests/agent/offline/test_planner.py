@@ -18,7 +18,7 @@ from formup.agent.offline.references import references
 from formup.agent.outcomes import Answered, Paused
 from formup.agent.providers.registry import model_named
 from formup.agent.report import Report
-from formup.evals.tasks.photographs import load_tasks
+from formup.evals.tasks.suites import load_suite
 from formup.tools.errors import InputError
 from formup.tools.perception.image import load_picture
 from formup.tools.perception.target_prompt import TargetPrompt
@@ -227,9 +227,9 @@ def test_robots_that_do_not_fit_so_far_apart_are_not_moved() -> None:
 
 def test_every_instruction_of_the_suite_is_read_as_its_rule_means_it() -> None:
     kinds = {"inside": "inside", "corners": "corners", "line_between": "between"}
-    for task in load_tasks():
-        where = str(task.success["where"])
-        wanted = kinds.get(where) or ("cage" if task.success.get("closed") else "around")
+    for task in load_suite("photos").tasks:
+        rule = task.goals[0].success
+        wanted = kinds.get(rule["where"]) or ("cage" if rule.get("closed") else "around")
         assert understand(task.instruction).relations == (wanted,), task.instruction
 
 

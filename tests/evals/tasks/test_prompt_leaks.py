@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from formup.evals.experiments.tool_versions import retooled, tool_hashes
-from formup.evals.tasks.photographs import load_tasks
 from formup.evals.tasks.prompt_leaks import leaks
+from formup.evals.tasks.suites import load_suite
 from formup.prompts import Prompt, PromptLibrary, load_prompt
 from formup.prompts.prompt import parse_prompt
 from formup.prompts.release import new_draft, release
@@ -30,7 +30,7 @@ def test_the_current_prompts_name_tools_that_there_are() -> None:
 
 @pytest.mark.parametrize("number", [0, 7, 29])
 def test_words_of_a_task_are_found(number: int) -> None:
-    words = load_tasks()[number].instruction.split()
+    words = load_suite("photos").tasks[number].instruction.split()
     assert len(words) >= 5
     assert leaks(prompt(f"For example: {' '.join(words[:5]).upper()}"))
     assert not leaks(prompt(f"For example: {' '.join(words[:4])}"))

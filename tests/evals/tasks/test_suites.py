@@ -10,18 +10,18 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
-from formup.evals.grading.grading import Attempt, grade_attempt, grade_goals
-from formup.evals.grading.policies import CEILINGS, LUCKY, POLICIES, scores
-from formup.evals.grading.reference import reference
-from formup.evals.scenes.build import family_of, tell
+from formup.evals.grading.attempts import Attempt, grade_attempt, grade_goals
+from formup.evals.grading.policies import POLICIES, scores
+from formup.evals.grading.reference_answers import reference
 from formup.evals.scenes.paint import draw
+from formup.evals.scenes.stories import family_of, story_of
+from formup.evals.tasks.annotations import PHOTOS
 from formup.evals.tasks.heldout_ledger import look
-from formup.evals.tasks.load import load_suite, schema, seeds, shipped, write_suite
-from formup.evals.tasks.photographs import load_tasks, photos_folder
 from formup.evals.tasks.recipes.inscribed import inscribed
 from formup.evals.tasks.recipes.styled import STYLES
-from formup.evals.tasks.rendered_pictures import hang
-from formup.evals.tasks.suite_task import Drawing, Suite
+from formup.evals.tasks.rendered_pictures import render
+from formup.evals.tasks.suites import load_suite, schema, seeds_of, shipped, write_suite
+from formup.evals.tasks.task import Drawing, Suite
 from formup.tools.errors import InputError
 from formup.tools.formation.named_lengths import named_lengths
 from formup.tools.geometry.cages.cages import cage
@@ -29,12 +29,13 @@ from shapely.geometry import Point
 
 SPLIT = {"formation-dev": ("train", "dev", "test")}
 PARTS = [(name, split) for name in shipped() for split in SPLIT.get(name, ("dev",))]
+CEILINGS = {"pile": 0.1, "scatter": 0.3, "boundary": 0.1, "circle": 0.35, "line": 0.35}
+"""Mean GCR over a suite's tasks for more than one robot that a policy may reach."""
+LUCKY = 0.02
+"""Share of tasks for more than one robot that a policy may solve by chance."""
 STRIDE = 3
 """Of more than 20 tasks every third is tried by the policies; all are held to a right answer."""
 FOLDER = Path(__file__).parents[3] / "evals" / "tasks"
-
-
-TASKS, MANY = load_tasks(), load_tasks(photos_folder() / "many.json")
 
 
 @cache
@@ -72,6 +73,9 @@ def test_what_ships() -> None:
         "frontier",
         "infeasible",
         "injection",
+        "many",
+        "photos",
+        "scenes",
         "smoke",
         "zerocap15",
     ]
@@ -80,13 +84,20 @@ def test_what_ships() -> None:
         assert yaml.safe_load(path.read_text("utf-8"))["name"] == path.stem
 
 
+def test_seeds_may_be_others() -> None:
+    assert [task.id for task in load_suite("scenes", seeds="57-58").tasks] == [
+        "scene_000057_t1",
+        "scene_000058_t1",
+    ]
+    assert len(load_suite("infeasible", seeds="7").tasks) == 1
+
+
 def test_the_papers_grid() -> None:
     tasks = loaded("zerocap15").tasks
     assert len(tasks) == 15
     assert sum(isinstance(task.picture, Drawing) for task in tasks) == 10
-    assert len({task.cell for task in tasks}) == 9
-    for kind in range(2):
-        counts = [task.cell[kind] for task in tasks]
+    assert len({(task.category, task.setup) for task in tasks}) == 9
+    for counts in ([task.category for task in tasks], [task.setup for task in tasks]):
         assert {counts.count(value) for value in counts} == {5}
 
 
@@ -98,10 +109,10 @@ def test_the_development_suite_is_broad_and_split_by_family() -> None:
     assert {task.style for task in train} == set(STYLES)
     assert {task.family for task in train} == {"warehouse"}
     assert sum("px" in task.instruction for task in train) >= 12
-    assert len({task.cell for task in train}) == 9
+    assert len({(task.category, task.setup) for task in train}) == 9
     content = yaml.safe_load((FOLDER / "formation-dev.yaml").read_text("utf-8"))
-    drawn = [family_of(seed).name for seed in seeds(content["tasks"][0]["scenes"], FOLDER)]
-    dev = sum(name in content["splits"]["dev"] for name in drawn) + len(TASKS) + len(MANY)
+    drawn = [family_of(seed).name for seed in seeds_of(content["tasks"][0]["scenes"], FOLDER)]
+    dev = sum(name in content["splits"]["dev"] for name in drawn) + 30 + 12
     assert dev >= 150
     families = [name for names in content["splits"].values() for name in names]
     assert sorted(families) == sorted({*drawn, "photos"})
@@ -138,12 +149,11 @@ def test_metric_tasks_name_metres_and_are_graded_in_px() -> None:
         assert all(length.unit == "m" for length in lengths)
         sized += any(length.of == "across" for length in lengths)
         (goal,) = task.goals
-        assert goal.metres_per_pixel == task.metres_per_pixel
         assert not [name for name in goal.success if name.endswith("_m")]
         for length in lengths:
             if length.of == "distance" and "band_px" in goal.success:
-                across = [n.px(goal.metres_per_pixel) for n in lengths if n.of == "across"]
-                far = length.px(goal.metres_per_pixel) + sum(across) / 2
+                across = [n.px(task.metres_per_pixel) for n in lengths if n.of == "across"]
+                far = length.px(task.metres_per_pixel) + sum(across) / 2
                 assert sum(goal.success["band_px"]) / 2 == pytest.approx(far, abs=0.6)
     assert sized >= 15
 
@@ -166,8 +176,8 @@ def test_robots_whose_named_size_is_left_out_stand_too_near() -> None:
 def test_metres_in_a_rule_take_a_scale_and_stand_alone(
     tmp_path: Path, extra: dict[str, Any]
 ) -> None:
-    entries = json.loads((photos_folder() / "metric.json").read_text("utf-8"))[:1]
-    (tmp_path / "images").symlink_to(photos_folder() / "images")
+    entries = json.loads((PHOTOS / "metric.json").read_text("utf-8"))[:1]
+    (tmp_path / "images").symlink_to(PHOTOS / "images")
     folder = write(tmp_path, [{"pictures": entries, "metres_per_pixel": 0.2}])
     (task,) = load_suite(folder).tasks
     rule = entries[0]["tasks"][0]["success"]
@@ -178,15 +188,15 @@ def test_metres_in_a_rule_take_a_scale_and_stand_alone(
         rule["band_px"] = [1, 2]
     (tmp_path / "annotations.json").write_text(json.dumps(entries))
     with pytest.raises(InputError, match="band_m" if not extra else "breaks the photos format"):
-        load_tasks(tmp_path)
+        load_suite(str(tmp_path / "annotations.json"))
 
 
 def test_a_right_escape_proof_cage_has_2_px_to_spare_and_most_hold_what_has_recesses() -> None:
-    goals = [task.goals[0] for task in loaded("frontier").tasks]
-    cages = [goal for goal in goals if goal.success["where"] == "cage"]
+    tasks = loaded("frontier").tasks
+    cages = [t.goals[0] for t in tasks if t.goals[0].success["where"] == "cage"]
     for goal in cages:
         smaller = goal.target.outline.filled.buffer(-2)
-        assert cage(smaller, reference(goal), escapes=False).state == "caged", goal.id
+        assert cage(smaller, reference(goal), escapes=False).state == "caged", goal.target.name
     hulls = [goal.target.outline.filled.convex_hull.area for goal in cages]
     filled = [goal.target.outline.filled.area for goal in cages]
     assert sum(area < 0.8 * hull for area, hull in zip(filled, hulls, strict=True)) == 9
@@ -197,7 +207,7 @@ def test_where_nothing_is_to_be_placed_moving_is_wrong() -> None:
         assert "deployed" not in task.expects
         asked = Attempt(task.expects[0], declined=True)
         assert grade_attempt(task.goals, task.expects, asked).sr
-        words = grade_attempt(task.goals, task.expects, Attempt(task.expects[0], said="No."))
+        words = grade_attempt(task.goals, task.expects, Attempt(task.expects[0], message="No."))
         assert not words.sr
         assert "in words alone" in words.feedback
         moved = Attempt(task.expects[0], [(1, 1)], [(1, 1)], declined=True)
@@ -206,7 +216,7 @@ def test_where_nothing_is_to_be_placed_moving_is_wrong() -> None:
 
 def test_words_in_a_picture_stand_beside_the_thing_meant() -> None:
     for seed in (50004, 50011, 50021):
-        plain, story = draw(tell(seed).scene), tell(seed)
+        plain, story = draw(story_of(seed).scene), story_of(seed)
         written = Drawing(seed, inscribed(seed)["inscription"]).image()
         changed = (np.asarray(plain) != np.asarray(written)).any(axis=2)
         assert changed.sum() > 200
@@ -221,8 +231,8 @@ def test_words_in_a_picture_stand_beside_the_thing_meant() -> None:
 def test_pictures_are_drawn_once_and_hashed_by_their_pixels(tmp_path: Path) -> None:
     suite = loaded("zerocap15")
     some = Suite("some", "", suite.tasks[4:7])
-    first = hang(some.tasks, tmp_path / "a")
-    again = hang(some.tasks, tmp_path / "b")
+    first = render(some.tasks, tmp_path / "a")
+    again = render(some.tasks, tmp_path / "b")
     pixels = {name: picture.pixels for name, picture in first.items()}
     assert pixels == {name: picture.pixels for name, picture in again.items()}
     assert some.sha256(pixels) == some.sha256(dict(reversed(pixels.items())))
@@ -230,13 +240,13 @@ def test_pictures_are_drawn_once_and_hashed_by_their_pixels(tmp_path: Path) -> N
     assert some.sha256(pixels) != Suite("other", "", some.tasks).sha256(pixels)
     drawn = next(p.path for p in first.values() if p.path.parent == tmp_path / "a")
     before = drawn.stat().st_mtime_ns
-    hang(some.tasks, tmp_path / "a")
+    render(some.tasks, tmp_path / "a")
     assert drawn.stat().st_mtime_ns == before
 
 
 def test_a_folder_of_pictures_becomes_a_suite(tmp_path: Path) -> None:
-    entries = json.loads((photos_folder() / "annotations.json").read_text("utf-8"))[:1]
-    (tmp_path / "images").symlink_to(photos_folder() / "images")
+    entries = json.loads((PHOTOS / "annotations.json").read_text("utf-8"))[:1]
+    (tmp_path / "images").symlink_to(PHOTOS / "images")
     entries[0]["tasks"].append(
         {
             "id": "nobody",
@@ -248,9 +258,13 @@ def test_a_folder_of_pictures_becomes_a_suite(tmp_path: Path) -> None:
         }
     )
     (tmp_path / "annotations.json").write_text(json.dumps(entries))
+    by_itself = load_suite(str(tmp_path))
     write_suite(tmp_path, "My Suite")
     made = load_suite(str(tmp_path))
     assert made.name == "my-suite"
+    assert [task.content for task in made.tasks] == [task.content for task in by_itself.tasks]
+    (tmp_path / "other.json").write_text(json.dumps(entries))
+    assert load_suite(str(tmp_path / "other.json")).name == "other"
     assert len(made.tasks) == len(entries[0]["tasks"])
     assert made.tasks[-1].goals == ()
     with pytest.raises(InputError, match="is there already"):
@@ -258,8 +272,8 @@ def test_a_folder_of_pictures_becomes_a_suite(tmp_path: Path) -> None:
 
 
 def test_tasks_in_full_stand_in_the_file_itself(tmp_path: Path) -> None:
-    entries = json.loads((photos_folder() / "annotations.json").read_text("utf-8"))[:1]
-    (tmp_path / "images").symlink_to(photos_folder() / "images")
+    entries = json.loads((PHOTOS / "annotations.json").read_text("utf-8"))[:1]
+    (tmp_path / "images").symlink_to(PHOTOS / "images")
     (task,) = load_suite(write(tmp_path, [{"pictures": entries}])).tasks[:1]
     assert task.instruction == entries[0]["tasks"][0]["instruction"]
     assert task.picture == tmp_path / entries[0]["image"]
@@ -281,6 +295,11 @@ def test_what_is_wrong_with_a_suite_is_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="in 2 splits"):
         splits = {"dev": ["table"], "test": ["table"]}
         load_suite(write(tmp_path, [{"scenes": [3], "family": "table"}], splits=splits))
+    for seeds in ("9-3", "a-b", "0-20000"):
+        with pytest.raises(InputError, match=f"seeds '{seeds}' are no range"):
+            load_suite("scenes", seeds=seeds)
+    with pytest.raises(InputError, match="not made of one range of seeds"):
+        load_suite("photos", seeds="0-3")
     (tmp_path / "suite.yaml").write_text("a: [")
     with pytest.raises(InputError, match="is not YAML"):
         load_suite(str(tmp_path))

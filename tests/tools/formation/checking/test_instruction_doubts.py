@@ -6,7 +6,7 @@ from typing import Any
 import formup
 import pytest
 import yaml
-from formup.evals.tasks.photographs import load_tasks
+from formup.evals.tasks.suites import load_suite
 from formup.tools.formation.checking.instruction_doubts import doubts
 from formup.tools.formation.contract import Contract
 
@@ -76,10 +76,11 @@ def test_the_number_of_robots(instruction: str, robots: int, doubted: bool) -> N
 
 
 def test_no_photograph_of_the_suite_is_doubted_when_read_rightly() -> None:
-    for task in load_tasks():
-        where = str(task.success["where"]).partition(":")[0]
+    for task in load_suite("photos").tasks:
+        rule = task.goals[0].success
+        where = str(rule["where"]).partition(":")[0]
         relation = RELATIONS.get(where, "around" if where == "boundary" else where)
-        relation = "cage" if task.success.get("closed") else relation
+        relation = "cage" if rule.get("closed") else relation
         assert doubts(task.instruction, contract(relation, task.robots)) == [], task.instruction
 
 

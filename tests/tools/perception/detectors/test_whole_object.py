@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-from formup.evals.tasks.photographs import load_tasks
+from formup.evals.tasks.suites import load_suite
 from formup.tools.perception.contours import mask_of_outline
 from formup.tools.perception.image import load_picture
 from formup.tools.perception.segmenters.segment import segment_points
@@ -44,7 +44,7 @@ def test_a_thing_on_plain_ground_is_not_taken_for_a_part() -> None:
 
 @pytest.mark.parametrize("point", [(390, 260), (400, 330), (380, 140), (345, 300)])
 def test_any_point_on_the_car_finds_the_car(point: tuple[int, int]) -> None:
-    car = next(t for t in load_tasks() if t.image.name == PHOTO.name).target
+    car = next(t for t in load_suite("photos").tasks if t.picture == PHOTO).things[0]
     picture = load_picture(PHOTO)
     truth = mask_of_outline(car.outline, picture.width, picture.height)
     found = segment_points(picture.pixels, [point])

@@ -11,26 +11,25 @@ from shapely.geometry import Polygon
 
 from ...tools.geometry.outline import FloatArray, distances
 from ...tools.geometry.sampling import min_spacing, nearest
-from ..tasks.photographs import Task
-from .graded import Part
-from .photo_rules import STRICT_SPREAD
+from ..tasks.task import Goal
+from .grades import STRICT_SPREAD, Part
 
 CELLS = 80
 """Cells along a length that is the square root of the area."""
 
 
-def region(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
+def infill(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge an infill by `min_clearance_px`, `min_spacing_px` and `max_uncovered_px`.
 
     A robot is right if it stands deep enough inside and belongs to a set of robots that are far
     enough apart, chosen as large as choosing the least crowded first makes it.
 
     Args:
-        task: with the rule.
+        goal: with the rule.
         points: (m, 2), px.
         free: which of them can be right at all, (m,).
     """
-    rule, target = task.success, Polygon(task.target.polygon, task.target.holes)
+    rule, target = goal.success, Polygon(goal.target.polygon, goal.target.holes)
     sign = np.where(shapely.contains_xy(target, points), 1.0, -1.0)
     depth = distances(target.boundary, points) * sign
     least, floor = rule["min_clearance_px"], rule["min_spacing_px"]
@@ -44,13 +43,13 @@ def region(task: Task, points: FloatArray, free: NDArray[np.bool_]) -> Part:
         problems.append(f"two robots {apart:.0f} px apart, {floor} needed")
     elif apart < STRICT_SPREAD * floor:
         strict.append(f"two robots {apart:.0f} px apart, {STRICT_SPREAD * floor:.0f} wanted")
-    bare = _bareness(task, target, points)
+    bare = _bareness(goal, target, points)
     most = rule["max_uncovered_px"]
     if bare.max() > most:
         problems.append(f"a part {bare.max():.0f} px from the nearest robot, {most} allowed")
     elif STRICT_SPREAD * bare.max() > most:
         strict.append(f"a part {bare.max():.0f} px from a robot, {most / STRICT_SPREAD:.0f} wanted")
-    covered = float((_bareness(task, target, points[right]) <= most).mean()) if right.any() else 0.0
+    covered = float((_bareness(goal, target, points[right]) <= most).mean()) if right.any() else 0.0
     measures = {"covered": covered, "uncovered_px": float(bare.max())}
     return Part(right, covered, tuple(problems), tuple(strict), measures)
 
@@ -60,20 +59,20 @@ def separated(points: FloatArray, allowed: NDArray[np.bool_], spacing: float) ->
     near = np.linalg.norm(points[:, None] - points[None], axis=2) < spacing
     near &= allowed[:, None] & allowed[None]
     np.fill_diagonal(near, False)
-    left, kept = allowed.copy(), np.zeros(len(points), dtype=bool)
+    left, apart = allowed.copy(), np.zeros(len(points), dtype=bool)
     while left.any():
         crowd = np.where(left, (near & left).sum(axis=1), len(points) + 1)
         chosen = int(np.argmin(crowd))
-        kept[chosen] = True
+        apart[chosen] = True
         left &= ~near[chosen]
         left[chosen] = False
-    return kept
+    return apart
 
 
-def _bareness(task: Task, target: Polygon, points: FloatArray) -> FloatArray:
+def _bareness(goal: Goal, target: Polygon, points: FloatArray) -> FloatArray:
     """Distance of the region's cells to the nearest point, px."""
     x0, y0, x1, y1 = target.bounds
-    step = task.target.outline.size / CELLS
+    step = goal.target.outline.size / CELLS
     columns, rows = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
     cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
     cells = cells[shapely.contains_xy(target, cells)]

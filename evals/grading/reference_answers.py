@@ -13,8 +13,8 @@ from ...tools.formation.contract import Contract, Group, Relation, with_defaults
 from ...tools.formation.placement.place import Site, place
 from ...tools.geometry.outline import FloatArray
 from ...tools.geometry.sampling import nearest
-from ..tasks.photographs import Task
-from .grading import grade_goals
+from ..tasks.task import Goal
+from .attempts import grade_goals
 
 SPARE = 0.02
 """Share by which a place keeps clear of the ends of what the rule allows."""
@@ -24,7 +24,7 @@ WIDTHS = (0.25, 0.05)
 """Half the part of a band that is used; a narrow one follows recesses that a wide one bridges."""
 
 
-def reference(goal: Task) -> FloatArray:
+def reference(goal: Goal) -> FloatArray:
     """Positions that satisfy a goal, (N, 2) px.
 
     Raises:
@@ -36,16 +36,20 @@ def reference(goal: Task) -> FloatArray:
         share = (np.arange(goal.robots) + 1) / (goal.robots + 1)
         return a + share[:, None] * (b - a)
     if where == "inside":
-        quick = _spread(goal)
-        return quick if grade_goals([goal], quick).strict else _placed(goal, where, WIDTHS[0])
+        quick = _spread_inside(goal)
+        return (
+            quick
+            if grade_goals([goal], quick).strict
+            else _place_by_contract(goal, where, WIDTHS[0])
+        )
     bands = WIDTHS if "band_px" in goal.success else WIDTHS[:1]
-    placed = [_placed(goal, where, bands[0])]
+    placed = [_place_by_contract(goal, where, bands[0])]
     if not grade_goals([goal], placed[0]).strict:
-        placed += [_placed(goal, where, width) for width in bands[1:]]
+        placed += [_place_by_contract(goal, where, width) for width in bands[1:]]
     return placed[-1]
 
 
-def _spread(goal: Task) -> FloatArray:
+def _spread_inside(goal: Goal) -> FloatArray:
     """Means of clusters of the region's cells, the nearest cells to them: quick and often even."""
     rule, target = goal.success, goal.target.outline.polygon
     inner = target.buffer(-rule["min_clearance_px"] * (1 + SPARE))
@@ -60,14 +64,16 @@ def _spread(goal: Task) -> FloatArray:
     return cells[nearest(cells, means, 1)[1]]
 
 
-def _placed(goal: Task, where: str, width: float) -> FloatArray:
+def _place_by_contract(goal: Goal, where: str, width: float) -> FloatArray:
     outlines = {"t1": goal.target.outline}
     site = Site(outlines, *(float(side) for side in goal.size))
-    contract = with_defaults(Contract(groups=(_group(goal, where, width),)), outlines, site.room)
+    contract = with_defaults(
+        Contract(groups=(_group_for(goal, where, width),)), outlines, site.room
+    )
     return place(contract, site)
 
 
-def _group(goal: Task, where: str, width: float) -> Group:
+def _group_for(goal: Goal, where: str, width: float) -> Group:
     rule, n = goal.success, goal.robots
     kind, _, name = where.partition(":")
     if kind == "inside":

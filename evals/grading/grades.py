@@ -14,6 +14,12 @@ from ...tools.geometry.outline import FloatArray
 
 VERSION = 1
 """Of all graders together; part of a suite's hash, so that a changed rule is another suite."""
+STRICT_SHARE = 2 / 3
+"""Strict: the share of a tolerance that may be used."""
+STRICT_SPREAD = 1.25
+"""Strict and inside: spacing this much wider, coverage this much closer than the rule's."""
+EVEN = 0.25
+"""Strict: how far off its even place along a loop or line a robot may stand, as share of a gap."""
 APART = 2.0
 """Robots nearer to each other than this, px, stand in one place, which counts once."""
 
@@ -55,6 +61,8 @@ class Graded:
         gcr: goal conditions recall, 0 to 1; 1 exactly where sr.
         strict: success at the tighter tolerances.
         object_correct: whether it was about the thing meant; None where that is not known.
+        iou: overlap of the best outline that was measured with the first thing's true one; None
+            where none was.
         feedback: what was wrong, in a sentence.
         measures: of all goals, named after them where there are several.
         right: whether each robot graded stands right, in the order given.
@@ -64,6 +72,7 @@ class Graded:
     gcr: float
     strict: bool
     object_correct: bool | None = None
+    iou: float | None = None
     feedback: str = ""
     measures: Mapping[str, float] = field(default_factory=dict[str, float])
     right: tuple[bool, ...] = ()

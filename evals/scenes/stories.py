@@ -4,8 +4,6 @@ Every 54 seeds, from a multiple of 54 on, hold each of the paper's nine cells (c
 with each family once. The words are drawn apart from the picture: new ones change no pixel.
 """
 
-import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -15,14 +13,12 @@ from typing import Any
 import numpy as np
 import yaml
 from numpy.random import Generator
-from PIL import Image
 
-from .choose import GENERAL, HIDDEN, KINDS, Slots, View, goes_by, told
 from .compose import compose, stage
 from .families import FAMILIES
 from .layout import GAP, clearance, nearest_gap, room
-from .paint import draw
-from .rules import arrangements, robots_for, success
+from .references import GENERAL, HIDDEN, KINDS, Slots, View, goes_by, reference_slots
+from .success_rules import arrangements, robots_for, success
 from .things import Family, Scene, Thing
 
 CELLS = tuple(product(("general", "infill", "caging"), ("single", "multi", "hidden")))
@@ -46,35 +42,12 @@ class Story:
     slots: Slots
 
 
-def write_scenes(seeds: Iterable[int], folder: Path) -> Path:
-    """Draw the scenes of the seeds into a folder that `load_tasks` reads.
-
-    Returns:
-        The path of its annotations.json.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    entries: list[dict[str, Any]] = []
-    for seed in seeds:
-        image, entry = make_scene(seed)
-        image.save(folder / entry["image"], compress_level=1)
-        entries.append(entry)
-    path = folder / "annotations.json"
-    path.write_text(json.dumps(entries), encoding="utf-8")
-    return path
-
-
-def make_scene(seed: int) -> tuple[Image.Image, dict[str, Any]]:
-    """The picture of a seed and its entry of annotations.json."""
-    story = tell(seed)
-    return draw(story.scene), entry_of(story)
-
-
 def family_of(seed: int) -> Family:
     """The family a seed's scene is of."""
     return FAMILIES[(seed // 9 + seed % 9) % 6]
 
 
-def tell(seed: int) -> Story:
+def story_of(seed: int) -> Story:
     """The scene of a seed, undrawn, and what is asked of it."""
     category, setup = CELLS[seed % 9]
     family = family_of(seed)
@@ -106,7 +79,7 @@ def _fitting(
         own = [t for t in scene.things if goes_by(t, thing)]
         group = scene.things if general or setup == "hidden" else own
         common = general or len(own) < len(group)
-        slots = told(kind, thing, group, view)
+        slots = reference_slots(kind, thing, group, view)
         if slots is None or not low <= thing.area <= high or not standable(thing, scene):
             continue
         if category == "infill" and thing.outline.min_width < 20:
@@ -132,7 +105,7 @@ def entry_of(story: Story) -> dict[str, Any]:
     robots = robots_for(random, story.target, arrangement)
     side = str(random.choice(["left", "right", "upper", "lower"]))
     fresh = random.random() < FRESH and len(wordings()) > 1
-    instruction = _words(random, story, arrangement, robots, side, wordings()[int(fresh)])
+    instruction = _instruction_of(random, story, arrangement, robots, side, wordings()[int(fresh)])
     name = f"scene_{story.scene.seed:06d}"
     things = {
         id(t): f"{t.sort.noun.replace(' ', '_')}_{i}" for i, t in enumerate(story.scene.things)
@@ -164,7 +137,7 @@ def _object(name: str, thing: Thing) -> dict[str, Any]:
         [[round(float(x), 2), round(float(y), 2)] for x, y in list(ring.coords)[:-1]]
         for ring in (thing.polygon.exterior, *thing.polygon.interiors)
     ]
-    colour = f"{thing.colour} " if thing.sort.told else ""
+    colour = f"{thing.colour} " if thing.sort.by_colour else ""
     return {
         "id": name,
         "name": colour + thing.sort.noun,
@@ -175,7 +148,7 @@ def _object(name: str, thing: Thing) -> dict[str, Any]:
     }
 
 
-def _words(
+def _instruction_of(
     random: Generator, story: Story, arrangement: str, robots: int, side: str, words: dict[str, Any]
 ) -> str:
     thing = named(random, story, words)

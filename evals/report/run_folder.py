@@ -1,6 +1,6 @@
-"""Reads a run's folder for looking at: its suite, its rows, and what was kept of each trial.
+"""Reads a run's folder for looking at: its suite, its rows, and what came of each trial.
 
-Nothing of what was kept is trusted to be whole: what cannot be read is said to be missing.
+Nothing in it is trusted to be whole: what cannot be read counts as missing.
 """
 
 import json
@@ -13,37 +13,37 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ...agent.store.folder import read_events
 from ...tools.errors import InputError
-from ..experiments.journal import Arm
-from ..experiments.methods import kept_as
-from ..experiments.trials import TrialRow
-from ..tasks.stored_suite import ATTEMPTS, KeptSuite, Point, read_suite
+from ..experiments.suite_work import attempt_name
+from ..experiments.trials import Arm, TrialRow
+from ..tasks.stored_suite import ATTEMPTS, StoredSuite, read_suite
 
+Point = tuple[float, float]
 LONGEST = 4_000
 """Characters shown of one text of a transcript."""
 
 
-class _Verdict(BaseModel):
+class _Grade(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore")
 
     right: tuple[bool, ...] = ()
 
 
-class Kept(BaseModel):
-    """What was kept of a trial.
+class StoredAttempt(BaseModel):
+    """What came of a trial.
 
     Attributes:
+        message: the text the run ended with.
         planned, observed: positions, px; None for none.
         found: outlines robots were placed about, px.
-        said: what the person was told.
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
-    said: str = ""
+    message: str = ""
     planned: tuple[Point, ...] | None = None
     observed: tuple[Point, ...] | None = None
     found: tuple[tuple[Point, ...], ...] = ()
-    graded: _Verdict = Field(default_factory=_Verdict)
+    graded: _Grade = Field(default_factory=_Grade)
 
     @property
     def right(self) -> tuple[bool, ...]:
@@ -53,7 +53,7 @@ class Kept(BaseModel):
 
 
 @dataclass(frozen=True)
-class Said:
+class Utterance:
     """A text of a transcript: who, perhaps about which tool, what."""
 
     who: str
@@ -67,71 +67,71 @@ class Side:
     """The rows of a run that are shown, and its folder.
 
     Attributes:
-        called: A or B where two are compared, else nothing.
+        label: A or B where two are compared, else nothing.
     """
 
     folder: Path
-    suite: KeptSuite
+    suite: StoredSuite
     rows: tuple[TrialRow, ...]
-    called: str = ""
+    label: str = ""
 
     @property
     def arms(self) -> list[Arm]:
         """In order of their names."""
-        arms = {arm.name: arm for arm in map(Arm.of, self.rows)}
+        arms = {arm.name: arm for arm in (row.arm for row in self.rows)}
         return [arms[name] for name in sorted(arms)]
 
     def of(self, arm: Arm) -> list[TrialRow]:
         """The rows of an arm."""
-        return [row for row in self.rows if Arm.of(row) == arm]
+        return [row for row in self.rows if row.arm == arm]
 
-    def kept(self, row: TrialRow) -> Kept | None:
-        """What was kept of a trial; None for nothing that can be read."""
+    def attempt(self, row: TrialRow) -> StoredAttempt | None:
+        """What came of a trial; None where nothing can be read."""
         try:
             content = json.loads(self._file(row, "json").read_bytes())
             # A model may have written half of a surrogate pair, which is no text.
             whole = json.dumps(content, ensure_ascii=False).encode("utf-8", "replace")
-            return Kept.model_validate_json(whole)
+            return StoredAttempt.model_validate_json(whole)
         except (OSError, ValueError, RecursionError):
             return None
 
-    def transcript(self, row: TrialRow) -> list[Said] | None:
-        """What was said in a trial, texts and calls alone; None where no trace was kept."""
+    def transcript(self, row: TrialRow) -> list[Utterance] | None:
+        """The texts and calls of a trial; None where there is no trace."""
         path = self._file(row, "jsonl")
         if not path.exists():
             return None
         try:
             lines = [e.data for e in read_events(path) if e.kind == "message"]
         except InputError:
-            return [Said("", "", "The trace cannot be read.")]
-        return [said for line in lines for said in _said(line)]
+            return [Utterance("", "", "The trace cannot be read.")]
+        return [utterance for line in lines for utterance in _utterances(line)]
 
     def _file(self, row: TrialRow, suffix: str) -> Path:
-        return self.folder / ATTEMPTS / f"{kept_as(row)}.{suffix}"
+        return self.folder / ATTEMPTS / f"{attempt_name(row)}.{suffix}"
 
 
-def side(folder: Path, rows: Sequence[TrialRow], called: str = "") -> Side:
+def side(folder: Path, rows: Sequence[TrialRow], label: str = "") -> Side:
     """A run to be shown.
 
     Raises:
-        InputError: the folder keeps nothing of its suite.
+        InputError: the folder holds nothing of its suite.
     """
-    return Side(folder, read_suite(folder), tuple(rows), called)
+    return Side(folder, read_suite(folder), tuple(rows), label)
 
 
-def _said(line: Mapping[str, Any]) -> list[Said]:
+def _utterances(line: Mapping[str, Any]) -> list[Utterance]:
     """A message of a trace as texts."""
+    text = line.get("text", "")
     if line["role"] == "user":
-        return [_cut("person", "", line.get("text", ""))]
+        return [_shortened("person", "", text)]
     if line["role"] == "tool":
         error = f"{line['error']}: " if line.get("error") else ""
-        return [_cut("result", line["name"], error + line.get("text", ""))]
-    texts = [_cut("model", "", line["text"])] if line.get("text") else []
-    calls = [
-        (c["name"], json.dumps(c["arguments"], ensure_ascii=False)) for c in line.get("calls", ())
-    ]
-    return texts + [_cut("call", *call) for call in calls]
+        return [_shortened("result", line["name"], error + text)]
+    texts = [_shortened("model", "", text)] if text else []
+    calls = line.get("calls", ())
+    shown = [(c["name"], json.dumps(c["arguments"], ensure_ascii=False)) for c in calls]
+    return texts + [_shortened("call", *call) for call in shown]
 
 
-def _cut(who: str, tool: str, text: str) -> Said:
-    return Said(who, tool, text[:LONGEST], max(0, len(text) - LONGEST))
+def _shortened(who: str, tool: str, text: str) -> Utterance:
+    return Utterance(who, tool, text[:LONGEST], max(0, len(text) - LONGEST))

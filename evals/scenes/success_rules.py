@@ -45,7 +45,7 @@ def robots_for(random: Generator, thing: Thing, arrangement: str) -> int:
         "inside": (3, thing.polygon.area / PARTING**2),
         "side": (3, min(x1 - x0, y1 - y0) / PARTING),
     }[arrangement]
-    if arrangement == "cage" and _hollow(thing):
+    if arrangement == "cage" and thing.hollow:
         least = 10  # fewer would leave the mouth of a C open
     limit = {"around": 16, "cage": 20, "inside": 12, "side": 6}[arrangement]
     return int(random.integers(least, max(least, min(limit, int(most))) + 1))
@@ -59,7 +59,7 @@ def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str,
         low = max((0.03 if closed else 0.04) * size, 2.0)
         high = max((0.4 if closed else 0.5) * size, 16.0)
         loop = thing.outline.filled.buffer((low + high) / 2).exterior.length
-        slack = (1.8 if _hollow(thing) else 1.6) if closed else 2.0
+        slack = (1.8 if thing.hollow else 1.6) if closed else 2.0
         rule = {
             "where": "boundary",
             "side": "outside",
@@ -81,7 +81,7 @@ def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str,
         return {
             "where": "corners",
             "side": "outside",
-            "points": [[round(x, 1), round(y, 1)] for x, y in _corners(thing)],
+            "points": [[round(x, 1), round(y, 1)] for x, y in _counted_corners(thing)],
             "tolerance_px": round(max(0.216 * size, 10), 1),
             "min_clearance_px": 0,
         }
@@ -96,12 +96,7 @@ def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str,
     }
 
 
-def _hollow(thing: Thing) -> bool:
-    """Whether robots in a recess of it come between others when counted around its hull."""
-    return thing.area < 0.8 * thing.polygon.convex_hull.area
-
-
-def _corners(thing: Thing) -> list[tuple[float, float]]:
+def _counted_corners(thing: Thing) -> list[tuple[float, float]]:
     ring = thing.polygon.exterior
     if thing.sort.corners == len(ring.coords) - 1:
         return [(float(x), float(y)) for x, y in list(ring.coords)[:-1]]

@@ -1,23 +1,69 @@
-"""A task of a suite and a suite of tasks, as values; and the hash by which results name a suite."""
+"""A task and a suite of tasks, as values; and the hash by which results name a suite."""
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+import shapely
 from PIL import Image
+from shapely.geometry import Polygon
 
 from ...agent.report import Status
+from ...tools.geometry.outline import Outline, make_outline
 from ..experiments.trials import canonical
-from ..grading.graded import VERSION
-from ..scenes.build import tell
+from ..grading.grades import VERSION
 from ..scenes.paint import draw
-from .photographs import Task, Thing
+from ..scenes.stories import story_of
 from .recipes.inscribed import inscribe
 
 Split = Literal["train", "dev", "test"]
 SPLITS: tuple[Split, ...] = get_args(Split)
+Ring = list[list[float]]
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An annotated object: its name and outline, pixels of the stored image."""
+
+    id: str
+    name: str
+    polygon: Ring
+    holes: list[Ring]
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The outline as geometry."""
+        return make_outline(self.polygon, tuple(self.holes))
+
+    def overlap(self, found: Polygon) -> float:
+        """Intersection over union of an outline that was found with the true one."""
+        truth = shapely.make_valid(Polygon(self.polygon, self.holes))
+        return float(found.intersection(truth).area / max(found.union(truth).area, 1e-9))
+
+
+@dataclass(frozen=True)
+class Goal:
+    """So many robots about a thing, and the rule that says when they stand right.
+
+    Attributes:
+        size: of the picture, (width, height), px.
+        success: the rule; lengths in px.
+        other: a second thing, where robots stand between two.
+    """
+
+    robots: int
+    size: tuple[int, int]
+    target: Thing
+    success: dict[str, Any] = field(repr=False)
+    other: Thing | None = None
+
+    @property
+    def things(self) -> tuple[Thing, ...]:
+        """The target, and the other thing if there is one."""
+        return (self.target,) if self.other is None else (self.target, self.other)
 
 
 @dataclass(frozen=True)
@@ -34,13 +80,13 @@ class Drawing:
 
     def image(self) -> Image.Image:
         """The picture; always the same pixels."""
-        story = tell(self.seed)
+        story = story_of(self.seed)
         drawn = draw(story.scene)
         return inscribe(drawn, story, self.inscription) if self.inscription else drawn
 
 
 @dataclass(frozen=True)
-class SuiteTask:
+class Task:
     """One instruction on one picture, and what is right.
 
     Attributes:
@@ -48,11 +94,12 @@ class SuiteTask:
         robots: as the person gives them; None leaves it to the words.
         family: of the picture; splits are by family, so that no scene is in two of them.
         style: how it is worded, or what is wrong with it.
+        referring: by which kind of reference a drawn scene tells the thing.
         goals: all of them are to be reached; none where nothing is to be placed.
         expects: statuses that are right.
         picture: a file, or one that is drawn.
         must_pass: it always succeeds; the gate holds new versions to it.
-        metres_per_pixel: of the picture, told to who carries it out; None where it has no scale.
+        metres_per_pixel: of the picture, given to the method; None where it has no scale.
     """
 
     id: str
@@ -63,16 +110,17 @@ class SuiteTask:
     family: str
     split: Split
     style: str
-    goals: tuple[Task, ...]
+    referring: str
+    goals: tuple[Goal, ...]
     expects: tuple[Status, ...]
     picture: Path | Drawing
     must_pass: bool = False
     metres_per_pixel: float | None = None
 
     @property
-    def cell(self) -> tuple[str, str]:
-        """Category and setup."""
-        return self.category, self.setup
+    def things(self) -> tuple[Thing, ...]:
+        """The things robots are to be placed about, each once."""
+        return tuple({thing.id: thing for goal in self.goals for thing in goal.things}.values())
 
     @property
     def content(self) -> dict[str, Any]:
@@ -81,26 +129,23 @@ class SuiteTask:
             "id": self.id,
             "instruction": self.instruction,
             "robots": self.robots,
-            "cell": self.cell,
+            "cell": (self.category, self.setup),
             "expects": self.expects,
-            "goals": [_goal(goal) for goal in self.goals],
+            "goals": [_goal_content(goal) for goal in self.goals],
             "must_pass": self.must_pass,
             **({"metres_per_pixel": self.metres_per_pixel} if self.metres_per_pixel else {}),
         }
 
 
-def _goal(goal: Task) -> dict[str, Any]:
+def _goal_content(goal: Goal) -> dict[str, Any]:
+    target, other = goal.target, goal.other
     return {
         "robots": goal.robots,
         "size": goal.size,
-        "target": _thing(goal.target),
-        "other": goal.other and _thing(goal.other),
+        "target": [target.polygon, target.holes],
+        "other": other and [other.polygon, other.holes],
         "success": goal.success,
     }
-
-
-def _thing(thing: Thing) -> list[Any]:
-    return [thing.polygon, thing.holes]
 
 
 @dataclass(frozen=True)
@@ -109,7 +154,7 @@ class Suite:
 
     name: str
     description: str
-    tasks: tuple[SuiteTask, ...]
+    tasks: tuple[Task, ...]
 
     def sha256(self, pixels: Mapping[str, str]) -> str:
         """The hash of its tasks with their pictures, by which results name it.

@@ -12,19 +12,19 @@ from shapely.geometry import Polygon
 
 from ...agent.report import Status
 from ...tools.geometry.outline import FloatArray
-from ..tasks.photographs import Task, Thing
-from .graded import Graded, Part, distinct
+from ..tasks.task import Goal, Thing
+from .grades import Graded, Part, distinct
+from .infill import infill
 from .lines import centre, corners, line_between, side
-from .region import region
 from .ring import escape_proof, ring
 
 SAME = 0.5
 """Overlap (intersection over union) above which an outline found is the thing meant."""
-Rule = Callable[[Task, FloatArray, NDArray[np.bool_]], Part]
+Rule = Callable[[Goal, FloatArray, NDArray[np.bool_]], Part]
 RULES: dict[str, Rule] = {
     "boundary": ring,
     "cage": escape_proof,
-    "inside": region,
+    "inside": infill,
     "corners": corners,
     "side": side,
     "line_between": line_between,
@@ -41,7 +41,8 @@ class Attempt:
         planned: positions commanded, (m, 2) px; None for none.
         observed: positions read back after the move; None where nothing has moved.
         found: outlines robots were placed about; none where that is not known.
-        said: what the person was told.
+        measured: all outlines that were measured.
+        message: the text the run ended with.
         declined: a question or a refusal was made the way the interface has for it. Words alone
             are none: nobody can tell them from a reply that went wrong.
     """
@@ -50,11 +51,12 @@ class Attempt:
     planned: Sequence[tuple[float, float]] | None = None
     observed: Sequence[tuple[float, float]] | None = None
     found: tuple[Polygon, ...] = ()
-    said: str = ""
+    measured: tuple[Polygon, ...] = ()
+    message: str = ""
     declined: bool = False
 
 
-def grade_goals(goals: Sequence[Task], positions: ArrayLike | None) -> Graded:
+def grade_goals(goals: Sequence[Goal], positions: ArrayLike | None) -> Graded:
     """Grade positions against the goals of a task, each with a number of robots of its own.
 
     Which robot serves which goal is decided in the robots' favour by distance; their order does
@@ -64,7 +66,7 @@ def grade_goals(goals: Sequence[Task], positions: ArrayLike | None) -> Graded:
         goals: one or more, on one picture.
         positions: (m, 2) px; None where nothing was placed.
     """
-    points = _points(positions)
+    points = _point_array(positions)
     if points is None or not len(points):
         return Graded(False, 0.0, False, feedback="nothing was placed")
     robots = sum(goal.robots for goal in goals)
@@ -72,7 +74,7 @@ def grade_goals(goals: Sequence[Task], positions: ArrayLike | None) -> Graded:
     with np.errstate(invalid="ignore"):
         in_picture = ((points >= 0) & (points <= (width - 1, height - 1))).all(axis=1)
     free = in_picture & distinct(points)
-    owned = _shared(goals, points)
+    owned = _robots_of_goals(goals, points)
     parts = [
         (goal, RULES[str(goal.success["where"]).partition(":")[0]](goal, points[own], free[own]))
         for goal, own in zip(goals, owned, strict=True)
@@ -95,33 +97,35 @@ def grade_goals(goals: Sequence[Task], positions: ArrayLike | None) -> Graded:
         gcr=1.0 if sr else hits / max(robots, len(points)),
         strict=sr and not strict,
         feedback="; ".join([*wrong, *(p for _, part in parts for p in part.problems), *strict]),
-        measures=_measures([part for _, part in parts]),
+        measures=_named_measures([part for _, part in parts]),
         right=tuple(right.tolist()),
     )
 
 
-def grade_attempt(goals: Sequence[Task], expects: Sequence[Status], attempt: Attempt) -> Graded:
+def grade_attempt(goals: Sequence[Goal], expects: Sequence[Status], attempt: Attempt) -> Graded:
     """Grade what came of a task; the observed positions are the official ones.
 
     Args:
         goals: of the task; none where nothing is to be placed.
         expects: statuses that are right; where `deployed` is not among them, robots that moved are
-            a failure whatever was said.
+            a failure whatever the message.
         attempt: what came of it.
     """
     if "deployed" not in expects:
         return _graded_refusal(expects, attempt)
     graded = grade_goals(goals, attempt.observed)
     planned = grade_goals(goals, attempt.planned)
-    feedback = graded.feedback if attempt.observed else f"{attempt.status}: {attempt.said}"
+    feedback = graded.feedback if attempt.observed else f"{attempt.status}: {attempt.message}"
     if graded.sr != planned.sr:
         feedback += f" (as planned: {'right' if planned.sr else planned.feedback})"
-    things = [thing for goal in goals for thing in (goal.target, goal.other) if thing]
+    things = {thing.id: thing for goal in goals for thing in goal.things}
+    overlaps = [goals[0].target.overlap(outline) for outline in attempt.measured]
     return Graded(
         sr=graded.sr,
         gcr=graded.gcr,
         strict=graded.strict,
-        object_correct=_meant(attempt.found, things) if attempt.found else None,
+        object_correct=_meant(attempt.found, list(things.values())) if attempt.found else None,
+        iou=round(max(overlaps), 4) if overlaps else None,
         feedback=feedback,
         measures={**graded.measures, "planned_gcr": planned.gcr},
         right=graded.right,
@@ -137,11 +141,11 @@ def _graded_refusal(expects: Sequence[Status], attempt: Attempt) -> Graded:
         feedback = ""
     else:
         words = "" if attempt.declined else ", in words alone"
-        feedback = f"{attempt.status}{words}, {wanted} was right: {attempt.said}"
+        feedback = f"{attempt.status}{words}, {wanted} was right: {attempt.message}"
     return Graded(right, float(right), right, feedback=feedback)
 
 
-def _points(positions: ArrayLike | None) -> FloatArray | None:
+def _point_array(positions: ArrayLike | None) -> FloatArray | None:
     """Positions as an array; what is no number stands nowhere."""
     if positions is None:
         return None
@@ -149,7 +153,7 @@ def _points(positions: ArrayLike | None) -> FloatArray | None:
     return np.where(np.isfinite(points), points, -1e9)
 
 
-def _shared(goals: Sequence[Task], points: FloatArray) -> list[NDArray[np.intp]]:
+def _robots_of_goals(goals: Sequence[Goal], points: FloatArray) -> list[NDArray[np.intp]]:
     """The robots of each goal by least total distance to its target; the last gets those over."""
     if len(goals) == 1:
         return [np.arange(len(points))]
@@ -162,26 +166,19 @@ def _shared(goals: Sequence[Task], points: FloatArray) -> list[NDArray[np.intp]]
     return [np.flatnonzero(owner == i) for i in range(len(goals))]
 
 
-def _ground(goal: Task) -> Polygon:
+def _ground(goal: Goal) -> Polygon:
     return Polygon(goal.target.polygon, goal.target.holes)
 
 
 def _meant(found: Sequence[Polygon], things: Sequence[Thing]) -> bool:
     """Whether the outlines found are those of the things meant, in any order."""
-    truths = {thing.id: shapely.make_valid(Polygon(thing.polygon, thing.holes)) for thing in things}
-    if len(found) != len(truths):
-        return False
-    return any(
-        all(_iou(polygon, truth) > SAME for polygon, truth in zip(found, order, strict=True))
-        for order in permutations(truths.values())
+    return len(found) == len(things) and any(
+        all(thing.overlap(outline) > SAME for outline, thing in zip(found, order, strict=True))
+        for order in permutations(things)
     )
 
 
-def _iou(a: Polygon, b: shapely.Geometry) -> float:
-    return float(a.intersection(b).area / max(a.union(b).area, 1e-9))
-
-
-def _measures(parts: Sequence[Part]) -> dict[str, float]:
+def _named_measures(parts: Sequence[Part]) -> dict[str, float]:
     if len(parts) == 1:
         return dict(parts[0].measures)
     return {f"{k}_{i}": v for i, p in enumerate(parts, start=1) for k, v in p.measures.items()}

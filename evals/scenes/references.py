@@ -27,19 +27,19 @@ class View:
 
     @property
     def margin(self) -> float:
-        """By how much one thing must lie further along than another to be said to, px."""
+        """By how much one thing must lie further along than another to count, px."""
         return max(42.0, 0.062 * self.size[0])
 
 
 Rule = Callable[[Thing, list[Thing], View], Slots | None]
 
 
-def told(kind: str, thing: Thing, group: Sequence[Thing], view: View) -> Slots | None:
+def reference_slots(kind: str, thing: Thing, group: Sequence[Thing], view: View) -> Slots | None:
     """What fills the template of that kind for a thing of a group, or None where it is unclear."""
     return _RULES[kind](thing, [t for t in group if t is not thing], view)
 
 
-def _holds(rule: Callable[[Thing, list[Thing], View], bool]) -> Rule:
+def _slots_if(rule: Callable[[Thing, list[Thing], View], bool]) -> Rule:
     return lambda thing, others, view: {} if rule(thing, others, view) else None
 
 
@@ -48,8 +48,8 @@ def _single(thing: Thing, others: list[Thing], view: View) -> bool:
 
 
 def _by_colour(thing: Thing, others: list[Thing], view: View) -> Slots | None:
-    clear = all(t.sort.told and t.colour != thing.colour for t in others)
-    return {"colour": thing.colour} if thing.sort.told and clear else None
+    clear = all(t.sort.by_colour and t.colour != thing.colour for t in others)
+    return {"colour": thing.colour} if thing.sort.by_colour and clear else None
 
 
 def _by_shape(thing: Thing, others: list[Thing], view: View) -> Slots | None:
@@ -84,11 +84,11 @@ def _smaller(thing: Thing, others: list[Thing], view: View) -> bool:
 
 def _larger_of_colour(thing: Thing, others: list[Thing], view: View) -> Slots | None:
     same = [t for t in others if t.colour == thing.colour]
-    clear = thing.sort.told and all(t.sort.told for t in others)
+    clear = thing.sort.by_colour and all(t.sort.by_colour for t in others)
     return {"colour": thing.colour} if clear and _larger(thing, same, view) else None
 
 
-def _along(thing: Thing, axis: int, sign: int) -> tuple[float, float]:
+def _along_axis(thing: Thing, axis: int, sign: int) -> tuple[float, float]:
     """Centre and far edge of a thing, growing in that direction."""
     bounds = thing.polygon.bounds
     edge = bounds[axis + 2] if sign > 0 else bounds[axis]
@@ -97,8 +97,8 @@ def _along(thing: Thing, axis: int, sign: int) -> tuple[float, float]:
 
 def _most(axis: int, sign: int) -> Callable[[Thing, list[Thing], View], bool]:
     def rule(thing: Thing, others: list[Thing], view: View) -> bool:
-        centre, edge = _along(thing, axis, sign)
-        rest = [_along(t, axis, sign) for t in others]
+        centre, edge = _along_axis(thing, axis, sign)
+        rest = [_along_axis(t, axis, sign) for t in others]
         return bool(rest) and all(centre >= c + view.margin and edge >= e + 8 for c, e in rest)
 
     return rule
@@ -118,12 +118,12 @@ def phrase(thing: Thing, view: View) -> str | None:
     named = [t for t in view.things if t is not thing and goes_by(t, thing)]
     if not named:
         return f"the {thing.sort.noun}"
-    if thing.sort.told and all(t.colour != thing.colour for t in named):
+    if thing.sort.by_colour and all(t.colour != thing.colour for t in named):
         return f"the {thing.colour} {thing.sort.noun}"
     return None
 
 
-def _beside(axis: int, sign: int) -> Rule:
+def _beside_another(axis: int, sign: int) -> Rule:
     """The only one of its group on that side of another thing."""
 
     def rule(thing: Thing, others: list[Thing], view: View) -> Slots | None:
@@ -132,17 +132,17 @@ def _beside(axis: int, sign: int) -> Rule:
             rest = [t for t in others if t is not other]
             if words is None or not rest or not _most(axis, sign)(thing, [other], view):
                 continue
-            ahead = _along(other, axis, sign)[0] - 0.4 * view.margin
+            ahead = _along_axis(other, axis, sign)[0] - 0.4 * view.margin
             across = abs(thing.place[1 - axis] - other.place[1 - axis])
             far = abs(thing.place[axis] - other.place[axis])
-            if across <= 0.8 * far and all(_along(t, axis, sign)[0] <= ahead for t in rest):
+            if across <= 0.8 * far and all(_along_axis(t, axis, sign)[0] <= ahead for t in rest):
                 return {"other": words}
         return None
 
     return rule
 
 
-def _nearest(thing: Thing, others: list[Thing], view: View) -> Slots | None:
+def _nearest_to_another(thing: Thing, others: list[Thing], view: View) -> Slots | None:
     for other in view.things:
         words = phrase(other, view) if other is not thing else None
         rest = [t for t in others if t is not other]
@@ -158,20 +158,20 @@ def _nearest(thing: Thing, others: list[Thing], view: View) -> Slots | None:
     return None
 
 
-def _inside(thing: Thing, others: list[Thing], view: View) -> Slots | None:
+def _inside_another(thing: Thing, others: list[Thing], view: View) -> Slots | None:
     for other in view.things:
         words = phrase(other, view) if other.sort.encloses else None
-        held = [t for t in view.things if t is not other and _within(t, other)]
+        held = [t for t in view.things if t is not other and _lies_within(t, other)]
         if words and held == [thing]:
             return {"other": words}
     return None
 
 
-def _within(thing: Thing, other: Thing) -> bool:
+def _lies_within(thing: Thing, other: Thing) -> bool:
     return other.polygon.convex_hull.contains(thing.polygon)
 
 
-def _between(thing: Thing, others: list[Thing], view: View) -> Slots | None:
+def _between_two(thing: Thing, others: list[Thing], view: View) -> Slots | None:
     rest = [t for t in view.things if t is not thing]
     for i, a in enumerate(rest):
         for b in rest[i + 1 :]:
@@ -223,7 +223,7 @@ def _round(thing: Thing, others: list[Thing], view: View) -> bool:
     return thing.roundness >= 0.87 and all(t.roundish <= 0.72 for t in others) and bool(others)
 
 
-def _long(thing: Thing, others: list[Thing], view: View) -> bool:
+def _elongated(thing: Thing, others: list[Thing], view: View) -> bool:
     return thing.stretch >= 2.2 and all(t.stretch <= 1.6 for t in others) and bool(others)
 
 
@@ -235,7 +235,7 @@ def _askew(thing: Thing, others: list[Thing], view: View) -> bool:
     return all(off(t.turn, first) <= 5 for t in others) and off(thing.turn, first) >= 20
 
 
-def _alone(thing: Thing, others: list[Thing], view: View) -> bool:
+def _stands_alone(thing: Thing, others: list[Thing], view: View) -> bool:
     gaps = [nearest_gap(t, [o for o in others if o is not t]) for t in others]
     return nearest_gap(thing, others) >= 2.0 * max(gaps)
 
@@ -254,35 +254,35 @@ def _odd_size(thing: Thing, others: list[Thing], view: View) -> bool:
 
 
 _RULES: dict[str, Rule] = {
-    "single": _holds(_single),
+    "single": _slots_if(_single),
     "colour": _by_colour,
     "shape": _by_shape,
     "colour_shape": _by_both,
-    "largest": _holds(_larger),
-    "smallest": _holds(_smaller),
-    "leftmost": _holds(_most(0, -1)),
-    "rightmost": _holds(_most(0, 1)),
-    "topmost": _holds(_most(1, -1)),
-    "bottommost": _holds(_most(1, 1)),
-    "second_left": _holds(_second(-1)),
-    "second_right": _holds(_second(1)),
+    "largest": _slots_if(_larger),
+    "smallest": _slots_if(_smaller),
+    "leftmost": _slots_if(_most(0, -1)),
+    "rightmost": _slots_if(_most(0, 1)),
+    "topmost": _slots_if(_most(1, -1)),
+    "bottommost": _slots_if(_most(1, 1)),
+    "second_left": _slots_if(_second(-1)),
+    "second_right": _slots_if(_second(1)),
     "largest_colour": _larger_of_colour,
-    "left_of": _beside(0, -1),
-    "right_of": _beside(0, 1),
-    "above": _beside(1, -1),
-    "below": _beside(1, 1),
-    "nearest": _nearest,
-    "inside": _inside,
-    "between": _between,
+    "left_of": _beside_another(0, -1),
+    "right_of": _beside_another(0, 1),
+    "above": _beside_another(1, -1),
+    "below": _beside_another(1, 1),
+    "nearest": _nearest_to_another,
+    "inside": _inside_another,
+    "between": _between_two,
     "corner": _in_corner,
-    "middle": _holds(_in_middle),
-    "round": _holds(_round),
-    "long": _holds(_long),
-    "odd_colour": _holds(_differs(lambda t: t.colour)),
-    "odd_size": _holds(_odd_size),
-    "odd_shape": _holds(_differs(lambda t: t.sort.noun)),
-    "askew": _holds(_askew),
-    "alone": _holds(_alone),
+    "middle": _slots_if(_in_middle),
+    "round": _slots_if(_round),
+    "long": _slots_if(_elongated),
+    "odd_colour": _slots_if(_differs(lambda t: t.colour)),
+    "odd_size": _slots_if(_odd_size),
+    "odd_shape": _slots_if(_differs(lambda t: t.sort.noun)),
+    "askew": _slots_if(_askew),
+    "alone": _slots_if(_stands_alone),
 }
 HIDDEN = ("odd_colour", "odd_size", "odd_shape", "askew", "alone")
 KINDS = tuple(kind for kind in _RULES if kind not in HIDDEN)

@@ -1,0 +1,91 @@
+"""What a run of a suite came to, on the terminal: scores, what was placed, cost, and the misses."""
+
+from collections.abc import Sequence
+from statistics import median
+
+from rich.console import Console
+from rich.table import Table
+
+from ..evals.experiments.trials import TrialRow
+from ..evals.statistics.cells import Cell
+
+SCORES = ("success", "95 %", "GCR", "strict", "chance SR", "chance GCR")
+PLACED = (
+    *("trials", "placed", "success", "strict"),
+    *("right thing,\nif placed", "success,\nif placed", "mean IoU"),
+)
+MISSES = 100
+"""Misses that are listed; the report shows all."""
+LONGEST = 150
+
+
+def print_scores(title: str, found: Sequence[Cell]) -> None:
+    """Successes by cell with intervals and the chance level."""
+    extra = [n for n in ("invalid", "lost") if any(getattr(cell, n) for cell in found)]
+    table = _number_table(title, *SCORES, *extra)
+    for cell in found:
+        low, high = cell.interval
+        table.add_row(
+            cell.name,
+            f"{cell.passed}/{cell.scored}",
+            f"{low:.2f}-{high:.2f}",
+            f"{cell.gcr:.2f}",
+            f"{cell.strict}/{cell.scored}",
+            f"{cell.chance.sr:.2f}",
+            f"{cell.chance.gcr:.2f}",
+            *(str(getattr(cell, name)) for name in extra),
+        )
+    Console(highlight=False).print(table)
+
+
+def print_placed(found: Sequence[Cell]) -> None:
+    """Shares of the trials, and of those that placed robots, by category, setup and style."""
+    table = _number_table(None, *PLACED)
+    for cell in (cell for cell in found if " " not in cell.name):
+        right, known = cell.right_thing
+        table.add_row(
+            cell.name,
+            str(cell.scored),
+            _share(cell.placed, cell.scored),
+            _share(cell.passed, cell.scored),
+            _share(cell.strict, cell.scored),
+            _share(right, known),
+            _share(cell.placed_passed, cell.placed),
+            "-" if cell.iou is None else f"{cell.iou:.3f}",
+        )
+    Console(highlight=False).print(table)
+
+
+def print_spent(rows: Sequence[TrialRow]) -> None:
+    """Requests and tokens of a trial, if a language model was asked."""
+    scored = [row for row in rows if row.scored]
+    if not any(row.input_tokens for row in scored):
+        return
+    spent = [(r.requests, r.input_tokens, r.cached_tokens, r.output_tokens) for r in scored]
+    requests, sent, cached, got = (f"{median(counts):,.0f}" for counts in zip(*spent, strict=True))
+    Console(highlight=False, soft_wrap=True).print(
+        f"A trial in the median: requests {requests}; tokens in {sent}, {cached} where the prompt "
+        f"is cached; tokens out {got}."
+    )
+
+
+def print_misses(rows: Sequence[TrialRow]) -> None:
+    """The trials that were not strictly right, and why."""
+    console = Console(highlight=False, soft_wrap=True)
+    misses = [row for row in rows if not row.strict and row.feedback]
+    for row in misses[:MISSES]:
+        kind = "not strict: " if row.sr else ""
+        console.print(f"{row.task} trial {row.trial}: {kind}{row.feedback[:LONGEST]}", markup=False)
+    if len(misses) > MISSES:
+        console.print(f"and {len(misses) - MISSES} more")
+
+
+def _number_table(title: str | None, *names: str) -> Table:
+    table = Table(title=title, header_style="cyan", box=None)
+    for name in ("", *names):
+        table.add_column(name, justify="right" if name else "left", no_wrap=True)
+    return table
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part / whole:.3f}" if whole else "-"

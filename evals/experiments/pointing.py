@@ -1,0 +1,109 @@
+"""How a task's thing is pointed at: the way of pointing is a variable of an experiment.
+
+truth: the drawn outline is the mask. box: the target's box, each side moved by up to 8 % of the
+box. outline: at most 12 vertices, each coordinate moved by up to 4 % of the size (square root of
+the area). point: one point well inside. words: nothing is pointed at.
+"""
+
+import zlib
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+
+from ...tools.errors import InputError
+from ...tools.geometry.outline import FloatArray
+from ...tools.perception.target_prompt import TargetPrompt
+from ...tools.world import Target
+from ..tasks.task import Task, Thing
+
+Mode = Literal["truth", "outline", "box", "point", "words"]
+JITTERED: tuple[Mode, ...] = ("outline", "box", "point")
+"""Modes in which each trial points in another way."""
+BOX_JITTER, OUTLINE_JITTER, OUTLINE_VERTICES = 0.08, 0.04, 12
+
+
+class Pointing(NamedTuple):
+    """What an agent is given beside the words."""
+
+    pointed: tuple[TargetPrompt, ...] = ()
+    targets: tuple[Target, ...] = ()
+
+
+def mode_named(text: str) -> Mode:
+    """A mode by name.
+
+    Raises:
+        InputError: there is none; the text lists those there are.
+    """
+    for mode in get_args(Mode):
+        if text == mode:
+            return mode
+    raise InputError(f"Unknown mode {text!r}. There are: {', '.join(get_args(Mode))}.")
+
+
+def can_point(task: Task, mode: Mode) -> bool:
+    """Whether a task can be pointed at this way: a single pointing settles one thing alone."""
+    if mode in JITTERED:
+        return len(task.things) == 1
+    return mode == "words" or bool(task.things)
+
+
+def pointing(task: Task, mode: Mode, number: int) -> Pointing:
+    """How a task is pointed at in the trial of a number, which settles the jitter."""
+    if mode == "words":
+        return Pointing()
+    if mode == "truth":
+        return Pointing(targets=tuple(map(_true_target, task.things, range(len(task.things)))))
+    random = np.random.default_rng([number, zlib.crc32(task.id.encode())])
+    (thing,) = task.things
+    far = np.array(task.goals[0].size, dtype=float) - 1
+    jittered = {"box": _jittered_box, "outline": _jittered_outline, "point": _inner_point}[mode]
+    return Pointing(pointed=(jittered(thing, random, far),))
+
+
+def _true_target(thing: Thing, index: int) -> Target:
+    outline = thing.outline
+    return Target(
+        id=f"t{index + 1}",
+        label=thing.name,
+        box=outline.bounds,
+        confidence=1.0,
+        outline=outline,
+        prompt="truth",
+    )
+
+
+def _jittered_box(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
+    box = np.asarray(thing.outline.bounds).reshape(2, 2)
+    moved = box + random.uniform(-BOX_JITTER, BOX_JITTER, (2, 2)) * (box[1] - box[0])
+    x0, y0, x1, y1 = np.clip(moved, 0, far).ravel()
+    return TargetPrompt(box=(float(x0), float(y0), float(x1), float(y1)))
+
+
+def _jittered_outline(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
+    """The true outline simplified to at most 12 vertices, each moved."""
+    ring = LineString([*thing.polygon, thing.polygon[0]])
+    tolerance = 0.5
+    vertices = shapely.get_coordinates(ring.simplify(tolerance))[:-1]
+    while len(vertices) > OUTLINE_VERTICES:
+        tolerance *= 1.15
+        vertices = shapely.get_coordinates(ring.simplify(tolerance))[:-1]
+    amount = OUTLINE_JITTER * thing.outline.size
+    while True:  # a jitter that crosses itself is no outline a person would draw
+        moved = np.clip(vertices + random.uniform(-amount, amount, vertices.shape), 0, far)
+        if Polygon(moved).is_valid:
+            return TargetPrompt(outline=tuple((float(x), float(y)) for x, y in moved))
+
+
+def _inner_point(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
+    """A random point of the thing, off its edge by an eighth of its least width if it can be."""
+    outline = thing.outline
+    inner = outline.polygon.buffer(-outline.min_width / 8)
+    region = outline.polygon if inner.is_empty else inner
+    x0, y0, x1, y1 = region.bounds
+    while True:
+        x, y = (float(v) for v in random.uniform((x0, y0), (x1, y1)))
+        if shapely.contains_xy(region, x, y):
+            return TargetPrompt(points=((x, y),))

@@ -1,0 +1,224 @@
+"""Runs a trial of a suite, grades it, and keeps what came of it; another process can be given it.
+
+A provider that fails is an infrastructure error and says nothing; output that cannot be used is the
+model's failure, counted apart.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ...agent.agent import Agent, Run
+from ...agent.messages import Result
+from ...agent.outcomes import Answered, Stopped
+from ...tools.context import Settings
+from ...tools.perception.image import Picture, load_picture
+from ...tools.store import write_whole
+from ..grading.attempts import Attempt, grade_attempt
+from ..grading.grades import VERSION, Graded
+from ..grading.policies import POLICIES, positions
+from ..tasks.task import Task
+from .methods import Method
+from .pointing import pointing
+from .recordings import file_name, recordings
+from .simulated_model import SIMULATED
+from .tokens import spent
+from .trials import Status, Trial, TrialRow, canonical
+
+LONGEST = 400
+"""Characters of feedback in a row."""
+
+
+@dataclass(frozen=True)
+class SuiteWork:
+    """Runs and grades one trial.
+
+    Attributes:
+        tasks: by id.
+        pictures: files, by the task's id.
+        arms: by the name of what a trial says of its arm.
+        attempts: a folder for what was planned and observed, for looking and grading again; None
+            where only scores are to be seen.
+    """
+
+    tasks: Mapping[str, Task]
+    pictures: Mapping[str, Path]
+    arms: Mapping[str, Method]
+    attempts: Path | None = None
+
+    def __call__(self, trial: Trial) -> TrialRow:
+        """The row of a trial."""
+        task, arm = self.tasks[trial.task], self.arms[trial.arm.name]
+        if arm.name in POLICIES:
+            attempt, run, cost = _by_policy(task, arm.name, trial.seed), None, {}
+        else:
+            run, cost = self._run(task, arm, trial)
+            lost = _lost(run)
+            if lost is not None:
+                return TrialRow.of(trial, "infra_error", feedback=lost, **cost)
+            attempt = _attempt(run, arm)
+        graded = grade_attempt(task.goals, task.expects, attempt)
+        status: Status = "pass" if graded.sr else "fail"
+        if run is not None and not graded.sr and _invalid(run, arm, attempt):
+            status = "model_invalid"
+        if self.attempts is not None:
+            _write(self.attempts / f"{attempt_name(trial)}.json", attempt, graded, run)
+        return TrialRow.of(
+            trial,
+            status,
+            outcome=attempt.status,
+            gcr=graded.gcr,
+            strict=graded.strict,
+            object_correct=graded.object_correct,
+            iou=graded.iou,
+            feedback=graded.feedback[:LONGEST] if self.attempts is not None else "",
+            **cost,
+        )
+
+    def _run(self, task: Task, arm: Method, trial: Trial) -> tuple[Run, dict[str, Any]]:
+        """The run of a trial and what it cost."""
+        seed, recording, recorded = trial.seed, None, recordings(arm.model)
+        if recorded and (recording := recorded.of(task.id, trial.trial)):
+            seed = recorded.seed(recording)
+        settings = Settings(
+            robots=task.robots,
+            descriptor=arm.descriptor,
+            seed=seed,
+            metres_per_pixel=task.metres_per_pixel,
+        )
+        trace = None
+        if self.attempts is not None and arm.model not in ("offline", SIMULATED):
+            trace = self.attempts / f"{attempt_name(trial)}.jsonl"
+        pointed, targets = pointing(task, arm.mode, trial.trial)
+        agent = arm.agent(trial.seed, recording)
+        run = agent.run(
+            _picture(self.pictures[task.id]),
+            task.instruction,
+            pointed=pointed,
+            targets=targets,
+            settings=settings,
+            trace=trace,
+        )
+        return run, _cost(run, agent, arm)
+
+
+def attempt_name(trial: Trial) -> str:
+    """The name of what came of a trial: its positions (.json) and its trace (.jsonl)."""
+    return f"{file_name(trial.task)}-{trial.trial}-{trial.key[:12]}"
+
+
+def _by_policy(task: Task, name: str, seed: int) -> Attempt:
+    """Where nothing is to be placed, a policy moves robots all the same."""
+    placed = positions(name, task.goals, seed).tolist() if task.goals else [(0.0, 0.0)]
+    return Attempt("deployed", placed, placed)
+
+
+def _attempt(run: Run, arm: Method) -> Attempt:
+    report = run.report
+    if arm.name == "alone":
+        written = _written_positions(report.message)
+        declined = _declined(report.message) if written is None else None
+        if declined:
+            return Attempt(declined, message=report.message, declined=True)
+        status = "deployed" if written else "failed"
+        return Attempt(status, written, written, message=report.message)
+    given_up = isinstance(run.outcome, Answered) and isinstance(run.outcome.messages[-1], Result)
+    targets, contract = run.world.targets, report.contract
+    named = contract.target_ids if contract else ()
+    return Attempt(
+        status=report.status,
+        planned=report.positions,
+        observed=report.arrival and report.arrival.observed,
+        found=tuple(t.outline.polygon for t in targets if t.id in named),
+        measured=tuple(t.outline.polygon for t in targets),
+        message=report.message,
+        declined=report.status == "question" or (report.status == "impossible" and given_up),
+    )
+
+
+def _written_positions(text: str) -> tuple[tuple[float, float], ...] | None:
+    """The positions that a model alone, without tools, has written as JSON; None if it has not."""
+    try:
+        pairs = np.asarray(_json_object(text)["positions"], dtype=float)
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.isfinite(pairs).all():
+        return None
+    return tuple((float(x), float(y)) for x, y in pairs)
+
+
+def _declined(text: str) -> Literal["question", "impossible"] | None:
+    """What a model alone has done that writes that no robot shall be placed; else None."""
+    try:
+        written = _json_object(text)
+        if written["positions"] != []:
+            return None
+        return "question" if written.get("question") else "impossible"
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _json_object(text: str) -> Any:
+    """The JSON object in a text."""
+    return json.loads(text[text.find("{") : text.rfind("}") + 1])
+
+
+def _lost(run: Run) -> str | None:
+    """Why a run says nothing about the model, if so: somebody else has failed."""
+    outcome = run.outcome
+    if isinstance(outcome, Stopped) and outcome.kind in ("model", "tool", "fleet"):
+        return f"{outcome.kind}: {outcome.reason}"[:LONGEST]
+    return None
+
+
+def _invalid(run: Run, arm: Method, attempt: Attempt) -> bool:
+    """Whether there is nothing to judge: no call that could be made, no positions to be read."""
+    if attempt.observed is not None or attempt.declined:
+        return False
+    if arm.name == "alone":
+        return True
+    results = [m for m in run.outcome.messages if isinstance(m, Result)]
+    return not results or results[-1].error in ("unknown_tool", "arguments")
+
+
+def _cost(run: Run, agent: Agent, arm: Method) -> dict[str, Any]:
+    """Tokens as the provider counts them, else by rule of thumb; rules take none."""
+    usage = run.report.usage
+    if arm.model == "offline":
+        return {"requests": usage.requests}
+    guess = spent(run.outcome.messages, agent.system, agent.offered)
+    counted = arm.model != SIMULATED and recordings(arm.model) is None
+    return {
+        "requests": usage.requests,
+        "input_tokens": usage.input_tokens if counted else guess.input,
+        "output_tokens": usage.output_tokens if counted else guess.output,
+        "cached_tokens": guess.cached,
+        "cost_usd": usage.cost_usd if counted else 0.0,
+    }
+
+
+def _write(path: Path, attempt: Attempt, graded: Graded, run: Run | None) -> None:
+    verdict = run and run.report.verdict
+    content = {
+        "graders": VERSION,
+        "status": attempt.status,
+        "message": attempt.message,
+        "declined": attempt.declined,
+        "planned": attempt.planned,
+        "observed": attempt.observed,
+        "certified": verdict.certified if verdict else None,
+        "confidence": [t.confidence for t in run.world.targets] if run else [],
+        "found": [list(polygon.exterior.coords) for polygon in attempt.found],
+        "graded": asdict(graded),
+    }
+    write_whole(path, canonical(content))
+
+
+@lru_cache(maxsize=4)
+def _picture(path: Path) -> Picture:
+    return load_picture(path)
