@@ -64,9 +64,10 @@ class ReplayModel:
 
 
 def _facts(line: dict[str, Any]) -> dict[str, Any]:
-    """What two messages must share: of images the number alone, for libraries that draw and
-    compress write other bytes in other versions."""
-    facts = {k: v for k, v in line.items() if k not in ("type", "seconds") and v is not None}
+    """What two messages must share, as far as a model sees it: of images the number alone, for
+    libraries that draw and compress write other bytes in other versions."""
+    unseen = ("type", "seconds", "cause", "facts")
+    facts = {k: v for k, v in line.items() if k not in unseen and v is not None}
     return facts | {"images": len(line["images"])}
 
 
