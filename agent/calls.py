@@ -72,7 +72,7 @@ def failed(call: Call, kind: ErrorKind, text: str, error: ToolError | None = Non
     result = Result(call_id=call.id, name=call.name, text=text, error=kind)
     if error is None:
         return result
-    causes = {"images": error.images, "cause": error.kind, "facts": error.facts}
+    causes = {"images": error.images, "cause": error.kind, "facts": error.facts or None}
     return result.model_copy(update=causes)
 
 

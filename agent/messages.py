@@ -98,7 +98,7 @@ class Result(_Value):
     text: str
     error: ErrorKind | None = None
     cause: str | None = None
-    facts: dict[str, Any] = {}
+    facts: dict[str, Any] | None = None
     images: tuple[bytes, ...] = ()
     message: str | None = None
 

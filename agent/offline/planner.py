@@ -257,8 +257,8 @@ def _after_proposal(task: Task, result: Result, history: History) -> Reply:
             return _begin(task, history)
         if result.cause == "low_confidence":
             return _call("ask_user", {"question": result.text})
-        reason = result.facts.get("plain", result.text)
-        return _impossible(history, reason, result.facts.get("partial_plan"))
+        facts = result.facts or {}
+        return _impossible(history, facts.get("plain", result.text), facts.get("partial_plan"))
     plan = json.loads(result.text)
     if not plan["certified"]:
         partial = plan.get("partial")

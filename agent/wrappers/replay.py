@@ -66,9 +66,9 @@ class ReplayModel:
 
 
 def _facts(line: Mapping[str, Any]) -> dict[str, Any]:
-    """What two messages must share: of images the number alone, for libraries that draw and
-    compress write other bytes in other versions."""
-    facts = {k: v for k, v in line.items() if v is not None}
+    """What two messages must share, as far as a model sees it: of images the number alone, for
+    libraries that draw and compress write other bytes in other versions."""
+    facts = {k: v for k, v in line.items() if k not in ("cause", "facts") and v is not None}
     return facts | {"images": len(line["images"])}
 
 
