@@ -10,7 +10,7 @@ import typer
 
 from ..tools.builtin import TOOLS
 from ..tools.context import Context, Settings
-from ..tools.errors import InputError, ToolError
+from ..tools.errors import FleetError, InputError, ToolError
 from ..tools.formation.contract import Contract
 from ..tools.perception.image import load_picture
 from ..tools.schema import compact_schema
@@ -63,9 +63,11 @@ def call_tool(
     try:
         called = tool.call(replace(context, observed=observed.append), arguments)
         result = asyncio.run(called)
-    except ToolError as error:
+    except (ToolError, FleetError) as error:
         if metres_per_pixel is None and observed:  # another scale is not kept if it was refused
-            _save(observed[-1], context, state)  # such as a partial plan that the error names
+            _save(observed[-1], context, state)  # such as a partial plan, or where robots stopped
+        if isinstance(error, FleetError):
+            raise
         raise InputError(str(error)) from None
     data = dict(result.data)
     folder = state.parent if state else Path()

@@ -33,13 +33,13 @@ async def with_robots(context: Context, node: PlanNode) -> World:
         return world.with_plan(node)
     try:
         fleet = await _team(context, plan.formation.contract)
-        poses = await fleet.observe(max_age=MAX_AGE)
-        points = plan.formation.points
+    except FleetSizeError:
+        return world.with_plan(node)  # more than can be driven can still be planned
+    poses, points = await fleet.observe(max_age=MAX_AGE), plan.formation.points
+    try:
         found = await in_thread(lambda: assign_robots(poses, points))
     except FleetSizeError as error:
-        if error.available < error.needed and context.settings.fleet != "simulated":
-            raise ToolError(str(error), "too_many_robots") from None
-        return world.with_plan(node)  # more than are simulated can be planned
+        raise ToolError(str(error), "too_many_robots") from None
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
     if notes := _notes(found, poses):
         verdict = plan.verdict.model_copy(update={"notes": (*plan.verdict.notes, *notes)})
