@@ -21,7 +21,9 @@ PHOTO = Path(__file__).parents[2] / "evals/photos/images/scissors_blue.jpg"
 
 @pytest.fixture(scope="module")
 def work() -> Workspace:
-    outline = next(t for t in load_suite("photos").tasks if t.picture == PHOTO).things[0].outline
+    outline = (
+        next(t for t in load_suite("photos").tasks if t.id == "scissors_blue_t1").things[0].outline
+    )
     assert len(outline.polygon.interiors) == 2
     target = Target("t1", "scissors", outline.bounds, 1.0, outline, "outline")
     workspace = Workspace(Scene(load_picture(PHOTO), (target,)))
