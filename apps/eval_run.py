@@ -121,7 +121,7 @@ def _run_trials(
     how: dict[str, Any],
 ) -> Sweep:
     """Run so many trials of each of the tasks by every arm, and show what came of them."""
-    identities, levels = [arm.arm for arm in arms], chances(tasks)
+    identities, levels = [arm.arm for arm in arms], chances(suite.tasks)
     attempts, held_out = folder / ATTEMPTS, split == "test"
     with ExitStack() as stack:
         place = stack.enter_context(TemporaryDirectory()) if held_out else folder / PICTURES

@@ -46,14 +46,6 @@ class Slot:
 
 
 @dataclass(frozen=True)
-class Corridor:
-    """A line that a rule names, as wide as its tolerance."""
-
-    ends: Ends
-    width: float
-
-
-@dataclass(frozen=True)
 class Mark:
     """A robot: planned, or observed and then right or wrong."""
 
@@ -67,11 +59,11 @@ class Mark:
 class Drawing:
     """All that is drawn over a picture; `radius` is that of a robot's mark, px."""
 
+    goals: Sequence[Goal]
     picture: PagePicture
     title: str
     radius: float
     paths: Sequence[Path]
-    corridors: Sequence[Corridor]
     slots: Sequence[Slot]
     ways: Sequence[Ends]
     planned: Sequence[Mark]
@@ -92,11 +84,11 @@ def drawing(task: Task, attempt: StoredAttempt | None, picture: PagePicture, tit
     crowded = len(observed or planned) > CROWD
     found = [_ring_path(ring, "found", "the outline it worked with") for ring in shown.found]
     return Drawing(
+        goals=task.goals,
         picture=picture,
         title=title,
         radius=MARK * max(size) * (0.65 if crowded else 1.0),
         paths=[*found, *(path for goal in task.goals for path in _truth_paths(goal))],
-        corridors=[c for goal in task.goals for c in _corridors(goal)],
         slots=[slot for goal in task.goals for slot in _rule_slots(goal, attempt)],
         ways=[
             (a, b)
@@ -123,13 +115,6 @@ def _truth_paths(goal: Goal) -> Iterator[Path]:
     elif rule["where"] == "inside":
         least = rule["min_clearance_px"]
         yield from _paths(target.buffer(-least), "band", f"{least:g} px inside")
-
-
-def _corridors(goal: Goal) -> list[Corridor]:
-    if goal.success["where"] != "line_between":
-        return []
-    (x1, y1), (x2, y2) = goal.success["points"]
-    return [Corridor(((x1, y1), (x2, y2)), 2 * goal.success["tolerance_px"])]
 
 
 def _rule_slots(goal: Goal, attempt: StoredAttempt | None) -> list[Slot]:

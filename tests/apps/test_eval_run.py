@@ -101,6 +101,23 @@ def test_rules_run_with_nothing_else(
     assert len((out / "trials.jsonl").read_text("utf-8").splitlines()) == TASKS
 
 
+def test_some_tasks_are_pointed_at_and_the_whole_goes_on(
+    suite: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    box: list[Any] = ["eval", "run", suite, "--mode", "box", "--out", out]
+    assert formup(*box, "--task", "ring_03") == 0
+    assert "if placed" in capsys.readouterr().out
+    assert [(row.task, row.trial) for row in read_rows(out)] == [("ring_03", n) for n in range(3)]
+    assert formup("eval", "run", suite, "--out", out) == 0
+    assert formup(*box, "--task", "ring_03") == 0
+    assert formup("eval", "report", out) == 0
+    arms = {row.arm.name for row in read_rows(out)}
+    assert arms == {"rules offline", "rules offline box"}
+    with pytest.raises(InputError, match="Unknown task 'nobody'"):
+        formup(*box, "--task", "nobody")
+
+
 def test_a_policy_is_a_method_and_scores_its_chance(suite: Path, tmp_path: Path) -> None:
     for name in ("circle", "pile"):
         assert formup("eval", "run", suite, "--method", name, "--out", tmp_path / name) == 0

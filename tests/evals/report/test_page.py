@@ -13,7 +13,7 @@ import pytest
 from formup.apps.cli import app
 from formup.tools.errors import InputError
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 hostile = import_module("hostile")
 write_run: Callable[..., Path] = hostile.write_run
 SECRET: str = hostile.SECRET

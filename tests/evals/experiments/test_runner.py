@@ -18,7 +18,7 @@ from formup.evals.experiments.trials import Trial, TrialRow
 from formup.tools.errors import InputError, ModelError
 from pydantic import ValidationError
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 sys.path.insert(0, str(HERE))  # so that processes of a pool find it as well
 trial_work: Any = import_module("trial_work")
 sweep: Callable[..., list[Trial]] = trial_work.sweep

@@ -18,11 +18,11 @@ from formup.evals.experiments.trials import TrialRow
 from formup.evals.tasks.suites import load_suite
 from formup.tools.errors import InputError
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 trying = import_module("trying")
 tried: Callable[..., list[TrialRow]] = trying.tried
 
-RECORDED = Path(__file__).parent.parent / "recordings"
+RECORDED = Path(__file__).parents[2] / "recordings"
 TASKS = {t.id: t for name in ("photos", "many") for t in load_suite(name).tasks}
 
 
