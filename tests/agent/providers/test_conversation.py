@@ -14,9 +14,8 @@ from formup.agent.model import Request
 from formup.agent.outcomes import Answered
 from formup.prompts import load_prompt
 from formup.tools.builtin import TOOLS
+from formup.tools.context import Context
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene
-from formup.tools.world import Workspace
 
 Say = Callable[..., bytes]
 PLAN: dict[str, Any] = {
@@ -118,7 +117,7 @@ def test_ids_that_lack_or_repeat_are_made_up(
 
     async def going() -> Any:
         try:
-            return await run(model, TOOLS, Workspace(Scene(picture)), (User(text="go"),))
+            return await run(model, TOOLS, Context.of(picture), (User(text="go"),))
         finally:
             await model.aclose()
 
