@@ -112,7 +112,8 @@ def test_ids_that_lack_or_repeat_are_made_up(
 ) -> None:
     twice: list[tuple[str, str, Any]]
     twice = [("", "locate_object", {}), ("x", "look", {}), ("x", "locate_object", {})]
-    server.script = [say("", twice, "calls"), say("", twice[1:], "calls"), say("done")]
+    again = [("x", "look", {}), ("x", "look", {"region": [0, 0, 60, 60]})]
+    server.script = [say("", twice, "calls"), say("", again, "calls"), say("done")]
     model = server.model(dialect.name)
 
     async def going() -> Any:
