@@ -20,7 +20,7 @@ from formup.tools.errors import InputError
 from formup.tools.perception.image import Picture, picture_from_array
 from formup.tools.perception.target_prompt import TargetPrompt
 
-RED, BLUE = [55, 35, 125, 95], [235, 115, 305, 175]
+RED, BLUE = (55, 35, 125, 95), (235, 115, 305, 175)
 FIRST, SECOND = "Surround the red thing", "And now the blue one"
 
 
@@ -133,7 +133,7 @@ def test_it_can_be_said_in_another_process(picture: Picture, tmp_path: Path) -> 
 
 def test_the_rules_turn_to_what_is_pointed_at_next(picture: Picture, tmp_path: Path) -> None:
     path = tmp_path / "trace.jsonl"
-    one, other = TargetPrompt(box=tuple(RED)), TargetPrompt(id="t2", box=tuple(BLUE))
+    one, other = TargetPrompt(box=RED), TargetPrompt(id="t2", box=BLUE)
     first = Agent().run(picture, "Surround it with 5 robots", pointed=[one], trace=path)
     second = Agent().say(load_run(path), "Surround this one with 7 robots", pointed=[other])
     assert (first.report.status, second.report.status) == ("deployed", "deployed")
@@ -243,7 +243,7 @@ def test_killed_anywhere_it_goes_on_to_the_same_end(picture: Picture, tmp_path: 
 
 def test_a_turn_of_which_nothing_was_said_has_not_begun(picture: Picture, tmp_path: Path) -> None:
     path = tmp_path / "trace.jsonl"
-    box = TargetPrompt(id="t2", box=tuple(BLUE))
+    box = TargetPrompt(id="t2", box=BLUE)
     first = agent().run(picture, FIRST, settings=Settings(robots=6), trace=path)
     agent().say(first, SECOND, pointed=[box])
     lines = path.read_bytes().splitlines(keepends=True)

@@ -111,6 +111,7 @@ def test_ids_that_lack_or_repeat_are_made_up(
     server: Any, dialect: Any, say: Say, picture: Any
 ) -> None:
     twice: list[tuple[str, str, Any]]
+    again: list[tuple[str, str, Any]]
     twice = [("", "locate_object", {}), ("x", "look", {}), ("x", "locate_object", {})]
     again = [("x", "look", {}), ("x", "look", {"region": [0, 0, 60, 60]})]
     server.script = [say("", twice, "calls"), say("", again, "calls"), say("done")]
