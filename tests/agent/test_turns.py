@@ -147,6 +147,20 @@ def test_the_rules_turn_to_what_is_pointed_at_next(picture: Picture, tmp_path: P
     assert third.world.pointed == ()
 
 
+def test_the_rules_leave_what_they_found_before_where_it_is(picture: Picture) -> None:
+    first = Agent().run(picture, "Surround the red thing with 5 robots")
+    second = Agent().say(first, "Now surround the blue thing with 7 robots")
+    third = Agent().say(second, "Surround the red thing with 4 robots")
+    for run in (first, second, third):
+        assert run.report.status == "deployed", run.report.message
+        assert run.report.contract is not None
+    labels = {t.id: t.label for t in third.world.targets}
+    assert labels == {"t1": "red thing", "t2": "blue thing"}
+    about = [n.plan.formation.contract.target_ids for n in third.world.plans.values()]
+    assert about == [("t1",), ("t2",), ("t1",)]
+    assert third.world.plan(first.report.plan_id).plan.verdict.certified
+
+
 def test_limits_are_of_each_turn(picture: Picture) -> None:
     limits = Limits(requests=3, tool_calls=3)
     first = agent(limits=limits).run(picture, FIRST, settings=Settings(robots=6))
