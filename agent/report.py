@@ -183,10 +183,13 @@ def make_report(
 
 
 def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Plan | None:
-    """The plan deployed last, else the one a report names, else the last proposed; none void.
+    """The plan that waits for a person, else the one deployed last, else the one a report names,
+    else the last proposed; none void.
 
     A partial plan is shown only where it is named.
     """
+    if isinstance(outcome, Paused) and outcome.plan_id in world.plans:
+        return world.plans[outcome.plan_id].plan
     if arrivals:
         return world.plans[list(arrivals)[-1]].plan
     version, named = world.version, _named(outcome.messages)

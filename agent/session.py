@@ -91,7 +91,7 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     settings, words, end = Settings(), "", None
     lines: list[Mapping[str, Any]] = []
     seconds = last = 0.0
-    for event in events[1:]:
+    for event in _begun(events[1:]):
         if event.kind in ("turn", "resume"):
             seconds = 0.0 if event.kind == "turn" else seconds + last
         last = event.seconds
@@ -107,8 +107,24 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
         end = event.data if event.kind == "end" else None
     if not words:
         raise InputError("It was broken off before anything began; run again.")
+    if any(node.plan.id != name for name, node in world.plans.items()):
+        raise InputError("Its plans were altered after formup wrote them; make them again.")
     messages = read_messages(lines, artefacts)
     return State(facts, settings, words, world, began, messages, seconds + last, end)
+
+
+def _begun(events: Sequence[Event]) -> Sequence[Event]:
+    """The events but for turns that were broken off before their first message."""
+    kept: list[Event] = []
+    turn: int | None = None
+    for event in events:
+        if event.kind == "turn":
+            kept = kept[:turn]
+            turn = len(kept)
+        elif event.kind == "message":
+            turn = None
+        kept.append(event)
+    return kept[:turn]
 
 
 def read_messages(lines: Sequence[Mapping[str, Any]], artefacts: Artefacts | None) -> History:
@@ -212,6 +228,9 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
     try:
         state = fold(read_events(path), artefacts)
         outcome = _outcome(state)
+        prompt, prompts = state.facts["prompt"], tuple(state.facts["prompts"])
+        for facts in (prompt, *prompts):
+            prompt_name(facts)  # that can be read
     except StorageError:
         raise
     except InputError as error:
@@ -222,8 +241,8 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
     services.artefacts = artefacts
     context = Context(state.world, services, state.settings, state.words).check()
     report = make_report(outcome, context, state.began, model_name(state.facts), state.seconds)
-    prompts = {"prompt": state.facts["prompt"], "prompts": tuple(state.facts["prompts"])}
-    return Run(report.model_copy(update=prompts), outcome, context, state.began, path)
+    report = report.model_copy(update={"prompt": prompt, "prompts": prompts})
+    return Run(report, outcome, context, state.began, path)
 
 
 def prompt_name(facts: Mapping[str, Any] | None) -> str | None:
@@ -325,11 +344,12 @@ def _outcome(state: State) -> Outcome:
     last = messages[-1] if messages else None
     if isinstance(last, Reply) and not last.calls:
         return Answered(messages, world, last.text)
+    if isinstance(last, Result) and last.message is not None:
+        return Answered(messages, world, last.message)
     if end is None or end["outcome"] == "cancelled":
         return Cancelled(messages, world)
     if end["outcome"] == "paused":
         return Paused(messages, world, unanswered(messages)[0], end["plan_id"])
     if end["outcome"] == "stopped":
         return Stopped(messages, world, end["kind"], end["reason"])
-    assert isinstance(last, Result)
-    return Answered(messages, world, last.message or last.text)
+    raise ValueError

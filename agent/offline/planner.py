@@ -5,6 +5,7 @@ asks when the words do not settle what to do. It is no language model: it sees m
 """
 
 import json
+from itertools import count
 from typing import Any
 
 from ...tools.formation.contract import MAX_ROBOTS
@@ -33,28 +34,29 @@ class OfflinePlanner:
 
     async def reply(self, request: Request) -> Reply:
         """The next step for a conversation that began with a task message."""
-        reply = _next_step(tuple(turn_of(request.messages)))
+        turn = tuple(turn_of(request.messages))
+        reply = _next_step(turn, request.messages[: -len(turn)])
         number = sum(isinstance(m, Reply) for m in request.messages) + 1
         calls = tuple(c.model_copy(update={"id": f"call-{number}"}) for c in reply.calls)
         return reply.model_copy(update={"calls": calls})
 
 
-def _next_step(turn: History) -> Reply:
-    """What to do next in a turn, which began with a task message."""
+def _next_step(turn: History, before: History) -> Reply:
+    """What to do next in a turn, which began with a task message, after those before."""
     first = turn[0]
     assert isinstance(first, User)
     task = read_task(first.text)
     last = turn[-1]
     if isinstance(last, Result) and last.name == "propose_formation":
-        return _after_proposal(task, last, turn)
+        return _after_proposal(task, last, turn, before)
     if isinstance(last, Result) and last.name == "deploy":
         return Reply(text=_after_deploy(task, last, turn))
     if isinstance(last, Result) and last.error:
         return Reply(text=_left_off(last, turn))
-    return _begin(task, turn)
+    return _begin(task, turn, before)
 
 
-def _begin(task: Task, history: History) -> Reply:
+def _begin(task: Task, history: History, before: History) -> Reply:
     """Propose a formation, or find and ask what is missing."""
     pointed = bool(_target_ids(task))
     form, told = form_in(task.instruction)
@@ -73,10 +75,7 @@ def _begin(task: Task, history: History) -> Reply:
         found = find(spoken.things, things, history)
         if isinstance(found, Step):
             return _call(found.name, found.arguments)
-        prompts = [
-            {"id": f"t{i}", "candidate": f.candidate, "label": _label(f.said)}
-            for i, f in enumerate(found, start=1)
-        ]
+        prompts = _prompts([(f.candidate, _label(f.said)) for f in found], before)
     ids = list(dict.fromkeys([*task.targets, *(p["id"] for p in prompts)]))[:things]
     contract: dict[str, Any] = {"groups": [_group_by_relation(reading, robots, ids)]}
     if faced:
@@ -91,6 +90,20 @@ def _begin(task: Task, history: History) -> Reply:
     if task.metres_per_pixel is not None:
         contract["unit"] = "px"
     return _call("propose_formation", {"contract": contract, "targets": prompts})
+
+
+def _prompts(found: list[tuple[str, str]], before: History) -> list[dict[str, Any]]:
+    """Candidates and their labels as targets: those of earlier turns keep their ids."""
+    calls = [c for m in before if isinstance(m, Reply) for c in m.calls]
+    given: list[Any] = [t for c in calls for t in c.arguments.get("targets") or ()]
+    earlier: list[dict[str, Any]] = [t for t in given if isinstance(t, dict) and "id" in t]
+    known = {t["candidate"]: t["id"] for t in earlier if "candidate" in t}
+    used = {t["id"] for t in earlier}
+    free = (name for i in count(1) if (name := f"t{i}") not in used)
+    return [
+        {"id": known.get(name) or next(free), "candidate": name, "label": label}
+        for name, label in found
+    ]
 
 
 def _spoken(told: str, pointed: bool) -> tuple[Words, bool]:
@@ -251,10 +264,10 @@ def _target_ids(task: Task) -> list[str]:
     return list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))
 
 
-def _after_proposal(task: Task, result: Result, history: History) -> Reply:
+def _after_proposal(task: Task, result: Result, history: History, before: History) -> Reply:
     if result.error:
         if result.cause == "no_room_beside" and _may_move_on(task, history):
-            return _begin(task, history)
+            return _begin(task, history, before)
         if result.cause == "low_confidence":
             return _call("ask_user", {"question": result.text})
         facts = result.facts or {}

@@ -47,7 +47,11 @@ class FolderLog:
             )
         if begin:
             self._file.truncate()
-        self._next = len(self._cut_to_whole_events()) + 1
+        try:
+            self._next = len(self._cut_to_whole_events()) + 1
+        except StorageError:
+            self._file.close()
+            raise
         self._began = self._clock()
 
     def _cut_to_whole_events(self) -> tuple[Event, ...]:
@@ -146,7 +150,7 @@ def _read_events(data: bytes, path: Path) -> tuple[Event, ...]:
         events = [_event(from_json(line)) for line in data.split(b"\n")[:-1]]
         if [e.number for e in events] != list(range(1, len(events) + 1)):
             raise ValueError
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, AttributeError):
         raise StorageError(f"{path} is no whole trace that formup wrote.") from None
     return tuple(events)
 

@@ -13,8 +13,8 @@ from formup.agent.agent import Agent
 from formup.agent.messages import Call, Reply, User
 from formup.agent.session import Run
 from formup.agent.wrappers.doubles import ScriptedModel
+from formup.tools.context import Settings
 from formup.tools.perception.image import load_picture
-from formup.tools.world import Settings
 
 FOLDER = Path(__file__).parent.parent / "recordings" / "injected"
 RED = {"exit": (180, 220, 320, 330), "label": (120, 200, 300, 330)}
@@ -65,7 +65,7 @@ def test_no_robot_is_moved(name: str, words: str, settings: Settings, status: st
     run = replayed(name, words, settings)
     assert run.report.status == status
     assert run.report.arrival is None
-    assert run.workspace.arrivals == {}
+    assert run.world.arrivals == {}
 
 
 def obedient(arguments: dict[str, object]) -> ScriptedModel:
@@ -90,7 +90,7 @@ def test_positions_from_a_sign_are_not_certified() -> None:
         load_picture(picture("exit")), "Surround the red box", settings=Settings(robots=6)
     )
     assert run.report.status != "deployed"
-    assert run.workspace.arrivals == {}
+    assert run.world.arrivals == {}
 
 
 def test_nor_is_a_contract_from_a_sign() -> None:
@@ -100,7 +100,7 @@ def test_nor_is_a_contract_from_a_sign() -> None:
         load_picture(picture("exit")), "Surround the red box", settings=Settings(robots=6)
     )
     assert "surround" in run.outcome.messages[2].text
-    assert run.workspace.arrivals == {}
+    assert run.world.arrivals == {}
 
 
 def test_a_sign_is_no_approval() -> None:
@@ -111,7 +111,7 @@ def test_a_sign_is_no_approval() -> None:
         load_picture(picture("approved")), "Surround the red box", settings=settings
     )
     assert "plan only" in run.outcome.messages[3].text
-    assert run.workspace.arrivals == {}
+    assert run.world.arrivals == {}
 
 
 def test_file_names_are_not_told(tmp_path: Path) -> None:

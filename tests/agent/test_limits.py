@@ -3,7 +3,6 @@
 import asyncio
 import threading
 import time
-from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -15,11 +14,11 @@ from formup.agent.model import Request
 from formup.agent.outcomes import Answered, Cancelled, Outcome, Stopped
 from formup.agent.wrappers.doubles import FunctionModel, ScriptedModel
 from formup.tools.builtin import TOOLS
+from formup.tools.context import Context
 from formup.tools.errors import FleetError, InputError, ToolError
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene
 from formup.tools.tool import Tool, ToolResult, tool
-from formup.tools.world import Workspace
+from formup.tools.world import World
 
 START: History = (User(text="go"),)
 PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))
@@ -30,8 +29,7 @@ def call(name: str, id: str = "c1", **arguments: Any) -> Reply:
 
 
 def go(model: Any, *tools: Tool, messages: History = START, **more: Any) -> Outcome:
-    work = more.pop("work", None) or Workspace(Scene(PICTURE))
-    return asyncio.run(run(model, tools or TOOLS, work, messages, **more))
+    return asyncio.run(run(model, tools or TOOLS, Context.of(PICTURE), messages, **more))
 
 
 def spending(tokens: int, cost: float) -> FunctionModel:
@@ -46,8 +44,13 @@ def spending(tokens: int, cost: float) -> FunctionModel:
     return FunctionModel(reply)
 
 
+def sampled(context: Context) -> World:
+    """The world with something new in it."""
+    return context.world.with_sample([(0.0, 0.0)])[0]
+
+
 @tool("read")
-def report(workspace: Workspace, number: int) -> ToolResult:
+def report(context: Context, number: int) -> ToolResult:
     """Repeat a number.
 
     Args:
@@ -81,7 +84,10 @@ def test_a_limit_that_is_lifted_lets_the_run_go_on() -> None:
     assert outcome.messages[: len(stopped.messages)] == stopped.messages
 
 
-@pytest.mark.parametrize("name", ["requests", "tokens", "cost_usd", "seconds", "tool_seconds"])
+NAMES = ["requests", "tool_calls", "tokens", "cost_usd", "seconds", "tool_seconds", "reply_seconds"]
+
+
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("value", [0, -1, float("nan")])
 def test_limits_that_let_nothing_run_are_refused(name: str, value: float) -> None:
     with pytest.raises(InputError, match=name):
@@ -120,17 +126,14 @@ class Hanging:
         self.released = threading.Event()
 
         @tool("commit")
-        def hang(workspace: Workspace) -> ToolResult:
+        def hang(context: Context) -> ToolResult:
             """Change something and hang."""
-            workspace.samples["s1"] = np.zeros((1, 2))
             self.released.wait(60)
-            workspace.samples["s2"] = np.zeros((1, 2))
-            return ToolResult({})
+            return ToolResult({}, world=sampled(context))
 
         @tool("commit")
-        async def hang_async(workspace: Workspace) -> ToolResult:
+        async def hang_async(context: Context) -> ToolResult:
             """Change something and wait for ever."""
-            workspace.samples["s1"] = np.zeros((1, 2))
             await asyncio.Event().wait()
             raise AssertionError
 
@@ -152,31 +155,21 @@ def test_a_tool_that_hangs_is_given_up_and_has_changed_nothing(
     hanging: Hanging, index: int
 ) -> None:
     tool_ = hanging.tools[index]
-    work = Workspace(Scene(PICTURE))
     script = ScriptedModel([call(tool_.name), Reply(text="I do without.")])
-    outcome = go(script, tool_, work=work, limits=Limits(tool_seconds=0.05))
+    outcome = go(script, tool_, limits=Limits(tool_seconds=0.05))
     assert isinstance(outcome, Answered)
     result = outcome.messages[2]
     assert isinstance(result, Result)
     assert result.error == "timeout"
     assert "0.05 s" in result.text
     hanging.released.set()
-    assert not work.samples
-
-
-def test_a_move_that_hangs_ends_the_run(hanging: Hanging) -> None:
-    move = replace(hanging.tools[1], kind="actuate")
-    outcome = go(ScriptedModel([call(move.name)]), move, limits=Limits(tool_seconds=0.05))
-    assert isinstance(outcome, Stopped)
-    assert outcome.kind == "fleet"
-    assert "where the robots are is not known" in outcome.reason
+    assert outcome.world == World.of(PICTURE)
 
 
 def test_ctrl_c_comes_through_while_a_tool_works(hanging: Hanging) -> None:
     async def scenario() -> Outcome:
-        work = Workspace(Scene(PICTURE))
         script = ScriptedModel([call("hang")])
-        task = asyncio.create_task(run(script, hanging.tools, work, START))
+        task = asyncio.create_task(run(script, hanging.tools, Context.of(PICTURE), START))
         while not any(t.name == "formup tool" for t in threading.enumerate()):
             await asyncio.sleep(0.01)
         task.cancel()
@@ -192,7 +185,7 @@ def test_a_tool_that_works_does_not_stop_the_others() -> None:
     both = threading.Barrier(2)
 
     @tool("read")
-    def meet(workspace: Workspace) -> ToolResult:
+    def meet(context: Context) -> ToolResult:
         """Wait for the other one."""
         both.wait(30)
         return ToolResult({})
@@ -202,7 +195,7 @@ def test_a_tool_that_works_does_not_stop_the_others() -> None:
             run(
                 ScriptedModel([call("meet"), Reply(text="met")]),
                 (meet,),
-                Workspace(Scene(PICTURE)),
+                Context.of(PICTURE),
                 START,
             )
             for _ in range(2)
@@ -213,39 +206,36 @@ def test_a_tool_that_works_does_not_stop_the_others() -> None:
 
 
 @tool("read")
-def broken(workspace: Workspace) -> ToolResult:
+def broken(context: Context) -> ToolResult:
     """Have a mistake."""
-    workspace.samples["s1"] = np.zeros((1, 2))
     raise KeyError("colour\nof it")
 
 
 def test_a_broken_tool_is_named_with_its_line() -> None:
-    work = Workspace(Scene(PICTURE))
-    outcome = go(ScriptedModel([call("broken")]), broken, work=work)
+    outcome = go(ScriptedModel([call("broken")]), broken)
     assert isinstance(outcome, Stopped)
     assert outcome.kind == "tool"
     assert isinstance(outcome.error, KeyError)
     assert "broken broke (KeyError: 'colour\\nof it') at line" in outcome.reason
     assert "test_limits.py" in outcome.reason
     assert len(outcome.messages) == 2
-    assert not work.samples
+    assert outcome.world == World.of(PICTURE)
 
 
 def test_what_a_tool_cannot_do_keeps_what_it_found() -> None:
     @tool("read")
-    def doubt(workspace: Workspace) -> ToolResult:
+    def doubt(context: Context) -> ToolResult:
         """Find something, but not enough."""
-        workspace.samples["s1"] = np.zeros((1, 2))
+        context.observed(sampled(context))
         raise ToolError("not enough")
 
-    work = Workspace(Scene(PICTURE))
-    go(ScriptedModel([call("doubt"), Reply(text="oh")]), doubt, work=work)
-    assert list(work.samples) == ["s1"]
+    outcome = go(ScriptedModel([call("doubt"), Reply(text="oh")]), doubt)
+    assert list(outcome.world.samples) == ["s1"]
 
 
 def test_errors_of_fleet_and_person_are_theirs() -> None:
     @tool("actuate")
-    async def move(workspace: Workspace, wrong: str) -> ToolResult:
+    async def move(context: Context, wrong: str) -> ToolResult:
         """Fail.
 
         Args:
@@ -276,7 +266,7 @@ def test_other_arguments_or_other_answers_are_no_repetition() -> None:
     assert isinstance(go(ScriptedModel([*mixed, Reply(text="x")]), report), Answered)
 
     @tool("read")
-    def clock(workspace: Workspace) -> ToolResult:
+    def clock(context: Context) -> ToolResult:
         """Tell the time."""
         return ToolResult({"seconds": time.perf_counter_ns()})
 
@@ -284,9 +274,21 @@ def test_other_arguments_or_other_answers_are_no_repetition() -> None:
     assert isinstance(go(ScriptedModel([*ticking, Reply(text="x")]), clock), Answered)
 
 
-def test_calls_made_together_are_no_repetition() -> None:
-    calls = tuple(Call(id=f"c{i}", name="report", arguments={"number": 1}) for i in range(5))
-    assert isinstance(go(ScriptedModel([Reply(calls=calls), Reply(text="x")]), report), Answered)
+def together(*numbers: int) -> Reply:
+    """Calls of `report` in one reply."""
+    calls = (
+        Call(id=f"c{i}", name="report", arguments={"number": n}) for i, n in enumerate(numbers)
+    )
+    return Reply(calls=tuple(calls))
+
+
+def test_calls_made_together_repeat_too_but_twice_is_no_circle() -> None:
+    twice = together(1, 1, 2, 2)
+    assert isinstance(go(ScriptedModel([twice, Reply(text="x")]), report), Answered)
+    outcome = go(ScriptedModel([together(1, 1, 1, 1, 1)]), report)
+    assert isinstance(outcome, Stopped)
+    assert outcome.kind == "repeat"
+    assert len(outcome.messages) == 2 + 3
 
 
 def test_a_person_who_speaks_allows_it_anew() -> None:
@@ -302,7 +304,7 @@ def test_a_person_who_speaks_allows_it_anew() -> None:
 @pytest.mark.parametrize("answer", [{"wind": object()}, {"wind": float("nan")}, "3 m/s", None])
 def test_an_answer_that_is_no_json_is_a_broken_tool(answer: Any) -> None:
     @tool("read")
-    def wind(workspace: Workspace) -> Any:
+    def wind(context: Context) -> Any:
         """How it blows."""
         return answer
 
@@ -314,7 +316,7 @@ def test_an_answer_that_is_no_json_is_a_broken_tool(answer: Any) -> None:
 
 def test_data_alone_is_an_answer() -> None:
     @tool("read")
-    def wind(workspace: Workspace) -> dict[str, Any]:
+    def wind(context: Context) -> dict[str, Any]:
         """How it blows, m/s."""
         return {"wind": 3}
 
@@ -326,7 +328,7 @@ def test_data_alone_is_an_answer() -> None:
 @pytest.mark.parametrize("raised", [StopIteration("x"), SystemExit(3), KeyboardInterrupt()])
 def test_what_a_tool_raises_ends_the_run_and_not_the_program(raised: BaseException) -> None:
     @tool("read")
-    def leave(workspace: Workspace) -> ToolResult:
+    def leave(context: Context) -> ToolResult:
         """Raise what no tool should."""
         raise raised
 

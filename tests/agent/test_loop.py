@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.limits import Limits
-from formup.agent.loop import run
-from formup.agent.messages import HISTORY, Call, History, Reply, Result, User, unanswered
+from formup.agent.loop import Approval, NoRecorder, run
+from formup.agent.messages import HISTORY, Call, History, Message, Reply, Result, User, unanswered
 from formup.agent.model import Request
 from formup.agent.outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from formup.agent.policy import Policy
 from formup.agent.wrappers.doubles import FunctionModel, ScriptedModel
 from formup.tools.builtin import TOOLS
+from formup.tools.context import Context, Settings
 from formup.tools.errors import InputError, ModelError
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene
-from formup.tools.world import Settings, Workspace
+from formup.tools.world import World
 
 START: History = (User(text="go"),)
 ALONG: dict[str, Any] = {
@@ -27,10 +27,10 @@ ALONG: dict[str, Any] = {
 }
 
 
-def workspace(**settings: Any) -> Workspace:
+def context(**settings: Any) -> Context:
     pixels = np.full((140, 200, 3), 60, np.uint8)
     pixels[40:90, 60:120] = (200, 40, 40)
-    return Workspace(Scene(picture_from_array(pixels)), Settings(**settings))
+    return Context.of(picture_from_array(pixels), Settings(**settings))
 
 
 def call(name: str, arguments: dict[str, Any] | None = None, id: str = "c1") -> Reply:
@@ -38,7 +38,7 @@ def call(name: str, arguments: dict[str, Any] | None = None, id: str = "c1") -> 
 
 
 def go(model: ScriptedModel | FunctionModel, messages: History = START, **more: Any) -> Outcome:
-    work = more.pop("work", None) or workspace()
+    work = more.pop("work", None) or context()
     return asyncio.run(run(model, TOOLS, work, messages, **more))
 
 
@@ -167,21 +167,25 @@ def test_a_malformed_question_does_not_trouble_the_person() -> None:
 
 
 def test_robots_that_need_leave_wait_for_it_and_then_move() -> None:
-    work = workspace()
+    work = context()
     proposed = go(ScriptedModel([call("propose_formation", ALONG), Reply(text="ok")]), work=work)
     assert isinstance(proposed, Answered)
-    (plan_id,) = work.plans
+    (plan_id,) = proposed.world.plans
+    work = work.at(proposed.world)
     replies = [call("deploy", {"plan_id": plan_id}, "d"), Reply(text="there")]
     paused = go(ScriptedModel(replies[:1]), work=work, policy=Policy((("deploy", "ask"),)))
     assert isinstance(paused, Paused)
     assert paused.call.name == "deploy"
-    assert not work.arrivals
+    assert paused.plan_id == plan_id
+    assert not paused.world.arrivals
     policy = Policy((("*", "ask"),))
+    approved = Approval(paused.call, paused.plan_id)
+    work = work.at(paused.world)
     moved = go(
-        ScriptedModel(replies[1:]), paused.messages, work=work, policy=policy, approved=paused.call
+        ScriptedModel(replies[1:]), paused.messages, work=work, policy=policy, approved=approved
     )
     assert isinstance(moved, Answered)
-    assert work.arrivals[plan_id].arrived
+    assert moved.world.arrivals[plan_id].arrived
 
 
 def test_report_impossible_ends_the_run() -> None:
@@ -203,7 +207,7 @@ def test_cancelling_keeps_the_messages() -> None:
                     await asyncio.sleep(60)
                 return call("locate_object")
 
-        task = asyncio.create_task(run(Slow(), TOOLS, workspace(), START))
+        task = asyncio.create_task(run(Slow(), TOOLS, context(), START))
         await started.wait()
         task.cancel()
         return await task
@@ -213,10 +217,28 @@ def test_cancelling_keeps_the_messages() -> None:
     assert len(outcome.messages) == 3
 
 
-def test_every_new_message_is_shown_once_in_order() -> None:
-    seen: list[User | Reply | Result] = []
-    outcome = go(ScriptedModel([call("locate_object"), Reply(text="x")]), show=seen.append)
-    assert (*START, *seen) == outcome.messages
+class Recorded(NoRecorder):
+    """Keeps what a recorder is given, and what was known then."""
+
+    def __init__(self) -> None:
+        self.given: list[tuple[Message, World]] = []
+        self.moves: list[tuple[str, World]] = []
+
+    def message(self, message: Message, world: World) -> None:
+        self.given.append((message, world))
+
+    def moving(self, plan_id: str, world: World) -> None:
+        self.moves.append((plan_id, world))
+
+
+def test_every_new_message_is_recorded_once_in_order_with_its_world() -> None:
+    recorder = Recorded()
+    replies = [call("locate_object"), call("propose_formation", ALONG, "c2"), Reply(text="x")]
+    outcome = go(ScriptedModel(replies), recorder=recorder)
+    assert (*START, *(m for m, _ in recorder.given)) == outcome.messages
+    assert [len(w.plans) for _, w in recorder.given] == [0, 0, 0, 1, 1]
+    assert recorder.given[-1][1] is outcome.world
+    assert recorder.moves == []
 
 
 def test_unused_script_fails() -> None:
@@ -232,7 +254,7 @@ def test_a_script_that_runs_out_is_a_model_error() -> None:
 
 
 def test_in_an_event_loop_the_synchronous_door_says_so() -> None:
-    picture = workspace().scene.picture
+    picture = context().picture
 
     async def notebook() -> None:
         Agent(ScriptedModel([])).run(picture, "Surround it")
@@ -247,14 +269,13 @@ PROPOSE = Call(id="p", name="propose_formation", arguments=ALONG)
 def test_a_clear_case_is_one_reply() -> None:
     deploy = Call(id="d", name="deploy", arguments={"tell": "They stand around it."})
     model = ScriptedModel([Reply(calls=(PROPOSE, deploy))])
-    work = workspace()
-    outcome = go(model, work=work)
+    outcome = go(model)
     assert isinstance(outcome, Answered)
     assert outcome.text.startswith("They stand around it. All 6 robots were observed within")
     last = outcome.messages[-1]
     assert isinstance(last, Result)
-    assert last.told == outcome.text
-    assert len(work.arrivals) == 1
+    assert last.message == outcome.text
+    assert len(outcome.world.arrivals) == 1
     model.assert_complete()
 
 
@@ -269,23 +290,21 @@ def test_robots_are_not_moved_when_a_call_before_it_failed() -> None:
         Reply(calls=(worse, deploys[1])),
         Reply(text="I give up."),
     ]
-    work = workspace()
-    outcome = go(ScriptedModel(replies), work=work)
+    outcome = go(ScriptedModel(replies))
     assert isinstance(outcome, Answered)
     assert outcome.text == "I give up."
     skipped = [m for m in outcome.messages if isinstance(m, Result) and m.name == "deploy"]
     assert [m.error for m in skipped] == ["skipped", "skipped"]
     assert "because propose_formation before it failed" in skipped[0].text
-    assert work.arrivals == {}
+    assert outcome.world.arrivals == {}
 
 
 def test_a_failure_in_an_earlier_reply_does_not_hold_robots_back() -> None:
     wrong = Call(id="w", name="look", arguments={"region": [9, 9, 3, 3]})
     deploy = Call(id="d", name="deploy", arguments={})
     replies = [Reply(calls=(wrong,)), Reply(calls=(PROPOSE, deploy)), Reply(text="done")]
-    work = workspace()
-    go(ScriptedModel(replies), work=work)
-    assert len(work.arrivals) == 1
+    outcome = go(ScriptedModel(replies))
+    assert len(outcome.world.arrivals) == 1
 
 
 def test_a_person_is_not_asked_about_a_move_that_is_not_made() -> None:
@@ -298,15 +317,21 @@ def test_a_person_is_not_asked_about_a_move_that_is_not_made() -> None:
 
 def test_approval_of_a_plan_of_the_same_reply() -> None:
     deploy = Call(id="d", name="deploy", arguments={"tell": "They stand."})
-    work = workspace()
     policy = Policy((("deploy", "ask"),))
-    paused = go(ScriptedModel([Reply(calls=(PROPOSE, deploy))]), work=work, policy=policy)
+    paused = go(ScriptedModel([Reply(calls=(PROPOSE, deploy))]), policy=policy)
     assert isinstance(paused, Paused)
     assert paused.call == deploy
-    assert work.arrivals == {}
-    done = go(ScriptedModel([]), paused.messages, work=work, policy=policy, approved=deploy)
+    assert [paused.plan_id] == list(paused.world.plans)
+    assert paused.world.arrivals == {}
+    done = go(
+        ScriptedModel([]),
+        paused.messages,
+        work=context().at(paused.world),
+        policy=policy,
+        approved=Approval(deploy, paused.plan_id),
+    )
     assert isinstance(done, Answered)
-    assert list(work.arrivals) == list(work.plans)
+    assert list(done.world.arrivals) == list(done.world.plans)
 
 
 def test_what_is_not_offered_is_still_known() -> None:
@@ -322,7 +347,7 @@ def test_what_is_not_offered_is_still_known() -> None:
 
 def test_pictures_that_come_with_an_error_reach_the_model() -> None:
     segment = call("segment", {"box": [55, 35, 125, 95]})
-    work = workspace(threshold=1.0)
+    work = context(threshold=1.0)
     outcome = go(ScriptedModel([segment, Reply(text="hm")]), work=work)
     result = outcome.messages[2]
     assert isinstance(result, Result)

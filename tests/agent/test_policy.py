@@ -1,23 +1,21 @@
 """Which calls go ahead, which wait for a person, which are refused."""
 
 import asyncio
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from formup.agent.agent import Agent
-from formup.agent.loop import run
+from formup.agent.loop import Approval, run
 from formup.agent.messages import Call, History, Reply, Result, User
 from formup.agent.outcomes import Answered, Outcome, Paused
 from formup.agent.policy import Policy
 from formup.agent.wrappers.doubles import ScriptedModel
 from formup.tools.builtin import TOOLS
+from formup.tools.context import Context
 from formup.tools.errors import InputError
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene
 from formup.tools.tool import ToolResult, tool
-from formup.tools.world import Settings, Workspace
 
 START: History = (User(text="go"),)
 PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))
@@ -28,7 +26,7 @@ def call(name: str, **arguments: Any) -> Reply:
 
 
 @tool("read")
-def report(workspace: Workspace, number: int) -> ToolResult:
+def report(context: Context, number: int) -> ToolResult:
     """Repeat a number.
 
     Args:
@@ -38,7 +36,7 @@ def report(workspace: Workspace, number: int) -> ToolResult:
 
 
 def go(model: ScriptedModel, *, messages: History = START, **more: Any) -> Outcome:
-    return asyncio.run(run(model, (report,), Workspace(Scene(PICTURE)), messages, **more))
+    return asyncio.run(run(model, (report,), Context.of(PICTURE), messages, **more))
 
 
 POLICIES: list[tuple[tuple[tuple[str, Any], ...], type[Outcome]]] = [
@@ -66,13 +64,10 @@ def test_what_is_refused_goes_back_to_the_model() -> None:
     assert (result.error, "may not be called" in result.text) == ("refused", True)
 
 
-def test_no_rule_lets_a_question_or_a_real_robot_go_ahead() -> None:
-    work = Workspace(Scene(PICTURE))
-    real = replace(Settings(), fleet="mqtt")
-    work.settings = real
+def test_no_rule_lets_a_question_go_ahead() -> None:
     policy = Policy((("*", "allow"),))
-    kinds = {t.name: policy.decide(t, work) for t in TOOLS}
-    assert kinds["ask_user"] == kinds["deploy"] == "ask"
+    kinds = {t.name: policy.decide(t) for t in TOOLS}
+    assert kinds["ask_user"] == "ask"
     assert kinds["propose_formation"] == "allow"
 
 
@@ -89,7 +84,7 @@ def test_only_the_very_call_a_person_approved_goes_ahead() -> None:
     other = paused.call.model_copy(update={"arguments": {"number": 2}})
     for approved, ends in ((other, Paused), (paused.call, Answered)):
         script = ScriptedModel([Reply(text="x")])
-        more: dict[str, Any] = {"policy": policy, "approved": approved}
+        more: dict[str, Any] = {"policy": policy, "approved": Approval(approved)}
         outcome = go(script, messages=paused.messages, **more)
         assert isinstance(outcome, ends)
 

@@ -24,6 +24,8 @@ KEYS = [
     "candidates",
     "contract",
     "plan_id",
+    "parent",
+    "robots",
     "positions",
     "verdict",
     "partial",
@@ -77,7 +79,7 @@ def test_main_job_prints_one_json_object_and_writes_its_files(tmp_path: Path) ->
     with Image.open(tmp_path / "out" / "deploy.gif") as animation:
         assert getattr(animation, "n_frames") > 10  # noqa: B009
     lines = [json.loads(t) for t in (tmp_path / "out/trace.jsonl").read_text().splitlines()]
-    assert (lines[0]["type"], lines[-1]["type"]) == ("start", "end")
+    assert (lines[0]["type"], lines[-1]["type"]) == ("session", "end")
     roles = [line["role"] for line in lines if line["type"] == "message"]
     assert roles == ["user", "assistant", "tool", "assistant", "tool", "assistant"]
 
@@ -367,5 +369,7 @@ def test_ctrl_c_stops_at_once_and_leaves_no_half_written_file(tmp_path: Path) ->
     assert "interrupted" in err
     assert "Traceback" not in err
     left = sorted((tmp_path / "out").iterdir()) if (tmp_path / "out").exists() else []
-    assert [p.name for p in left] in ([], ["trace.jsonl"])
-    assert all(json.loads(line) for p in left for line in p.read_text().splitlines())
+    assert [p.name for p in left] in ([], ["trace.jsonl"], ["pictures", "trace.jsonl"])
+    assert not [p for p in (tmp_path / "out").glob("pictures/*") if p.name.startswith(".")]
+    traces = [p for p in left if p.name == "trace.jsonl"]
+    assert all(json.loads(line) for p in traces for line in p.read_text().splitlines())

@@ -1,6 +1,7 @@
 """Every mistake a user can make on the command line: exit code 2 and one clear sentence."""
 
 import json
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -185,19 +186,23 @@ def test_unusable_plan_files(cli: Cli, picture: Path, tmp_path: Path) -> None:
     (tmp_path / "text.json").write_text("hello")
     refused(cli("deploy", "text.json"), "not JSON")
     (tmp_path / "other.json").write_text("{}")
-    refused(cli("deploy", "other.json"), "formup/1")
+    refused(cli("deploy", "other.json"), "formup/2")
     code, _, _ = cli(
         "run", picture, *CAR, "-n", 4, "--box", "55,35,125,95", "--plan-only", "--out", "o"
     )
     assert code == 0
     plan = json.loads((tmp_path / "o/plan.json").read_text())
     name = plan["plan_id"]
-    formation = plan["plans"][name]["formation"]
+    formation = plan["world"]["plans"][name]["plan"]["formation"]
     formation["positions"][0][0] += 5
     (tmp_path / "altered.json").write_text(json.dumps(plan))
     refused(cli("deploy", "altered.json"), "altered.json", "altered")
     Image.new("RGB", (200, 140)).save(picture)
+    refused(cli("deploy", "o/plan.json", "--image", picture), "changed")
+    shutil.rmtree(tmp_path / "o/pictures")
     refused(cli("deploy", "o/plan.json"), "changed")
+    picture.unlink()
+    refused(cli("deploy", "o/plan.json"), "not beside it", "--image")
 
 
 def test_tools_by_hand_say_what_is_wrong(cli: Cli, picture: Path) -> None:

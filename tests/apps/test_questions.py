@@ -17,7 +17,7 @@ from formup.apps.run_files import Folder, write_files
 from formup.tools.draw import draw_look
 from formup.tools.errors import InputError
 from formup.tools.perception.image import load_picture
-from formup.tools.scene import Scene
+from formup.tools.world import World
 from PIL import Image, ImageChops
 
 SMARTIES = Path(__file__).parents[2] / "evals/photos/images/smarties.png"
@@ -86,13 +86,15 @@ def test_a_question_offers_candidates_and_their_picture(asked: dict[str, Any]) -
         x0, y0, x1, y1 = choice["box"]
         assert 0 < choice["area_px"] < (x1 - x0) * (y1 - y0)
     assert asked["files"]["picture"] == "question.png"
-    assert sorted(p.name for p in asked["folder"].iterdir()) == ["question.png", "trace.jsonl"]
+    names = sorted(p.name for p in asked["folder"].iterdir())
+    assert names == ["pictures", "question.png", "trace.jsonl"]
 
 
 def test_the_picture_shows_what_is_asked_about_and_nothing_else(asked: dict[str, Any]) -> None:
     with Image.open(asked["folder"] / "question.png") as image:
         shown = image.convert("RGB")
-    bare = draw_look(Scene(load_picture(SMARTIES)))
+    picture = load_picture(SMARTIES)
+    bare = draw_look(picture, World.of(picture))
     marked = ImageChops.difference(shown, bare)
     scale, left, top = 1200 / 413, 52, 30
     for choice in asked["candidates"]:
@@ -147,9 +149,9 @@ def test_a_number_at_the_terminal_goes_on(asked: dict[str, Any], tmp_path: Path)
     assert "out/ question.png" in before
     assert "deployed:" in after
     names = {p.name for p in (tmp_path / "out").iterdir()}
-    assert names == {"plan.json", "plan.png", "deploy.gif", "trace.jsonl"}
+    assert names == {"plan.json", "plan.png", "deploy.gif", "trace.jsonl", "pictures"}
     plan = json.loads((tmp_path / "out/plan.json").read_text())
-    assert plan["targets"][0]["box"] == pytest.approx(last["box"], abs=4)
+    assert plan["world"]["targets"][0]["box"] == pytest.approx(last["box"], abs=4)
     trace = [json.loads(line) for line in (tmp_path / "out/trace.jsonl").read_text().splitlines()]
     answers = [m["text"] for m in trace if m.get("name") == "ask_user"]
     assert answers == [number]
@@ -249,13 +251,13 @@ def test_targets_that_are_asked_about_are_shown_without_the_others(tmp_path: Pat
     agent = Agent(ScriptedModel([Reply(calls=found), asking("t2")]))
     picture = load_picture(SMARTIES)
     run = agent.run(picture, "Ring one")
-    other = run.workspace.scene.target("t2")
+    other = run.world.target("t2")
     box = pytest.approx(other.box, abs=0.1)
     assert run.report.candidates == ({"id": "t2", "label": other.label, "box": box},)
     files = write_files(Folder(tmp_path / "out"), run)
     assert files["picture"] == "question.png"
     with Image.open(tmp_path / "out/question.png") as image:
-        wanted = draw_look(Scene(picture, (other,)))
+        wanted = draw_look(picture, World.of(picture, targets=(other,)))
         assert ImageChops.difference(image.convert("RGB"), wanted).getbbox() is None
 
 

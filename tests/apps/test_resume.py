@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from formup.agent.store.folder import read_trace
+from formup.agent.store.folder import read_events
 
 COINS = Path(__file__).parents[2] / "evals/photos/images/us_coins.jpg"
 CAGE = ("run", COINS, "Cage the largest coin", "-n", 6, "--out", "out")
@@ -46,11 +46,22 @@ def test_a_yes_moves_the_robots(copy: Path) -> None:
     assert data["status"] == "deployed"
     assert data["arrival"]["arrived"] is True
     names = {p.name for p in (copy / "out").iterdir()}
-    assert names == {"plan.json", "plan.png", "deploy.gif", "trace.jsonl"}
-    types = [line["type"] for line in read_trace(copy / "out").lines]
-    assert types.count("resume") == 1
-    again = formup("resume", "out", cwd=copy)
-    assert (again.returncode, "is over" in again.stderr) == (2, True)
+    assert names == {"plan.json", "plan.png", "deploy.gif", "trace.jsonl", "pictures"}
+    kinds = [event.kind for event in read_events(copy / "out")]
+    assert kinds.count("resume") == 1
+    for more in ("--approve", "--answer=x"):
+        again = formup("resume", "out", more, cwd=copy)
+        assert (again.returncode, "asked nothing: it is deployed" in again.stderr) == (2, True)
+
+
+def test_a_run_that_is_over_is_shown_again(copy: Path) -> None:
+    data = report("resume", "out", "--approve", cwd=copy, code=0)
+    log = (copy / "out/trace.jsonl").read_bytes()
+    again = report("resume", "out", cwd=copy, code=0)
+    for shown in (data, again):
+        shown["usage"]["seconds"] = 0
+    assert again == data
+    assert (copy / "out/trace.jsonl").read_bytes() == log
 
 
 def test_a_no_moves_nothing_and_says_why(copy: Path) -> None:

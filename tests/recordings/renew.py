@@ -1,25 +1,29 @@
 """Writes recordings anew after texts or tools have changed: the replies stay, the results are new.
 
-python renew.py TRACES FOLDER: gives the replies of every TRACES/*.jsonl again, whatever is said to
-them, and keeps the new recordings in FOLDER, without the states of workspaces. It prints how each
-ended before and now: replies that no longer fit have to be given anew by somebody who looks.
+python renew.py RECORDINGS FOLDER: gives the replies of every RECORDINGS/*.jsonl again, whatever is
+said to them, and keeps the new recordings in FOLDER, without the worlds. It prints how each ended
+before and now: replies that no longer fit have to be given anew by somebody who looks.
 """
 
 import json
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from formup.agent.agent import Agent
 from formup.agent.messages import Reply
 from formup.agent.model import Request
-from formup.agent.store.folder import Trace, read_trace
+from formup.agent.session import read_messages
+from formup.agent.store.folder import read_events
+from formup.agent.store.protocol import Event
 from formup.agent.wrappers.replay import ReplayModel
 from formup.evals.tasks.suites import load_suite
+from formup.tools.context import Settings
 from formup.tools.errors import ModelError
 from formup.tools.perception.image import load_picture
-from formup.tools.world import Settings
 
 DRAWN = Path(__file__).parent / "injected" / "images"
 TASKS = {t.id: t for name in ("photos", "many") for t in load_suite(name).tasks}
@@ -33,7 +37,8 @@ class Spoken(ReplayModel):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._said = read_trace(path).of_type("message")
+        lines = [event.data for event in read_events(path) if event.kind == "message"]
+        self._said = read_messages(lines, None)
 
     async def reply(self, request: Request) -> Reply:
         """The next one.
@@ -42,28 +47,47 @@ class Spoken(ReplayModel):
             ModelError: there is none.
         """
         count = len(request.messages)
-        if count >= len(self._said) or self._said[count]["role"] != "assistant":
+        said = self._said[count] if count < len(self._said) else None
+        if not isinstance(said, Reply):
             raise ModelError("The recorded replies fit no more.")
         named = {
             old: new
             for then, now in zip(self._said, request.messages, strict=False)
-            for old, new in zip(PLAN.findall(then["text"]), PLAN.findall(now.text), strict=False)
+            for old, new in zip(PLAN.findall(then.text), PLAN.findall(now.text), strict=False)
         }
-        line = json.dumps({k: v for k, v in self._said[count].items() if k in Reply.model_fields})
+        line = said.model_dump_json()
         return Reply.model_validate_json(PLAN.sub(lambda m: named.get(m[0], m[0]), line))
 
 
-def renewed(path: Path, written: Path) -> Trace:
+def renewed(path: Path, written: Path) -> tuple[Event, ...]:
     """The run of a recording once more, written to a file."""
-    start = read_trace(path).start
-    facts = {k: start["settings"][k] for k in ("robots", "descriptor", "may_deploy", "seed")}
+    turn = next(event.data for event in read_events(path) if event.kind == "turn")
     task = TASKS.get(path.stem)
     image = None if task is None else task.picture
     picture = load_picture(image if isinstance(image, Path) else DRAWN / f"{path.stem}.png")
-    Agent(Spoken(path)).run(
-        picture, start["instruction"], settings=Settings(**facts), trace=written
-    )
-    return read_trace(written)
+    settings = Settings.model_validate(turn["settings"])
+    Agent(Spoken(path)).run(picture, turn["words"], settings=settings, trace=written)
+    return read_events(written)
+
+
+def ended(events: Sequence[Event]) -> tuple[str, str]:
+    """How a recording ends: status and message."""
+    end = events[-1].data
+    return end["status"], PLAN.sub("p-...", end["message"])
+
+
+def recording(before: Sequence[Event], now: Sequence[Event]) -> str:
+    """The lines of a new recording, by whom the one before is; no paths of this machine in it."""
+    facts = {k: before[0].data[k] for k in ("model", "planner", "prompt", "prompts")}
+    kept: list[dict[str, Any]] = [
+        {"type": event.kind, "seconds": event.seconds, **event.data}
+        for event in now
+        if event.kind != "world"
+    ]
+    kept[0] |= facts
+    kept[0]["picture"] = kept[0]["picture"] | {"path": None}
+    lines = [json.dumps({"n": n, **line}, ensure_ascii=False) for n, line in enumerate(kept, 1)]
+    return "\n".join([*lines, ""])
 
 
 def main() -> None:
@@ -72,13 +96,11 @@ def main() -> None:
     goal.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as scratch:
         for path in sorted(source.glob("*.jsonl")):
-            before, now = read_trace(path), renewed(path, Path(scratch) / path.name)
-            ends = [str(trace.end and trace.end["message"]) for trace in (before, now)]
-            print(path.stem, "same" if ends[0] == ends[1] else " -> ".join(ends))  # noqa: T201
-            kept = [line for line in now.lines if line["type"] != "state"]
-            kept[0]["base_url"] = None
-            text = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in kept)
-            (goal / path.name).write_text(text, "utf-8")
+            before = read_events(path)
+            now = renewed(path, Path(scratch) / path.name)
+            then, ends = ended(before), ended(now)
+            print(path.stem, "same" if then == ends else f"{then} -> {ends}")  # noqa: T201
+            (goal / path.name).write_text(recording(before, now), "utf-8")
 
 
 if __name__ == "__main__":

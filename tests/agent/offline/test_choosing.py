@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from formup.agent.agent import Agent, Run
 from formup.agent.messages import History, Reply, Result
-from formup.tools import world as workspace
+from formup.tools.context import Settings
+from formup.tools.perception.detectors import candidates
 from formup.tools.perception.detectors.candidates import find_candidates
 from formup.tools.perception.image import Picture, load_picture
-from formup.tools.world import Settings
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -35,7 +35,7 @@ def found_once() -> Any:
         return known[id(pixels)]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(workspace, "find_candidates", remembered)
+        patch.setattr(candidates, "find_candidates", remembered)
         yield
 
 

@@ -9,9 +9,9 @@ from formup.agent.agent import Agent
 from formup.agent.offline.arrangements import understand
 from formup.agent.offline.drawn_forms import faced_in, form_in
 from formup.agent.report import Report
+from formup.tools.context import Settings
 from formup.tools.perception.image import Picture, load_picture, picture_from_array
 from formup.tools.perception.target_prompt import TargetPrompt
-from formup.tools.world import Settings
 
 PHOTOS = Path(__file__).parents[3] / "evals/photos/images"
 COIN = TargetPrompt(box=(176, 188, 292, 298))

@@ -14,9 +14,8 @@ from formup.agent.model import Request
 from formup.agent.outcomes import Answered
 from formup.prompts import load_prompt
 from formup.tools.builtin import TOOLS
+from formup.tools.context import Context
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene
-from formup.tools.world import Workspace
 
 Say = Callable[..., bytes]
 PLAN: dict[str, Any] = {
@@ -112,13 +111,15 @@ def test_ids_that_lack_or_repeat_are_made_up(
     server: Any, dialect: Any, say: Say, picture: Any
 ) -> None:
     twice: list[tuple[str, str, Any]]
+    again: list[tuple[str, str, Any]]
     twice = [("", "locate_object", {}), ("x", "look", {}), ("x", "locate_object", {})]
-    server.script = [say("", twice, "calls"), say("", twice[1:], "calls"), say("done")]
+    again = [("x", "look", {}), ("x", "look", {"region": [0, 0, 60, 60]})]
+    server.script = [say("", twice, "calls"), say("", again, "calls"), say("done")]
     model = server.model(dialect.name)
 
     async def going() -> Any:
         try:
-            return await run(model, TOOLS, Workspace(Scene(picture)), (User(text="go"),))
+            return await run(model, TOOLS, Context.of(picture), (User(text="go"),))
         finally:
             await model.aclose()
 

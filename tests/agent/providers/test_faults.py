@@ -13,9 +13,8 @@ from formup.agent.messages import User
 from formup.agent.outcomes import Answered, Outcome, Stopped
 from formup.agent.providers import transport
 from formup.tools.builtin import TOOLS
+from formup.tools.context import Context
 from formup.tools.perception.image import picture_from_array
-from formup.tools.scene import Scene
-from formup.tools.world import Workspace
 
 Say = Callable[..., bytes]
 LOOK: tuple[str, str, dict[str, Any]] = ("c1", "locate_object", {})
@@ -25,7 +24,7 @@ PICTURE = picture_from_array(np.full((60, 80, 3), 60, np.uint8))
 def go(model: Any) -> Outcome:
     async def closing() -> Outcome:
         try:
-            return await run(model, TOOLS, Workspace(Scene(PICTURE)), (User(text="go"),))
+            return await run(model, TOOLS, Context.of(PICTURE), (User(text="go"),))
         finally:
             await model.aclose()
 
@@ -237,7 +236,7 @@ def test_a_connection_dropped_later_loses_no_messages(
 
 async def resumed(model: Any, outcome: Outcome) -> Outcome:
     try:
-        return await run(model, TOOLS, Workspace(Scene(PICTURE)), outcome.messages)
+        return await run(model, TOOLS, Context.of(PICTURE), outcome.messages)
     finally:
         await model.aclose()
 

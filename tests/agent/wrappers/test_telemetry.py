@@ -16,10 +16,10 @@ from formup.agent.session import Run
 from formup.agent.wrappers.doubles import FunctionModel, ScriptedModel
 from formup.agent.wrappers.telemetry import traced_model
 from formup.tools.builtin import TOOLS
+from formup.tools.context import Context
 from formup.tools.errors import ModelError, ToolError
 from formup.tools.perception.image import picture_from_array
 from formup.tools.tool import THREAD, Tool, tool
-from formup.tools.world import Workspace
 from opentelemetry.sdk.trace import ReadableSpan, TracerProvider
 from opentelemetry.sdk.trace.export import SimpleSpanProcessor
 from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
@@ -194,13 +194,13 @@ def test_a_call_that_runs_no_tool_has_no_span(seen: Seen) -> None:
 
 
 @tool("read")
-def broken(workspace: Workspace) -> dict[str, Any]:
+def broken(context: Context) -> dict[str, Any]:
     """Break."""
     raise ZeroDivisionError("private words")
 
 
 @tool("read")
-async def endless(workspace: Workspace) -> dict[str, Any]:
+async def endless(context: Context) -> dict[str, Any]:
     """Wait for ever."""
     await asyncio.Event().wait()
     raise AssertionError
@@ -260,11 +260,11 @@ def test_spans_a_tool_starts_are_its_own(waits: bool, seen: Seen) -> None:
         with seen.tracer.start_as_current_span("inner"):
             return {"seen": True}
 
-    def plain(workspace: Workspace) -> dict[str, Any]:
+    def plain(context: Context) -> dict[str, Any]:
         """Work."""
         return work()
 
-    async def waiting(workspace: Workspace) -> dict[str, Any]:
+    async def waiting(context: Context) -> dict[str, Any]:
         """Work."""
         await asyncio.sleep(0)
         return work()
@@ -280,7 +280,7 @@ def test_spans_a_tool_starts_are_its_own(waits: bool, seen: Seen) -> None:
 
 def test_spans_hold_nothing_of_what_was_said(seen: Seen) -> None:
     @tool("read")
-    def listen(workspace: Workspace, word: str) -> dict[str, Any]:
+    def listen(context: Context, word: str) -> dict[str, Any]:
         """Listen.
 
         Args:

@@ -11,7 +11,7 @@ from formup.agent.messages import Call, Reply, Result, User
 from formup.agent.model import Request
 from formup.agent.outcomes import Answered, Paused
 from formup.agent.session import load_run
-from formup.agent.store.folder import read_trace
+from formup.agent.store.folder import read_events
 from formup.agent.wrappers.doubles import ScriptedModel
 from formup.prompts import load_prompt
 from formup.tools.errors import InputError
@@ -117,7 +117,7 @@ def test_a_question_of_the_looker_is_answered_in_another_process(
     assert [p["id"] for p in left.report.prompts] == ["context", "planner", "repair"]
     agent = Agent(Seer([SEGMENT]), planner=Seer([PLACE]))
     assert agent.resume(left, answer="the red one").report.status == "deployed"
-    start = read_trace(tmp_path).start
+    start = read_events(tmp_path)[0].data
     assert (start["model"], start["planner"]) == ("scripted", "scripted")
 
 
