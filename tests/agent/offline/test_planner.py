@@ -351,9 +351,10 @@ PARTIAL = {"plain": "y", "partial_plan": "p-1"}
 def test_it_acts_on_what_an_error_is_not_on_how_it_reads(
     result: dict[str, Any], name: str, arguments: dict[str, Any]
 ) -> None:
-    scene = Scene(load_picture(PHOTOS / "us_coins.jpg"))
+    context = Context.of(load_picture(PHOTOS / "us_coins.jpg"))
     words = "6 robots in a 2 by 3 grid above it"
-    first = User(text=task_text(Workspace(scene, pointed=(COIN,), instruction=words)))
+    world = context.world.having(pointed=(COIN,))
+    first = User(text=task_text(replace(context, world=world, words=words)))
     asked = Reply(calls=(Call(id="a", name="propose_formation", arguments={}),))
     failed = Result(call_id="a", name="propose_formation", error="tool", **result)
     reply = asyncio.run(OfflinePlanner().reply(Request("", (first, asked, failed), ())))
