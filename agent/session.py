@@ -6,7 +6,7 @@ written down before anything follows from it, so that the log opens again after 
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -275,6 +275,7 @@ def _picture(facts: Mapping[str, Any], artefacts: Artefacts, given: Picture | No
         try:
             data = artefacts.get(facts["file"])
             given = picture_from_file(data, facts["name"], wanted)
+            given = replace(given, path=facts["path"] and Path(facts["path"]))
         except StorageError:
             if facts["path"] is None or not Path(facts["path"]).is_file():
                 raise InputError(

@@ -94,8 +94,8 @@ LimitList = Annotated[
     list[str] | None,
     typer.Option(
         "--limit",
-        help="NAME=VALUE: requests, tool_calls, tokens, cost_usd, seconds, tool_seconds; "
-        "repeatable.",
+        help="NAME=VALUE: requests, tool_calls, tokens, cost_usd, seconds, tool_seconds, "
+        "reply_seconds; repeatable.",
     ),
 ]
 PolicyList = Annotated[
