@@ -50,16 +50,7 @@ def make_page(
 def draw_bars(page: Page) -> None:
     """Title and footer grounds, over whatever was drawn beyond the photograph's edge."""
     canvas, unit = page.canvas, page.canvas.unit
-    x0, top, x1, bottom = canvas.photo
-    width, height = canvas.size
-    for box in (
-        (0, 0, width, top),
-        (0, bottom, width, height),
-        (0, top, x0, bottom),
-        (x1, top, width, bottom),
-    ):
-        if box[2] > box[0] and box[3] > box[1]:
-            canvas.box(box, INK)
+    canvas.fill_margins(INK)
     for row, line in enumerate(page.title):
         y = (PAD + (row + 0.5) * TITLE * LINE) * unit
         left_text(canvas, PAD * unit, y, line, TITLE, PAPER)

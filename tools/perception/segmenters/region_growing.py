@@ -4,8 +4,6 @@ A click says where a thing is but not how large it is. The few regions with cont
 their edge are the proposals that the segmentation proper then has to confirm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
