@@ -19,7 +19,7 @@ from .curves import (
     ring,
 )
 from .outline import FloatArray, Outline
-from .sampling import PHASES, along_curve, nearest, split
+from .sampling import PHASES, along_curve, arc_length, nearest, split
 
 CHORD_STEPS = 200
 EQUAL = 0.999
@@ -152,7 +152,7 @@ def hole_rings(outline: Outline, n: int, offset: float) -> tuple[FloatArray, ...
     if not parts:
         return ()
     loops = [shapely.get_coordinates(part.exterior) for part in parts]
-    curves = [Curve((loop,), True, float(LineString(loop).length)) for loop in loops]
+    curves = [Curve((loop,), True, arc_length(loop)) for loop in loops]
     shares = split(np.array([curve.length for curve in curves]), n)
     return tuple(along_curve(c, k) for c, k in zip(curves, shares, strict=True) if k)
 

@@ -40,7 +40,7 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
         return interpolate(curve.lines[0], stations)
     if len(curve.lines) == 1:
         return open_points(curve.lines[0], n)
-    lengths = [_length(line) for line in curve.lines]
+    lengths = [arc_length(line) for line in curve.lines]
     shares = split(np.array(lengths), n)
     return np.concatenate(
         [
@@ -113,12 +113,12 @@ def open_points(line: FloatArray, n: int) -> FloatArray:
         line: (m, 2), image pixels.
         n: how many.
     """
-    length = _length(line)
+    length = arc_length(line)
     return interpolate(line, np.array([length / 2]) if n == 1 else np.linspace(0, length, n))
 
 
 def _best_phase(loop: FloatArray, n: int) -> FloatArray:
-    step = _length(loop) / n
+    step = arc_length(loop) / n
     starts = np.arange(PHASES) / PHASES * step if n <= 200 else np.zeros(1)
     stations = starts[:, None] + step * np.arange(n)
     layouts = interpolate(loop, stations.ravel()).reshape(len(starts), n, 2)
@@ -136,7 +136,8 @@ def _closest_pairs(layouts: FloatArray) -> FloatArray:
     return np.sqrt(squares.min(axis=1, initial=np.inf))
 
 
-def _length(line: FloatArray) -> float:
+def arc_length(line: FloatArray) -> float:
+    """Length of a polyline (m, 2), px."""
     return float(LineString(line).length)
 
 
