@@ -92,12 +92,7 @@ class _Assembly(Assembly):
 
 
 class Anthropic(Wire):
-    """Speaks Messages.
-
-    Args:
-        model: as the server calls it.
-        price: of its tokens.
-    """
+    """Speaks Messages."""
 
     assembly = _Assembly
 

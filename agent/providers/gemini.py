@@ -132,12 +132,7 @@ class _Assembly(Assembly):
 
 
 class Gemini(Wire):
-    """Speaks generateContent.
-
-    Args:
-        model: as the server calls it.
-        price: of its tokens.
-    """
+    """Speaks generateContent."""
 
     assembly = _Assembly
 

@@ -121,12 +121,7 @@ class _Assembly(Assembly):
 
 
 class OpenAIChat(Wire):
-    """Speaks Chat Completions.
-
-    Args:
-        model: as the server calls it.
-        price: of its tokens.
-    """
+    """Speaks Chat Completions."""
 
     assembly = _Assembly
 

@@ -84,12 +84,7 @@ class _Assembly(Assembly):
 
 
 class OpenAIResponses(Wire):
-    """Speaks Responses.
-
-    Args:
-        model: as the server calls it.
-        price: of its tokens.
-    """
+    """Speaks Responses."""
 
     assembly = _Assembly
 

@@ -60,7 +60,10 @@ class Assembly(Protocol):
 
 
 class Wire(Protocol):
-    """One provider's language. It does no I/O."""
+    """One provider's language, made of a model as the server calls it and the price of its tokens.
+
+    It does no I/O.
+    """
 
     assembly: type[Assembly]
     """Takes the events of one stream in."""

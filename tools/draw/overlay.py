@@ -86,8 +86,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
     contract, points = plan.formation.contract, plan.formation.points
     site = world.site(contract)
     long = _long(picture)
-    page = make_page(picture, long, long / UNITS, title, TITLE_LINES, NARROWEST)
-    canvas = page.canvas
+    canvas, lines = make_page(picture, long, long / UNITS, title, TITLE_LINES, NARROWEST)
     draw_areas(canvas, contract, site, points)
     drivable = len(points) == contract.robots and _near_picture(points, site).all()
     if drivable:
@@ -98,7 +97,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
     _draw_robots(canvas, world, plan, labels)
     if drivable:
         label_openings(canvas, contract, site, points, labels)
-    draw_bars(page)
+    draw_bars(canvas, lines)
     scale = world.metres_per_pixel
     taken = draw_scale_bar(canvas, scale) if scale else 0.0
     badge, ground = _badge(plan, scale)

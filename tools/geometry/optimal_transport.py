@@ -56,12 +56,7 @@ def lower_bound(goals: FloatArray, starts: FloatArray, prices: FloatArray) -> fl
 
 
 def multilevel_matching(goals: FloatArray, starts: FloatArray) -> Matching:
-    """Nearly the least sum of squared distances, by levels.
-
-    Args:
-        goals: (n, 2).
-        starts: (n, 2).
-    """
+    """Nearly the least sum of squared distances, (n, 2) each, by levels."""
     n = len(goals)
     if n <= BASE:
         return Matching(_least_squares(goals, starts)[1], np.zeros(n))
@@ -99,9 +94,6 @@ def improved_by_cycles(goals: FloatArray, starts: FloatArray, matching: Matching
 
     Prices fall by Bellman-Ford: a robot is worth no more than the price at which another goal
     would rather take it. Where they fall in a circle, exchanging robots around it saves.
-
-    Args:
-        goals, starts: (n, 2).
     """
     goal, robot, cost = _candidate_pairs(goals, starts, matching)
     nothing = ROUNDING * float(cost.max())

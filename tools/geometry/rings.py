@@ -41,9 +41,7 @@ def equal_chords(curve: Curve, n: int) -> FloatArray:
     equal chords would leave much of a ring bare, as about something thin, they are as equal as they
     get without.
 
-    Args:
-        curve: closed or open; on an open one the end robots stay at its ends.
-        n: how many.
+    On an open curve the end robots stay at its ends.
 
     Returns:
         (n, 2), in order along the curve.

@@ -52,16 +52,7 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
 
 
 def at_corners(outline: Outline, n: int, standoff: float) -> FloatArray:
-    """A place off every corner that n robots may be sent to, pushed outward by a distance.
-
-    Args:
-        outline: the thing.
-        n: how many robots; see `corner_points`.
-        standoff: distance from the outline, px.
-
-    Returns:
-        (k, 2), in the corners' order.
-    """
+    """Places off the `corner_points` of n robots, each `standoff` px from the outline, (k, 2)."""
     corners = corner_points(outline, n)
     before = _unit(corners - np.roll(corners, 1, axis=0))
     after = _unit(np.roll(corners, -1, axis=0) - corners)
@@ -107,12 +98,7 @@ def nearest(points: FloatArray, queries: FloatArray, k: int) -> tuple[FloatArray
 
 
 def open_points(line: FloatArray, n: int) -> FloatArray:
-    """N points at equal arc length of a polyline, (n, 2): both ends and between; one in its middle.
-
-    Args:
-        line: (m, 2), image pixels.
-        n: how many.
-    """
+    """N points at equal arc length of a polyline (m, 2), with both its ends; one in its middle."""
     length = arc_length(line)
     return interpolate(line, np.array([length / 2]) if n == 1 else np.linspace(0, length, n))
 

@@ -85,10 +85,6 @@ def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
     No more than the fewest in an even ring that the disc test certifies; no claim that fewer
     would not do. Several seconds at most.
 
-    Args:
-        demand: object, clearance, radius, frame.
-        at_least: as many robots or more.
-
     Returns:
         None where robots that keep their spacing and the frame cannot be certified to cage it.
     """
@@ -102,12 +98,9 @@ def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
 
 
 def caging_places(demand: Demand, n: int, preferred: Sequence[Curve] = ()) -> FloatArray | None:
-    """Places of n robots that certainly cage an object, (n, 2), image pixels, or None.
+    """Places of n robots, 3 or more, that certainly cage an object, (n, 2), image px, or None.
 
-    Args:
-        demand: object, clearance, radius, frame.
-        n: how many robots, 3 or more.
-        preferred: curves to spread them over evenly before all else.
+    `preferred` are curves to spread them over evenly before all else.
     """
     rings = [points for c in (*preferred, *demand.curves) for points in _even_rings(c, n)]
     levels = (0,) if n > MOST_SLID else (0, QUICK)

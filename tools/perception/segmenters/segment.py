@@ -15,7 +15,7 @@ from . import grabcut as gc
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
 from .mask_openings import cut_openings
 from .protocol import Segmentation
-from .region_growing import Region, box_iou, edge_support, pin, propose, solidity
+from .region_growing import Region, box_iou, edge_support, mask_solidity, pin, propose
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
 RING = 0.1
@@ -135,11 +135,7 @@ def segment_points(
     whole_objects = _tried_regions(pixels, propose_whole(pixels, points, PROPOSALS), points, off)
     if best is not None:
         whole_objects = [tried for tried in whole_objects if _is_whole_of(tried, best)]
-    solid = [
-        tried
-        for tried in whole_objects
-        if solidity(np.argwhere(tried.mask), int(np.count_nonzero(tried.mask))) >= SOLID
-    ]
+    solid = [tried for tried in whole_objects if mask_solidity(tried.mask) >= SOLID]
     chosen = max(solid, key=lambda tried: tried.distinctness, default=best)
     if chosen is None:
         return _empty_segmentation((pixels.shape[0], pixels.shape[1]))
@@ -149,9 +145,8 @@ def segment_points(
     if chosen is best and whole_objects:  # it may well be a part of one of them
         rival = max(tried.distinctness for tried in whole_objects)
         share = chosen.distinctness / (chosen.distinctness + rival)
-        return Segmentation(
-            found.mask, found.confidence * share, {**found.parts, "unrivalled": share}
-        )
+        parts = {**found.parts, "unrivalled": share}
+        return Segmentation(found.mask, found.confidence * share, parts)
     return found
 
 
