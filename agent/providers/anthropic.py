@@ -2,25 +2,29 @@
 
 import io
 from functools import lru_cache
+from itertools import groupby
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from ...tools.tool import Tool
 from ..messages import Reply, Result, Usage, User
 from ..model import Request
-from .failures import cut_off, empty, refused, unexpected
+from .failures import cut_off, empty, refused
 from .prices import Price
 from .wire import (
+    Assembly,
     MessageCache,
     Wire,
     base64_text,
     count,
+    described,
     dumped,
     make_calls,
     media_type,
     safe_name,
     usage_of,
+    validated,
 )
 
 VERSION = "2023-06-01"
@@ -45,13 +49,52 @@ class _Message(BaseModel):
     usage: Any = None
 
 
-class Anthropic(Wire):
-    """Speaks Messages.
+class _Assembly(Assembly):
+    events = "messages"
 
-    Args:
-        model: as the server calls it.
-        price: of its tokens.
-    """
+    def __init__(self) -> None:
+        self._blocks: dict[int, _Block] = {}
+        self._texts: dict[int, io.StringIO] = {}
+        self._inputs: dict[int, io.StringIO] = {}
+        self._stop: str | None = None
+        self._usage: dict[str, Any] = {}
+
+    def whole(self) -> Any:
+        content: list[dict[str, Any]] = []
+        for index, block in sorted(self._blocks.items()):
+            streamed, given = self._texts.get(index), self._inputs.get(index)
+            text = (block.text or "") + (streamed.getvalue() if streamed else "")
+            # What was streamed as text stays text: only a complete reply is read.
+            written = block.input if given is None else given.getvalue()
+            content.append(block.model_dump() | {"text": text, "input": written})
+        return {"content": content, "stop_reason": self._stop, "usage": self._usage}
+
+    def take(self, event: dict[str, Any]) -> str:
+        kind, index = event["type"], int(event.get("index") or 0)
+        if not isinstance(kind, str):
+            raise TypeError
+        delta: dict[str, Any] = event.get("delta") or {}
+        if kind == "content_block_delta":
+            text, written = delta.get("text") or "", delta.get("partial_json") or ""
+            self._texts.setdefault(index, io.StringIO()).write(text)
+            if written:
+                self._inputs.setdefault(index, io.StringIO()).write(written)
+            return text
+        if kind == "content_block_start":
+            self._blocks[index] = _Block.model_validate(event["content_block"])
+        message: dict[str, Any] = event.get("message") or {}
+        for owner in (message, event):
+            usage: dict[str, Any] = owner.get("usage") or {}
+            self._usage |= {k: v for k, v in usage.items() if v is not None}
+        self._stop = delta.get("stop_reason") or self._stop
+        self.done = self.done or self._stop is not None or kind == "message_stop"
+        return ""
+
+
+class Anthropic(Wire):
+    """Speaks Messages."""
+
+    assembly = _Assembly
 
     def __init__(self, model: str, price: Price) -> None:
         self._model, self.price = dumped(model), price
@@ -78,16 +121,9 @@ class Anthropic(Wire):
             parts.append(b',"stream":true')
         return b"".join([*parts, b"}"])
 
-    def assembly(self) -> "_Assembly":
-        """A place for the events of one stream."""
-        return _Assembly()
-
     def reply(self, body: Any, request: Request) -> Reply:
         """What a complete body answers to a request."""
-        try:
-            message = _Message.model_validate(body)
-        except ValidationError:
-            raise unexpected("something that is no message") from None
+        message = validated(body, _Message, "message")
         text = "".join(b.text or "" for b in message.content if b.type == "text").strip()
         if message.stop_reason == "refusal":
             raise refused(text)
@@ -103,68 +139,14 @@ class Anthropic(Wire):
 
     def _turns(self, request: Request) -> bytes:
         """Messages by turns: results and what a person says belong to the same one."""
-        turns: list[tuple[bytes, list[bytes]]] = []
-        for message in request.messages:
-            role, blocks = self._blocks(message)
-            if not blocks:
-                continue
-            if turns and turns[-1][0] == role:
-                turns[-1][1].append(blocks)
-            else:
-                turns.append((role, [blocks]))
+        said = [turn for message in request.messages if (turn := self._blocks(message))[1]]
+        by_role = groupby(said, key=lambda turn: turn[0])
+        turns = [(role, [blocks for _, blocks in turn]) for role, turn in by_role]
         for _, blocks in [turn for turn in turns if turn[0] == b"user"][-CACHED_TURNS:]:
             blocks[-1] = _cache_marked(blocks[-1])
         return b",".join(
             [b'{"role":"%b","content":[%b]}' % (role, b",".join(blocks)) for role, blocks in turns]
         )
-
-
-class _Assembly:
-    def __init__(self) -> None:
-        self.done = False
-        self._blocks: dict[int, _Block] = {}
-        self._texts: dict[int, io.StringIO] = {}
-        self._inputs: dict[int, io.StringIO] = {}
-        self._stop: str | None = None
-        self._usage: dict[str, Any] = {}
-
-    def add(self, event: Any) -> str:
-        # Read by hand: there are hundreds of these a reply. What they make up is validated whole.
-        try:
-            return self._take(event)
-        except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
-            raise unexpected("a stream of something else than messages") from None
-
-    def whole(self) -> Any:
-        content: list[dict[str, Any]] = []
-        for index, block in sorted(self._blocks.items()):
-            streamed, given = self._texts.get(index), self._inputs.get(index)
-            text = (block.text or "") + (streamed.getvalue() if streamed else "")
-            # What was streamed as text stays text: only a complete reply is read.
-            written = block.input if given is None else given.getvalue()
-            content.append(block.model_dump() | {"text": text, "input": written})
-        return {"content": content, "stop_reason": self._stop, "usage": self._usage}
-
-    def _take(self, event: dict[str, Any]) -> str:
-        kind, index = event["type"], int(event.get("index") or 0)
-        if not isinstance(kind, str):
-            raise TypeError
-        delta: dict[str, Any] = event.get("delta") or {}
-        if kind == "content_block_delta":
-            text, written = delta.get("text") or "", delta.get("partial_json") or ""
-            self._texts.setdefault(index, io.StringIO()).write(text)
-            if written:
-                self._inputs.setdefault(index, io.StringIO()).write(written)
-            return text
-        if kind == "content_block_start":
-            self._blocks[index] = _Block.model_validate(event["content_block"])
-        message: dict[str, Any] = event.get("message") or {}
-        for owner in (message, event):
-            usage: dict[str, Any] = owner.get("usage") or {}
-            self._usage |= {k: v for k, v in usage.items() if v is not None}
-        self._stop = delta.get("stop_reason") or self._stop
-        self.done = self.done or self._stop is not None or kind == "message_stop"
-        return ""
 
 
 def _anthropic_usage(usage: Any, price: Price) -> Usage:
@@ -223,8 +205,5 @@ def _cache_marked(blocks: bytes) -> bytes:
 
 @lru_cache(maxsize=16)
 def _tool_list(tools: tuple[Tool, ...], marked: bool) -> bytes:
-    listed = [
-        {"name": t.name, "description": t.description, "input_schema": t.offered} for t in tools
-    ]
-    written = b",".join(dumped(tool) for tool in listed)
+    written = b",".join(map(dumped, described(tools, "input_schema")))
     return _cache_marked(written) if marked else written

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any
 from urllib.parse import quote
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from ...tools.tool import Tool
 from ..messages import Call, Opaque, Reply, Result, Usage, User
@@ -17,14 +17,17 @@ from ..model import Request
 from .failures import AskError, cut_off, empty, refused, unexpected
 from .prices import Price
 from .wire import (
+    Assembly,
     MessageCache,
     Wire,
     base64_text,
     count,
+    described,
     dumped,
     make_calls,
     media_type,
     usage_of,
+    validated,
 )
 
 UNSIGNED = "skip_thought_signature_validator"
@@ -83,13 +86,55 @@ class _Response(BaseModel):
     usageMetadata: Any = None  # noqa: N815
 
 
-class Gemini(Wire):
-    """Speaks generateContent.
+class _Assembly(Assembly):
+    events = "Gemini's contents"
 
-    Args:
-        model: as the server calls it.
-        price: of its tokens.
-    """
+    def __init__(self) -> None:
+        self._parts: list[dict[str, Any]] = []
+        self._text: list[str] = []
+        self._whole: dict[str, Any] = {}
+        self._end: dict[str, Any] | None = None
+
+    def whole(self) -> Any:
+        self._close_text()
+        if self._end is None:
+            return self._whole
+        return self._whole | {"candidates": [self._end | {"content": {"parts": self._parts}}]}
+
+    def take(self, event: dict[str, Any]) -> str:
+        known = {key: event[key] for key in event.keys() & _KEYS if event[key] is not None}
+        if not known:
+            raise KeyError
+        candidates = known.pop("candidates", None)
+        self._whole |= known
+        self.done = self.done or bool(known.get("promptFeedback", {}).get("blockReason"))
+        if not candidates:
+            return ""
+        first: dict[str, Any] = candidates[0]
+        end = {key: first.get(key) for key in ("finishReason", "finishMessage")}
+        self._end = (self._end or {}) | {key: value for key, value in end.items() if value}
+        self.done = self.done or bool(self._end.get("finishReason"))
+        content: dict[str, Any] = first.get("content") or {}
+        return "".join([self._part(part) for part in content.get("parts") or ()])
+
+    def _part(self, part: dict[str, Any]) -> str:
+        if part.keys() == {"text"}:
+            self._text.append(part["text"])
+        else:
+            self._close_text()
+            self._parts.append(part)
+        return "" if part.get("thought") else part.get("text") or ""
+
+    def _close_text(self) -> None:
+        if self._text:
+            self._parts.append({"text": "".join(self._text)})
+            self._text = []
+
+
+class Gemini(Wire):
+    """Speaks generateContent."""
+
+    assembly = _Assembly
 
     def __init__(self, model: str, price: Price) -> None:
         self._name, self.price = f"gemini:{model}", price
@@ -115,16 +160,9 @@ class Gemini(Wire):
             parts += [b'"tools":', _function_declarations(request.tools), b","]
         return b"".join([*parts, b'"contents":[', self._contents(request), b"]}"])
 
-    def assembly(self) -> "_Assembly":
-        """A place for the events of one stream."""
-        return _Assembly()
-
     def reply(self, body: Any, request: Request) -> Reply:
         """What a complete body answers to a request."""
-        try:
-            response = _Response.model_validate(body)
-        except ValidationError:
-            raise unexpected("something that is no content of Gemini's") from None
+        response = validated(body, _Response, "content of Gemini's")
         if not response.candidates:
             raise _without_candidates(body, response.promptFeedback)
         candidate = response.candidates[0]
@@ -194,56 +232,6 @@ class Gemini(Wire):
         return [*text, *calls]
 
 
-class _Assembly:
-    def __init__(self) -> None:
-        self.done = False
-        self._parts: list[dict[str, Any]] = []
-        self._text: list[str] = []
-        self._whole: dict[str, Any] = {}
-        self._end: dict[str, Any] | None = None
-
-    def add(self, event: Any) -> str:
-        try:
-            return self._add(event)
-        except (TypeError, AttributeError, LookupError):
-            raise unexpected("a stream of something else than Gemini's contents") from None
-
-    def whole(self) -> Any:
-        self._close_text()
-        if self._end is None:
-            return self._whole
-        return self._whole | {"candidates": [self._end | {"content": {"parts": self._parts}}]}
-
-    def _add(self, event: dict[str, Any]) -> str:
-        known = {key: event[key] for key in event.keys() & _KEYS if event[key] is not None}
-        if not known:
-            raise KeyError
-        candidates = known.pop("candidates", None)
-        self._whole |= known
-        self.done = self.done or bool(known.get("promptFeedback", {}).get("blockReason"))
-        if not candidates:
-            return ""
-        first: dict[str, Any] = candidates[0]
-        end = {key: first.get(key) for key in ("finishReason", "finishMessage")}
-        self._end = (self._end or {}) | {key: value for key, value in end.items() if value}
-        self.done = self.done or bool(self._end.get("finishReason"))
-        content: dict[str, Any] = first.get("content") or {}
-        return "".join([self._take(part) for part in content.get("parts") or ()])
-
-    def _take(self, part: dict[str, Any]) -> str:
-        if part.keys() == {"text"}:
-            self._text.append(part["text"])
-        else:
-            self._close_text()
-            self._parts.append(part)
-        return "" if part.get("thought") else part.get("text") or ""
-
-    def _close_text(self) -> None:
-        if self._text:
-            self._parts.append({"text": "".join(self._text)})
-            self._text = []
-
-
 def _without_candidates(data: Any, feedback: _Feedback | None) -> AskError:
     """What a body without candidates means."""
     if feedback and feedback.blockReason:
@@ -295,8 +283,4 @@ def _inline_data(image: bytes) -> dict[str, Any]:
 
 @lru_cache(maxsize=16)
 def _function_declarations(tools: tuple[Tool, ...]) -> bytes:
-    declared = [
-        {"name": t.name, "description": t.description, "parametersJsonSchema": t.offered}
-        for t in tools
-    ]
-    return dumped([{"functionDeclarations": declared}])
+    return dumped([{"functionDeclarations": described(tools, "parametersJsonSchema")}])

@@ -9,23 +9,26 @@ from functools import lru_cache
 from typing import Annotated, Any, cast
 
 from annotated_types import MinLen
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 from pydantic_core import from_json
 
 from ...tools.tool import Tool
 from ..messages import Reply, Result, Usage, User
 from ..model import Request
-from .failures import AskError, cut_off, empty, refused, unexpected
+from .failures import AskError, cut_off, empty, refused
 from .prices import Price
 from .wire import (
+    Assembly,
     MessageCache,
     Wire,
     count,
     data_url,
+    described,
     dumped,
     make_calls,
     safe_name,
     usage_of,
+    validated,
 )
 
 _THOUGHTS = re.compile(r"\A\s*<think>.*?</think>", re.DOTALL)
@@ -62,91 +65,20 @@ class _Completion(BaseModel):
     usage: Any = None
 
 
-class OpenAIChat(Wire):
-    """Speaks Chat Completions.
+class _Assembly(Assembly):
+    events = "chat completions"
 
-    Args:
-        model: as the server calls it.
-        price: of its tokens.
-    """
-
-    def __init__(self, model: str, price: Price) -> None:
-        self._model, self.price = dumped(model), price
-        self._messages = MessageCache(_rendered)
-
-    def path(self, *, stream: bool) -> str:
-        """What follows the base URL."""
-        return "/chat/completions"
-
-    def headers(self, key: str | None) -> dict[str, str]:
-        """The key, where there is one."""
-        return {"authorization": f"Bearer {key}"} if key else {}
-
-    def body(self, request: Request, *, stream: bool) -> bytes:
-        """A request as JSON."""
-        written = [_system_message(request.system)] if request.system else []
-        pictures: list[bytes] = []
-        for message in request.messages:
-            if pictures and not isinstance(message, Result):
-                written += pictures
-                pictures = []
-            text, picture = self._messages(message)
-            written.append(text)
-            if picture:
-                pictures.append(picture)
-        parts = [b'{"model":', self._model, b',"messages":[', b",".join(written + pictures), b"]"]
-        if request.tools:
-            parts += [b',"tools":', _functions(request.tools)]
-        if stream:
-            parts.append(b',"stream":true,"stream_options":{"include_usage":true}')
-        return b"".join([*parts, b"}"])
-
-    def assembly(self) -> "_Assembly":
-        """A place for the events of one stream."""
-        return _Assembly()
-
-    def reply(self, body: Any, request: Request) -> Reply:
-        """What a complete body answers to a request."""
-        try:
-            completion = _Completion.model_validate(body)
-        except ValidationError:
-            raise unexpected("something that is no chat completion") from None
-        choice = completion.choices[0]
-        message = choice.message
-        if message.refusal:
-            raise refused(message.refusal)
-        _check_finish_reason(choice.finish_reason)
-        text = _THOUGHTS.sub("", message.text).strip()
-        written = [
-            (None if c.id is None else str(c.id), c.function.name or "", c.function.arguments)
-            for c in message.tool_calls or ()
-        ]
-        if not written and (call := call_in_text(text, request.tools)):
-            text, written = "", [(None, *call)]
-        if not text and not written:
-            raise empty()
-        calls = make_calls(written, request.messages)
-        usage = openai_usage(completion.usage, self.price, "prompt", "completion")
-        return Reply(text=text, calls=calls, usage=usage)
-
-
-class _Assembly:
     def __init__(self) -> None:
-        self.done = False
         self._text, self._refusal = io.StringIO(), io.StringIO()
         self._calls: list[dict[str, Any]] = []
         self._at: dict[int | None, dict[str, Any]] = {}
         self._finish: str | None = None
         self._usage: Any = None
 
-    def add(self, event: Any) -> str:
-        # Read by hand: there are hundreds of these a reply. What they make up is validated whole.
-        try:
-            self._usage = event.get("usage") or self._usage
-            choices = event.get("choices") or ()
-            return "".join([self._choice(c) for c in choices if not c.get("index")])
-        except (AttributeError, TypeError):
-            raise unexpected("a stream of something else than chat completions") from None
+    def take(self, event: dict[str, Any]) -> str:
+        self._usage = event.get("usage") or self._usage
+        choices = event.get("choices") or ()
+        return "".join([self._choice(c) for c in choices if not c.get("index")])
 
     def whole(self) -> Any:
         calls = [
@@ -186,6 +118,60 @@ class _Assembly:
         given = function.get("arguments")
         if given is not None:
             call["arguments"].append(given if isinstance(given, str) else dumped(given).decode())
+
+
+class OpenAIChat(Wire):
+    """Speaks Chat Completions."""
+
+    assembly = _Assembly
+
+    def __init__(self, model: str, price: Price) -> None:
+        self._model, self.price = dumped(model), price
+        self._messages = MessageCache(_rendered)
+
+    def path(self, *, stream: bool) -> str:
+        """What follows the base URL."""
+        return "/chat/completions"
+
+    def body(self, request: Request, *, stream: bool) -> bytes:
+        """A request as JSON."""
+        written = [_system_message(request.system)] if request.system else []
+        pictures: list[bytes] = []
+        for message in request.messages:
+            if pictures and not isinstance(message, Result):
+                written += pictures
+                pictures = []
+            text, picture = self._messages(message)
+            written.append(text)
+            if picture:
+                pictures.append(picture)
+        parts = [b'{"model":', self._model, b',"messages":[', b",".join(written + pictures), b"]"]
+        if request.tools:
+            parts += [b',"tools":', _functions(request.tools)]
+        if stream:
+            parts.append(b',"stream":true,"stream_options":{"include_usage":true}')
+        return b"".join([*parts, b"}"])
+
+    def reply(self, body: Any, request: Request) -> Reply:
+        """What a complete body answers to a request."""
+        completion = validated(body, _Completion, "chat completion")
+        choice = completion.choices[0]
+        message = choice.message
+        if message.refusal:
+            raise refused(message.refusal)
+        _check_finish_reason(choice.finish_reason)
+        text = _THOUGHTS.sub("", message.text).strip()
+        written = [
+            (None if c.id is None else str(c.id), c.function.name or "", c.function.arguments)
+            for c in message.tool_calls or ()
+        ]
+        if not written and (call := call_in_text(text, request.tools)):
+            text, written = "", [(None, *call)]
+        if not text and not written:
+            raise empty()
+        calls = make_calls(written, request.messages)
+        usage = openai_usage(completion.usage, self.price, "prompt", "completion")
+        return Reply(text=text, calls=calls, usage=usage)
 
 
 def _joined_text(content: str | list[dict[str, Any]]) -> str:
@@ -281,7 +267,5 @@ def _system_message(text: str) -> bytes:
 
 @lru_cache(maxsize=16)
 def _functions(tools: tuple[Tool, ...]) -> bytes:
-    functions = [
-        {"name": t.name, "description": t.description, "parameters": t.offered} for t in tools
-    ]
+    functions = described(tools, "parameters")
     return dumped([{"type": "function", "function": function} for function in functions])

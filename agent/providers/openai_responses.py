@@ -6,21 +6,24 @@ Nothing is stored there, so that what a model thought comes back to it encrypted
 from functools import lru_cache
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from ...tools.tool import Tool
 from ..messages import Call, Opaque, Reply, Result, User
 from ..model import Request
-from .failures import AskError, cut_off, empty, of_error_body, refused, unexpected
+from .failures import AskError, cut_off, empty, of_error_body, refused
 from .openai_chat import openai_usage
 from .prices import Price
 from .wire import (
+    Assembly,
     MessageCache,
     Wire,
     data_url,
+    described,
     dumped,
     make_calls,
     safe_name,
+    validated,
 )
 
 _ENDS = {"response.completed", "response.incomplete", "response.failed"}
@@ -54,13 +57,36 @@ class _Response(BaseModel):
     usage: Any = None
 
 
-class OpenAIResponses(Wire):
-    """Speaks Responses.
+class _Assembly(Assembly):
+    events = "responses"
 
-    Args:
-        model: as the server calls it.
-        price: of its tokens.
-    """
+    def __init__(self) -> None:
+        self._items: list[Any] = []
+        self._response: dict[str, Any] = {}
+
+    def whole(self) -> Any:
+        # Some servers end with a response that repeats nothing of what they streamed.
+        return self._response | {"output": self._response.get("output") or self._items}
+
+    def take(self, event: dict[str, Any]) -> str:
+        kind = event["type"]
+        if kind == "response.output_text.delta":
+            return "".join([event["delta"]])
+        if kind == "response.output_item.done":
+            self._items.append(event["item"])
+        elif kind in _ENDS:
+            self._response, self.done = {} | event["response"], True
+        elif kind == "error" and (failure := of_error_body({"error": event}, _KEY_ADVICE)):
+            raise failure
+        elif not isinstance(kind, str):
+            raise TypeError
+        return ""
+
+
+class OpenAIResponses(Wire):
+    """Speaks Responses."""
+
+    assembly = _Assembly
 
     def __init__(self, model: str, price: Price) -> None:
         self._model, self._name, self.price = dumped(model), f"openai-responses:{model}", price
@@ -70,10 +96,6 @@ class OpenAIResponses(Wire):
     def path(self, *, stream: bool) -> str:
         """What follows the base URL."""
         return "/responses"
-
-    def headers(self, key: str | None) -> dict[str, str]:
-        """The key, where there is one."""
-        return {"authorization": f"Bearer {key}"} if key else {}
 
     def body(self, request: Request, *, stream: bool) -> bytes:
         """A request as JSON."""
@@ -90,18 +112,11 @@ class OpenAIResponses(Wire):
             parts.append(b',"stream":true')
         return b"".join([*parts, b"}"])
 
-    def assembly(self) -> "_Assembly":
-        """A place for the events of one stream."""
-        return _Assembly()
-
     def reply(self, body: Any, request: Request) -> Reply:
         """What a complete body answers to a request."""
         if failure := of_error_body(body, _KEY_ADVICE):
             raise failure
-        try:
-            response = _Response.model_validate(body)
-        except ValidationError:
-            raise unexpected("something that is no response") from None
+        response = validated(body, _Response, "response")
         _check_status(response)
         messages = [item for item in response.output if item.type == "message"]
         parts = [part for message in messages for part in message.content or ()]
@@ -138,36 +153,6 @@ class OpenAIResponses(Wire):
         own = opaque is not None and opaque.model == self._name
         items = opaque.items if opaque and own else _items_of(message)
         return b",".join(map(dumped, items))
-
-
-class _Assembly:
-    def __init__(self) -> None:
-        self.done = False
-        self._items: list[Any] = []
-        self._response: dict[str, Any] = {}
-
-    def add(self, event: Any) -> str:
-        try:
-            return self._add(event["type"], event)
-        except (TypeError, AttributeError, LookupError):
-            raise unexpected("a stream of something else than responses") from None
-
-    def whole(self) -> Any:
-        # Some servers end with a response that repeats nothing of what they streamed.
-        return self._response | {"output": self._response.get("output") or self._items}
-
-    def _add(self, kind: object, event: dict[str, Any]) -> str:
-        if kind == "response.output_text.delta":
-            return "".join([event["delta"]])
-        if kind == "response.output_item.done":
-            self._items.append(event["item"])
-        elif kind in _ENDS:
-            self._response, self.done = {} | event["response"], True
-        elif kind == "error" and (failure := of_error_body({"error": event}, _KEY_ADVICE)):
-            raise failure
-        elif not isinstance(kind, str):
-            raise TypeError
-        return ""
 
 
 def _check_status(response: _Response) -> None:
@@ -226,15 +211,6 @@ def _input_content(text: str, images: tuple[bytes, ...]) -> str | list[dict[str,
 
 @lru_cache(maxsize=16)
 def _function_tools(tools: tuple[Tool, ...]) -> bytes:
-    listed = [
-        {
-            "type": "function",
-            "name": t.name,
-            "description": t.description,
-            "parameters": t.offered,
-            # The schemas have optional parameters, which strict mode does not know.
-            "strict": False,
-        }
-        for t in tools
-    ]
-    return dumped(listed)
+    # The schemas have optional parameters, which strict mode does not know.
+    listed = described(tools, "parameters")
+    return dumped([{"type": "function"} | tool | {"strict": False} for tool in listed])

@@ -124,12 +124,8 @@ def remote_model(
 ) -> RemoteModel:
     """A model of a provider, at its own address or another that speaks the same.
 
-    Args:
-        provider: openai, openai-responses, anthropic, gemini or ollama.
-        model: as the server calls it.
-        base_url: None for the one the environment names, else the provider's own.
-        show: see `RemoteModel`.
-        sleep: waits between tries.
+    Without a base URL the one the environment names counts, else the provider's own; `show` is as
+    of `RemoteModel`.
 
     Raises:
         InputError: no usable base URL, or no key for it.

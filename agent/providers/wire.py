@@ -5,15 +5,19 @@ import json
 import re
 import weakref
 from collections.abc import Callable, Iterable
-from typing import Any, Generic, Protocol, TypeVar, cast
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
 
+from pydantic import BaseModel, ValidationError
 from pydantic_core import from_json
 
+from ...tools.tool import Tool
 from ..messages import Call, History, Reply, Result, Usage, User
 from ..model import Request
+from .failures import unexpected
 from .prices import Price
 
 T = TypeVar("T")
+Body = TypeVar("Body", bound=BaseModel)
 UNREADABLE = "this is not a JSON object"
 """The argument under which a model gets back what it wrote in place of its arguments. No tool has
 such a parameter, so the call fails and says so, and what is sent on to servers is valid JSON."""
@@ -29,7 +33,9 @@ Show = Callable[[str | None], None]
 class Assembly(Protocol):
     """Puts the events of a stream together to what would have come unstreamed."""
 
-    done: bool
+    events: ClassVar[str]
+    """What the events are part of, for messages."""
+    done: bool = False
     """Whether the reply is complete, whatever the connection does from here."""
 
     def add(self, event: Any) -> str:
@@ -38,6 +44,14 @@ class Assembly(Protocol):
         Raises:
             AskError: it is none of this provider's.
         """
+        # Read by hand: there are hundreds of these a reply. What they make up is validated whole.
+        try:
+            return self.take(event)
+        except (AttributeError, LookupError, OverflowError, TypeError, ValueError):
+            raise unexpected(f"a stream of something else than {self.events}") from None
+
+    def take(self, event: Any) -> str:
+        """As `add`, with any builtin error for what is not this provider's."""
         ...
 
     def whole(self) -> Any:
@@ -46,22 +60,24 @@ class Assembly(Protocol):
 
 
 class Wire(Protocol):
-    """One provider's language. It does no I/O."""
+    """One provider's language, made of a model as the server calls it and the price of its tokens.
+
+    It does no I/O.
+    """
+
+    assembly: type[Assembly]
+    """Takes the events of one stream in."""
 
     def path(self, *, stream: bool) -> str:
         """What follows the base URL, with the version of the interface if it has one."""
         ...
 
     def headers(self, key: str | None) -> dict[str, str]:
-        """What it wants beside the body."""
-        ...
+        """What it wants beside the body: the key, where there is one."""
+        return {"authorization": f"Bearer {key}"} if key else {}
 
     def body(self, request: Request, *, stream: bool) -> bytes:
         """A request as JSON."""
-        ...
-
-    def assembly(self) -> Assembly:
-        """A place for the events of one stream."""
         ...
 
     def reply(self, body: Any, request: Request) -> Reply:
@@ -104,6 +120,23 @@ _ENCODER = json.JSONEncoder(separators=(",", ":"))
 def dumped(value: object) -> bytes:
     """Compact JSON; ASCII, so that no text whatever fails."""
     return _ENCODER.encode(value).encode()
+
+
+def described(tools: Iterable[Tool], schema: str) -> list[dict[str, Any]]:
+    """Tools as providers list them; `schema` is what this one calls that of the parameters."""
+    return [{"name": t.name, "description": t.description, schema: t.offered} for t in tools]
+
+
+def validated(body: Any, form: type[Body], noun: str) -> Body:
+    """A complete body in the form that the interface promises.
+
+    Raises:
+        AskError: it is no `noun`.
+    """
+    try:
+        return form.model_validate(body)
+    except ValidationError:
+        raise unexpected(f"something that is no {noun}") from None
 
 
 def media_type(image: bytes) -> str:

@@ -5,6 +5,7 @@ edge. Strokes and text are sized in units of the page, never of the photograph.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from itertools import pairwise
 
 import numpy as np
@@ -88,8 +89,7 @@ class Canvas:
 
     def copy(self) -> "Canvas":
         """A second canvas that starts from what is drawn here."""
-        twin = object.__new__(Canvas)
-        twin.__dict__.update(self.__dict__)
+        twin = copy(self)
         twin._image = self._image.copy()
         twin._draw = ImageDraw.Draw(twin._image, "RGBA")
         return twin
@@ -222,6 +222,19 @@ class Canvas:
             corner * self.unit * FINE,
             (*colour, round(255 * strength)),
         )
+
+    def fill_margins(self, colour: Colour) -> None:
+        """Colour the page around the photograph."""
+        x0, y0, x1, y1 = self.photo
+        width, height = self.size
+        for box in (
+            (0, 0, width, y0),
+            (0, y1, width, height),
+            (0, y0, x0, y1),
+            (x1, y0, width, y1),
+        ):
+            if box[2] > box[0] and box[3] > box[1]:
+                self.box(box, colour)
 
     def chip(
         self,

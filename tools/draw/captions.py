@@ -3,8 +3,6 @@
 Neither hides any of the photograph. Lengths are units of the page, see Canvas.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..perception.image import Picture
@@ -17,18 +15,10 @@ LINE, PAD = 1.35, 12.0
 FOOTER_HEIGHT = FOOTER * LINE + 2 * PAD
 
 
-@dataclass(frozen=True)
-class Page:
-    """A canvas with a title of some lines and an empty footer."""
-
-    canvas: Canvas
-    title: list[str]
-
-
 def make_page(
     picture: Picture, long: int, unit: float, title: str, lines: int, narrowest: float
-) -> Page:
-    """Lay out a page.
+) -> tuple[Canvas, list[str]]:
+    """A canvas with room for a title above and a footer below, and the title's lines.
 
     Args:
         picture: the photograph.
@@ -44,25 +34,15 @@ def make_page(
     kept = wrapped(title, (width + side - 2 * PAD * unit) * FINE, face, lines)
     top = round((len(kept) * TITLE * LINE + 2 * PAD) * unit) if kept else 0
     margins = (side // 2, top, side - side // 2, round(FOOTER_HEIGHT * unit))
-    return Page(Canvas(picture, long, unit, margins), kept)
+    return Canvas(picture, long, unit, margins), kept
 
 
-def draw_bars(page: Page) -> None:
+def draw_bars(canvas: Canvas, title: list[str]) -> None:
     """Title and footer grounds, over whatever was drawn beyond the photograph's edge."""
-    canvas, unit = page.canvas, page.canvas.unit
-    x0, top, x1, bottom = canvas.photo
-    width, height = canvas.size
-    for box in (
-        (0, 0, width, top),
-        (0, bottom, width, height),
-        (0, top, x0, bottom),
-        (x1, top, width, bottom),
-    ):
-        if box[2] > box[0] and box[3] > box[1]:
-            canvas.box(box, INK)
-    for row, line in enumerate(page.title):
-        y = (PAD + (row + 0.5) * TITLE * LINE) * unit
-        left_text(canvas, PAD * unit, y, line, TITLE, PAPER)
+    canvas.fill_margins(INK)
+    for row, line in enumerate(title):
+        y = (PAD + (row + 0.5) * TITLE * LINE) * canvas.unit
+        left_text(canvas, PAD * canvas.unit, y, line, TITLE, PAPER)
 
 
 def footer_middle(canvas: Canvas) -> float:

@@ -91,15 +91,15 @@ def draw_deployment(
     """
     goals = plan.formation.points
     long = _photo_long_side(picture)
-    page = make_page(picture, long, UNIT, title, TITLE_LINES, NARROWEST)
+    canvas, lines = make_page(picture, long, UNIT, title, TITLE_LINES, NARROWEST)
     for name in plan.formation.contract.target_ids:
-        draw_outline(page.canvas, world.target(name).outline)
-    radius = robot_size(page.canvas, goals)
-    _draw_goals(page.canvas, plan, radius)
-    draw_idle_robots(page.canvas, idle_robots(world, plan), radius)
-    draw_bars(page)
+        draw_outline(canvas, world.target(name).outline)
+    radius = robot_size(canvas, goals)
+    _draw_goals(canvas, plan, radius)
+    draw_idle_robots(canvas, idle_robots(world, plan), radius)
+    draw_bars(canvas, lines)
     return [
-        _frame(page.canvas, frames[max(i - TRAIL, 0) : i + 1], goals, radius, (i, len(frames)))
+        _frame(canvas, frames[max(i - TRAIL, 0) : i + 1], goals, radius, (i, len(frames)))
         for i in range(len(frames))
     ]
 

@@ -86,8 +86,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
     contract, points = plan.formation.contract, plan.formation.points
     site = world.site(contract)
     long = _long(picture)
-    page = make_page(picture, long, long / UNITS, title, TITLE_LINES, NARROWEST)
-    canvas = page.canvas
+    canvas, lines = make_page(picture, long, long / UNITS, title, TITLE_LINES, NARROWEST)
     draw_areas(canvas, contract, site, points)
     drivable = len(points) == contract.robots and _near_picture(points, site).all()
     if drivable:
@@ -98,7 +97,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
     _draw_robots(canvas, world, plan, labels)
     if drivable:
         label_openings(canvas, contract, site, points, labels)
-    draw_bars(page)
+    draw_bars(canvas, lines)
     scale = world.metres_per_pixel
     taken = draw_scale_bar(canvas, scale) if scale else 0.0
     badge, ground = _badge(plan, scale)
@@ -107,45 +106,31 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
 
 
 def draw_look(
-    picture: Picture,
-    world: World,
-    *,
-    plan: Plan | None = None,
-    candidates: Sequence[Candidate] = (),
-    rulers: bool = True,
+    picture: Picture, world: World, *, candidates: Sequence[Candidate] = ()
 ) -> Image.Image:
     """The photograph with what coordinates and ids can be read from.
 
     Args:
         world: its targets are outlined and tagged with their ids.
-        plan: its robots are drawn.
         candidates: outlined and numbered, 3 for c3.
-        rulers: whether all four edges bear rulers in image pixels.
 
     Returns:
-        RGB, the photograph's long side 1200 to 1500 px.
-
-    Raises:
-        ToolError: the plan names a target that the world does not have.
+        RGB, the photograph's long side 1200 to 1500 px, with rulers in image pixels on all edges.
     """
     long = _long(picture)
     unit = long / UNITS
-    left, top, right, bottom = (round(m * unit) if rulers else 0 for m in RULER)
+    left, top, right, bottom = (round(m * unit) for m in RULER)
     canvas = Canvas(picture, long, unit, (left, top, right, bottom))
-    draw_world(canvas, world, plan, candidates, Labels(canvas.photo))
-    if rulers:
-        draw_rulers(canvas)
+    draw_world(canvas, world, None, candidates)
+    draw_rulers(canvas)
     return canvas.finish()
 
 
 def draw_world(
-    canvas: Canvas,
-    world: World,
-    plan: Plan | None,
-    candidates: Sequence[Candidate],
-    labels: Labels,
+    canvas: Canvas, world: World, plan: Plan | None, candidates: Sequence[Candidate]
 ) -> None:
     """Targets with their ids, a plan's robots and numbered candidates, on a photograph."""
+    labels = Labels(canvas.photo)
     count = len(world.targets)
     colours = colours_of([thing.outline for thing in (*world.targets, *candidates)])
     for target, colour in zip(world.targets, colours[:count], strict=True):

@@ -14,11 +14,7 @@ RULER: Margins = (52, 30, 52, 30)
 
 def draw_rulers(canvas: Canvas) -> None:
     """Ticks at round pixels of the photograph, with their numbers, in every margin."""
-    x0, y0, x1, y1 = canvas.photo
-    width, height = canvas.size
-    for box in ((0, 0, width, y0), (0, y1, width, height), (0, y0, x0, y1), (x1, y0, width, y1)):
-        if box[2] > box[0] and box[3] > box[1]:
-            canvas.box(box, PAPER)
+    canvas.fill_margins(PAPER)
     for axis in (0, 1):
         step = _label_step(canvas, axis)
         minor, first = max(step // 5, 1), canvas.origin[axis]

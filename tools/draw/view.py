@@ -16,7 +16,7 @@ from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
 from ..perception.target_prompt import Box, Point
 from ..world import World
-from .canvas import WHITE, Canvas, Labels
+from .canvas import WHITE, Canvas
 from .overlay import draw_world
 from .rulers import RULER, draw_rulers
 
@@ -64,7 +64,7 @@ def draw_view(
     canvas = Canvas(picture, long, 1.0, (0, 0, RULER[2], RULER[3]), origin)
     if drawn:
         canvas.dashes([np.asarray([*drawn, drawn[0]], dtype=float)], WHITE, 1.0)
-    draw_world(canvas, world, plan, candidates, Labels(canvas.photo))
+    draw_world(canvas, world, plan, candidates)
     draw_rulers(canvas)
     file = BytesIO()
     canvas.finish().save(file, "JPEG", quality=QUALITY, subsampling=0)

@@ -240,16 +240,10 @@ def segment(
 
 
 def interpolate(line: FloatArray, stations: FloatArray) -> FloatArray:
-    """The places at given arc lengths of a polyline, to the last bit those that GEOS finds.
+    """The places (n, 2) at arc lengths (n,) of a polyline (m, 2), px; beyond an end it is meant.
 
-    GEOS walks along the line for each of them; here one search serves all.
-
-    Args:
-        line: (m, 2), image pixels.
-        stations: (n,) arc lengths, px; those beyond an end mean the end.
-
-    Returns:
-        (n, 2), image pixels.
+    To the last bit those that GEOS finds, which walks along the line for each; here one search
+    serves all.
     """
     steps = np.diff(line, axis=0)
     lengths = np.sqrt(steps[:, 0] * steps[:, 0] + steps[:, 1] * steps[:, 1])

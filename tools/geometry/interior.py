@@ -101,12 +101,9 @@ def yardstick(
 
 
 def coverage_radius(outline: Outline, points: FloatArray, cells: FloatArray | None = None) -> float:
-    """Greatest distance from a point of the region to its nearest robot, px (sampled).
+    """Greatest distance from a point of the region to its nearest robot (n, 2), px (sampled).
 
-    Args:
-        outline: the region.
-        points: (n, 2) robots.
-        cells: its samples, see `cells_of`, where they are at hand.
+    `cells` are the samples, see `cells_of`, where they are at hand.
     """
     sampled = cells_of(outline.polygon, len(points)) if cells is None else cells
     return float(nearest(points, sampled, 1)[0].max())

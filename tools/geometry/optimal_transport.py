@@ -56,19 +56,10 @@ def lower_bound(goals: FloatArray, starts: FloatArray, prices: FloatArray) -> fl
 
 
 def multilevel_matching(goals: FloatArray, starts: FloatArray) -> Matching:
-    """Nearly the least sum of squared distances, by levels.
-
-    Args:
-        goals: (n, 2).
-        starts: (n, 2).
-    """
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
+    """Nearly the least sum of squared distances, (n, 2) each, by levels."""
     n = len(goals)
     if n <= BASE:
-        robots = linear_sum_assignment(cdist(goals, starts, "sqeuclidean"))[1]
-        return Matching(np.asarray(robots, dtype=np.intp), np.zeros(n))
+        return Matching(_least_squares(goals, starts)[1], np.zeros(n))
     goal_blocks = _median_blocks(goals, goals, FINER)[0]
     start_blocks = _median_blocks(starts, starts, FINER)[0]
     here, there = _centres(goals, goal_blocks), _centres(starts, start_blocks)
@@ -78,18 +69,23 @@ def multilevel_matching(goals: FloatArray, starts: FloatArray) -> Matching:
     return _blockwise(goals, starts, Matching(robots, prices))
 
 
-def _blockwise(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matching:
-    """Exact reassignments within blocks of neighbours, laid anew a few times."""
+def _least_squares(goals: FloatArray, starts: FloatArray) -> tuple[IntArray, IntArray]:
+    """The exact assignment: goals and their robots, as many as the smaller of the two sets has."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
+    rows, columns = linear_sum_assignment(cdist(goals, starts, "sqeuclidean"))
+    return np.asarray(rows, dtype=np.intp), np.asarray(columns, dtype=np.intp)
+
+
+def _blockwise(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matching:
+    """Exact reassignments within blocks of neighbours, laid anew a few times."""
     robots = matching.robots.copy()
     for k in range(PASSES):
         by = starts[robots] if k % 2 else goals
         turned = by @ _rotation(k * GOLDEN_ANGLE)
         for block in _median_blocks(turned, turned, LEAF)[0]:
-            cost = cdist(goals[block], starts[robots[block]], "sqeuclidean")
-            robots[block] = robots[block][linear_sum_assignment(cost)[1]]
+            robots[block] = robots[block][_least_squares(goals[block], starts[robots[block]])[1]]
     return replace(matching, robots=robots)
 
 
@@ -98,9 +94,6 @@ def improved_by_cycles(goals: FloatArray, starts: FloatArray, matching: Matching
 
     Prices fall by Bellman-Ford: a robot is worth no more than the price at which another goal
     would rather take it. Where they fall in a circle, exchanging robots around it saves.
-
-    Args:
-        goals, starts: (n, 2).
     """
     goal, robot, cost = _candidate_pairs(goals, starts, matching)
     nothing = ROUNDING * float(cost.max())
@@ -192,20 +185,17 @@ def _spread_out(
     takes: IntArray,
 ) -> IntArray:
     """Robots for single goals where blocks go to blocks; their sizes may differ by one."""
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
     robots = np.full(len(goals), -1, dtype=np.intp)
     for block, taken in zip(goal_blocks, takes, strict=True):
         team = start_blocks[int(taken)]
-        rows, columns = linear_sum_assignment(cdist(goals[block], starts[team], "sqeuclidean"))
+        rows, columns = _least_squares(goals[block], starts[team])
         robots[block[rows]] = team[columns]
     left = np.flatnonzero(robots < 0)
     idle = np.setdiff1d(np.arange(len(goals)), robots[robots >= 0])
     if len(left):
         for block, team in zip(*_median_blocks(goals[left], starts[idle], LEAF), strict=True):
-            cost = cdist(goals[left[block]], starts[idle[team]], "sqeuclidean")
-            robots[left[block]] = idle[team[linear_sum_assignment(cost)[1]]]
+            found = _least_squares(goals[left[block]], starts[idle[team]])[1]
+            robots[left[block]] = idle[team[found]]
     return robots
 
 

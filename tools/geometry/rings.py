@@ -19,7 +19,7 @@ from .curves import (
     ring,
 )
 from .outline import FloatArray, Outline
-from .sampling import PHASES, along_curve, nearest, split
+from .sampling import PHASES, along_curve, arc_length, nearest, split
 
 CHORD_STEPS = 200
 EQUAL = 0.999
@@ -41,9 +41,7 @@ def equal_chords(curve: Curve, n: int) -> FloatArray:
     equal chords would leave much of a ring bare, as about something thin, they are as equal as they
     get without.
 
-    Args:
-        curve: closed or open; on an open one the end robots stay at its ends.
-        n: how many.
+    On an open curve the end robots stay at its ends.
 
     Returns:
         (n, 2), in order along the curve.
@@ -152,7 +150,7 @@ def hole_rings(outline: Outline, n: int, offset: float) -> tuple[FloatArray, ...
     if not parts:
         return ()
     loops = [shapely.get_coordinates(part.exterior) for part in parts]
-    curves = [Curve((loop,), True, float(LineString(loop).length)) for loop in loops]
+    curves = [Curve((loop,), True, arc_length(loop)) for loop in loops]
     shares = split(np.array([curve.length for curve in curves]), n)
     return tuple(along_curve(c, k) for c, k in zip(curves, shares, strict=True) if k)
 

@@ -40,7 +40,7 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
         return interpolate(curve.lines[0], stations)
     if len(curve.lines) == 1:
         return open_points(curve.lines[0], n)
-    lengths = [_length(line) for line in curve.lines]
+    lengths = [arc_length(line) for line in curve.lines]
     shares = split(np.array(lengths), n)
     return np.concatenate(
         [
@@ -52,16 +52,7 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
 
 
 def at_corners(outline: Outline, n: int, standoff: float) -> FloatArray:
-    """A place off every corner that n robots may be sent to, pushed outward by a distance.
-
-    Args:
-        outline: the thing.
-        n: how many robots; see `corner_points`.
-        standoff: distance from the outline, px.
-
-    Returns:
-        (k, 2), in the corners' order.
-    """
+    """Places off the `corner_points` of n robots, each `standoff` px from the outline, (k, 2)."""
     corners = corner_points(outline, n)
     before = _unit(corners - np.roll(corners, 1, axis=0))
     after = _unit(np.roll(corners, -1, axis=0) - corners)
@@ -107,18 +98,13 @@ def nearest(points: FloatArray, queries: FloatArray, k: int) -> tuple[FloatArray
 
 
 def open_points(line: FloatArray, n: int) -> FloatArray:
-    """N points at equal arc length of a polyline, (n, 2): both ends and between; one in its middle.
-
-    Args:
-        line: (m, 2), image pixels.
-        n: how many.
-    """
-    length = _length(line)
+    """N points at equal arc length of a polyline (m, 2), with both its ends; one in its middle."""
+    length = arc_length(line)
     return interpolate(line, np.array([length / 2]) if n == 1 else np.linspace(0, length, n))
 
 
 def _best_phase(loop: FloatArray, n: int) -> FloatArray:
-    step = _length(loop) / n
+    step = arc_length(loop) / n
     starts = np.arange(PHASES) / PHASES * step if n <= 200 else np.zeros(1)
     stations = starts[:, None] + step * np.arange(n)
     layouts = interpolate(loop, stations.ravel()).reshape(len(starts), n, 2)
@@ -136,7 +122,8 @@ def _closest_pairs(layouts: FloatArray) -> FloatArray:
     return np.sqrt(squares.min(axis=1, initial=np.inf))
 
 
-def _length(line: FloatArray) -> float:
+def arc_length(line: FloatArray) -> float:
+    """Length of a polyline (m, 2), px."""
     return float(LineString(line).length)
 
 

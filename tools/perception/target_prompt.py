@@ -1,16 +1,8 @@
 """How a thing is pointed at: candidate, box, points or rough outline, checked on the picture."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    SerializerFunctionWrapHandler,
-    WithJsonSchema,
-    model_serializer,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
 from shapely.geometry import Polygon
 
 _Number = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
@@ -72,11 +64,6 @@ class TargetPrompt(BaseModel):
         if self.straight and self.outline is None:
             raise ValueError("straight belongs to an outline")
         return self
-
-    @model_serializer(mode="wrap")
-    def _written(self, standard: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `straight` where it says nothing, as before there was such a word."""
-        return {k: v for k, v in standard(self).items() if k != "straight" or v}
 
     def corrected_by(self, later: "TargetPrompt") -> "TargetPrompt":
         """This outline, corrected by another prompt's points as well."""

@@ -24,7 +24,7 @@ class EllipseSegmenter:
         y, x = np.indices(pixels.shape[:2])
         across, down = (2 * x - x0 - x1) / (x1 - x0), (2 * y - y0 - y1) / (y1 - y0)
         mask = np.asarray(across**2 + down**2 <= 1)
-        return Segmentation(mask, 0.9, {"example": 0.9}, prompt.box)
+        return Segmentation(mask, 0.9, {"example": 0.9})
 
 
 class BrightDetector:

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formup.tools.draw import draw_deployment, draw_look, draw_plan, save_gif
+from formup.tools.draw.rulers import RULER
 from formup.tools.draw.text import drawable
 from formup.tools.errors import InputError, ToolError
 from formup.tools.formation.contract import Contract, Group
@@ -148,14 +149,12 @@ def test_rulers_are_exact(size: tuple[int, int]) -> None:
         assert np.abs(values - step * np.arange(1, len(values) + 1)).max() < 0.6 / scale
 
 
-def test_a_look_shows_targets_and_robots_without_rulers() -> None:
-    made = scene()
-    plain = draw_look(*scene(boxes=()), rulers=False)
-    assert plain.size == (1200, 800)
-    image = draw_look(*made, plan=plan_for(made), rulers=False)
-    changed = (np.asarray(image) != np.asarray(plain)).any(axis=2)
+def test_a_look_shows_targets() -> None:
+    plain = draw_look(*scene(boxes=()))
+    left, top, right, bottom = RULER
+    assert plain.size == (1200 + left + right, 800 + top + bottom)
+    changed = (np.asarray(draw_look(*scene())) != np.asarray(plain)).any(axis=2)[top:, left:]
     assert changed[4 * 95 : 4 * 105, 417:423].any()  # its left edge, x = 105 at scale 4
-    assert (np.asarray(image) == ROBOT).all(axis=2).any()
 
 
 GROUPS: list[dict[str, object]] = [
@@ -217,7 +216,7 @@ def test_pictures_of_extreme_shape(size: tuple[int, int]) -> None:
     made = scene(*size, boxes=())
     plan = free_plan(made, [[0, 0], [size[0] - 1, size[1] - 1], [8, 8]])
     assert draw_plan(*made, plan, "A long title for a narrow picture " * 5).width >= 600
-    assert draw_look(*made, plan=plan).width > 0
+    assert draw_look(*made).width > 0
     frames = [plan.formation.points] * 2
     assert max(draw_deployment(*made, plan, frames, "t")[0].size) <= 640
 

@@ -9,12 +9,14 @@ import shapely
 from formup.tools.draw import draw_look
 from formup.tools.draw.canvas import MARKS, Canvas, Colour, Labels
 from formup.tools.draw.numbered import colours_of, draw_numbered
+from formup.tools.draw.rulers import RULER
 from formup.tools.geometry.outline import FloatArray, largest_part, outline_of
 from formup.tools.perception.detectors.candidates import find_candidates
 from formup.tools.perception.image import Picture, load_picture, picture_from_array
 from formup.tools.perception.referring.attributes import Attributes, Candidate
 from formup.tools.world import Target, World
 from numpy.typing import NDArray
+from PIL import Image
 from scipy import ndimage
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
@@ -45,8 +47,14 @@ def numbered(*polygons: BaseGeometry) -> tuple[NDArray[np.bool_], NDArray[np.uin
     picture = picture_from_array(np.full((200, 300, 3), 120, dtype=np.uint8))
     world = World.of(picture)
     candidates = [candidate(k, p) for k, p in enumerate(polygons, start=1)]
-    pixels = np.asarray(draw_look(picture, world, candidates=candidates, rulers=False))
-    return (pixels != np.asarray(draw_look(picture, world, rulers=False))).any(axis=2), pixels
+    pixels = photograph_of(draw_look(picture, world, candidates=candidates))
+    return (pixels != photograph_of(draw_look(picture, world))).any(axis=2), pixels
+
+
+def photograph_of(look: Image.Image) -> NDArray[np.uint8]:
+    """A look without its rulers."""
+    left, top, right, bottom = RULER
+    return np.asarray(look)[top:-bottom, left:-right]
 
 
 def chip_of(pixels: NDArray[np.uint8], colour: tuple[int, int, int]) -> tuple[float, float]:
@@ -162,10 +170,8 @@ def test_targets_and_candidates_share_no_colour() -> None:
         id="t1", label="thing", box=outline.bounds, confidence=0.9, outline=outline, prompt="box"
     )
     found = candidate(1, shapely.box(150, 20, 220, 90))
-    image = draw_look(
-        picture, World.of(picture, targets=(target,)), candidates=[found], rulers=False
-    )
-    halves = np.split(np.asarray(image), [4 * 120], axis=1)
+    image = draw_look(picture, World.of(picture, targets=(target,)), candidates=[found])
+    halves = np.split(photograph_of(image), [4 * 120], axis=1)
     for half, own, other in zip(halves, MARKS[:2], MARKS[1::-1], strict=True):
         assert (half == own).all(axis=2).sum() > 1000
         assert not (half == other).all(axis=2).any()

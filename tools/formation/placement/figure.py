@@ -12,19 +12,19 @@ from shapely.geometry import GeometryCollection, LineString, MultiPoint, Point, 
 
 from ...errors import InputError, ToolError
 from ...geometry.curves import QUAD_SEGMENTS, ROUND_JOIN_DIP
+from ...geometry.figures.letters import letter_strokes
 from ...geometry.figures.shapes import (
     Sketch,
     arc_sketch,
     fitted,
     grid_sketch,
-    letters_sketch,
     line_sketch,
-    outlined_letters_sketch,
     polygon_sketch,
     polyline_sketch,
     star_sketch,
 )
 from ...geometry.figures.strokes import spread
+from ...geometry.figures.typeface import letter_outlines
 from ...geometry.outline import FloatArray, Outline
 from ...geometry.sampling import min_spacing
 from ..contract import Group, ShapeSpec, nominal
@@ -116,8 +116,8 @@ def _sketch(group: Group, shape: ShapeSpec) -> Sketch:
         "grid": lambda: grid_sketch(n, min(rows, n)),
         "polygon": lambda: polygon_sketch(shape.corners or POLYGON_CORNERS),
         "star": lambda: star_sketch(shape.corners or STAR_TIPS),
-        "letters": lambda: letters_sketch(shape.text or ""),
-        "outlined_letters": lambda: outlined_letters_sketch(shape.text or ""),
+        "letters": lambda: polyline_sketch(*letter_strokes(shape.text or "")),
+        "outlined_letters": lambda: polyline_sketch(*letter_outlines(shape.text or "")),
     }
     return made[shape.kind]()
 

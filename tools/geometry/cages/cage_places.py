@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
-from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from ..curves import Curve, Frame, ring
+from ..curves import Curve, Frame, interpolate, ring
 from ..outline import FloatArray, Outline
-from ..sampling import along_curve, min_spacing
+from ..sampling import along_curve, arc_length, min_spacing
 from .cages import QUICK, THOROUGH, State, cage
 from .configuration import clearances
 from .configuration_grid import Grid, component, first_grid
@@ -87,10 +85,6 @@ def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
     No more than the fewest in an even ring that the disc test certifies; no claim that fewer
     would not do. Several seconds at most.
 
-    Args:
-        demand: object, clearance, radius, frame.
-        at_least: as many robots or more.
-
     Returns:
         None where robots that keep their spacing and the frame cannot be certified to cage it.
     """
@@ -104,12 +98,9 @@ def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
 
 
 def caging_places(demand: Demand, n: int, preferred: Sequence[Curve] = ()) -> FloatArray | None:
-    """Places of n robots that certainly cage an object, (n, 2), image pixels, or None.
+    """Places of n robots, 3 or more, that certainly cage an object, (n, 2), image px, or None.
 
-    Args:
-        demand: object, clearance, radius, frame.
-        n: how many robots, 3 or more.
-        preferred: curves to spread them over evenly before all else.
+    `preferred` are curves to spread them over evenly before all else.
     """
     rings = [points for c in (*preferred, *demand.curves) for points in _even_rings(c, n)]
     levels = (0,) if n > MOST_SLID else (0, QUICK)
@@ -144,10 +135,9 @@ def _even_rings(curve: Curve, n: int) -> Iterator[FloatArray]:
     yield along_curve(curve, n)
     if not curve.closed:
         return
-    line = LineString(curve.lines[0])
+    line = curve.lines[0]
     for phase in range(PHASES):
-        at = (np.arange(n) + phase / PHASES) * line.length / n
-        yield shapely.get_coordinates(shapely.line_interpolate_point(line, at))
+        yield interpolate(line, (np.arange(n) + phase / PHASES) * arc_length(line) / n)
 
 
 class _Slides:
@@ -230,8 +220,8 @@ class _Slides:
 def _ring_stations(curve: Curve) -> FloatArray:
     """Points evenly along the pieces of a curve, (k, 2)."""
     pieces: list[FloatArray] = []
-    for line in map(LineString, curve.lines):
-        count = max(round(STATIONS * line.length / curve.length), 2)
-        at = np.arange(count) * line.length / count
-        pieces.append(shapely.get_coordinates(shapely.line_interpolate_point(line, at)))
+    for line in curve.lines:
+        length = arc_length(line)
+        count = max(round(STATIONS * length / curve.length), 2)
+        pieces.append(interpolate(line, np.arange(count) * length / count))
     return np.concatenate(pieces)

@@ -22,6 +22,8 @@ COARSE = 20
 """Cells along the longer side of the domain at the first level; every level doubles them."""
 MIN_TURNS, MAX_TURNS = 16, 64
 """Fewest and most cells of theta at the first level."""
+NEIGHBOURHOOD = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+"""Steps to a cell itself and its 26 neighbours, (27, 3)."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,14 @@ path is clear throughout and ends where a line separates the body from every rob
 import numpy as np
 
 from ..outline import FloatArray
-from .configuration_grid import BoolArray, Grid, component, neighbours, shortest_path
+from .configuration_grid import (
+    NEIGHBOURHOOD,
+    BoolArray,
+    Grid,
+    component,
+    neighbours,
+    shortest_path,
+)
 from .rigid import Body, Obstacles, clear_moves, shortened, ways_out
 
 RETRIES = 6
@@ -56,8 +63,7 @@ def _entry(
     body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray
 ) -> tuple[int, int, int] | None:
     """The roomiest cell beside the start whose middle the body gets to straight."""
-    around = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    cells = around + grid.seed(body.pivot)
+    cells = NEIGHBOURHOOD + grid.seed(body.pivot)
     inside = ((cells[:, 1:] >= 0) & (cells[:, 1:] < room.shape[1:])).all(axis=1)
     cells = cells[inside]
     poses = grid.centres(tuple(cells.T))  # before theta wraps: the turn there is a small one

@@ -9,7 +9,14 @@ from collections.abc import Callable
 import numpy as np
 
 from ..outline import FloatArray
-from .configuration_grid import BoolArray, Grid, IndexArray, neighbours, shortest_path
+from .configuration_grid import (
+    NEIGHBOURHOOD,
+    BoolArray,
+    Grid,
+    IndexArray,
+    neighbours,
+    shortest_path,
+)
 
 Cells = tuple[IndexArray, ...]
 Gaps = Callable[[Grid, Cells], FloatArray]
@@ -68,8 +75,7 @@ def _widest_way(
 def _touching(cells: IndexArray, way: IndexArray, grid: Grid) -> BoolArray:
     """Which cells are on a way or have a neighbour there, (k,)."""
     marked = np.zeros((grid.turns, *grid.domain.shape), dtype=bool)
-    steps = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    near = (way[:, None] + steps).reshape(-1, 3)
+    near = (way[:, None] + NEIGHBOURHOOD).reshape(-1, 3)
     near[:, 0] %= grid.turns
     near[:, 1:] = np.clip(near[:, 1:], 0, np.array(grid.domain.shape) - 1)
     marked[tuple(near.T)] = True

@@ -37,16 +37,22 @@ def letter_strokes(text: str) -> tuple[FloatArray, ...]:
     Raises:
         InputError: nothing to write, or a character that has no strokes.
     """
-    glyphs = stroke_glyphs()
-    unknown = sorted({c for c in text.upper() if c not in glyphs and c != " "})
-    if unknown or not text.strip():
-        named = ", ".join(map(repr, unknown)) or repr(text)
-        raise InputError(f"Letters are A to Z, 0 to 9 and blanks; {named} cannot be written.")
-    return in_a_row(text.upper(), glyphs, SPACE)
+    refusal = "Letters are A to Z, 0 to 9 and blanks; {} cannot be written."
+    return in_a_row(text.upper(), stroke_glyphs(), SPACE, refusal)
 
 
-def in_a_row(text: str, glyphs: Mapping[str, Glyph], space: float) -> tuple[FloatArray, ...]:
-    """The lines of a text's glyphs side by side, a blank being `space` wide."""
+def in_a_row(
+    text: str, glyphs: Mapping[str, Glyph], space: float, refusal: str
+) -> tuple[FloatArray, ...]:
+    """The lines of a text's glyphs side by side, a blank being `space` wide.
+
+    Raises:
+        InputError: nothing to write, or a character without a glyph; `refusal` has a {} for those.
+    """
+    lacking = sorted({c for c in text if c not in glyphs and c != " "})
+    if lacking or not text.strip():
+        named = ", ".join(map(repr, lacking)) or repr(text)
+        raise InputError(refusal.format(named))
     lines: list[FloatArray] = []
     x = 0.0
     for character in text.strip():

@@ -12,8 +12,7 @@ import numpy as np
 
 from ...errors import InputError
 from ..outline import FloatArray
-from .letters import arc, letter_strokes
-from .typeface import letter_outlines
+from .letters import arc
 
 Kind = Literal[
     "line", "arc", "circle", "grid", "polygon", "star", "letters", "outlined_letters", "polyline"
@@ -125,24 +124,6 @@ def star_sketch(points: int) -> Sketch:
         InputError: fewer than 3 points.
     """
     return _closed_loop(np.tile([1.0, WAIST], _checked_corner_count(points)), -90)
-
-
-def letters_sketch(text: str) -> Sketch:
-    """A line of letters and digits, as a pen writes them.
-
-    Raises:
-        InputError: see `letter_strokes`.
-    """
-    return polyline_sketch(*letter_strokes(text))
-
-
-def outlined_letters_sketch(text: str) -> Sketch:
-    """A line of letters, digits and signs by the outlines of a font.
-
-    Raises:
-        InputError: see `letter_outlines`.
-    """
-    return polyline_sketch(*letter_outlines(text))
 
 
 def polyline_sketch(*lines: FloatArray) -> Sketch:

@@ -1,6 +1,7 @@
 """Spreads robots over drawn lines: at ends, corners and crossings first, then evenly between.
 
-A drawing is any set of polylines; where they meet they are one. Frame: image pixels, y down.
+A drawing is any set of polylines, each (k, 2); where they meet they are one. Frame: image pixels,
+y down.
 """
 
 import heapq
@@ -37,9 +38,6 @@ class Stretch(NamedTuple):
 def split_at_crossings(lines: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
     """The drawing parted at its crossings and joined where only two lines meet.
 
-    Args:
-        lines: each (k, 2), image pixels.
-
     Returns:
         Polylines from crossing or end to crossing or end; a loop repeats its first point.
     """
@@ -58,10 +56,6 @@ def spread(lines: tuple[FloatArray, ...], n: int) -> FloatArray:
 
     Corners are left out where that is more even; with fewer robots than ends and crossings they
     take some far apart.
-
-    Args:
-        lines: each (k, 2), image pixels.
-        n: how many.
     """
     whole = split_at_crossings(lines)
     parted = [piece for walk in whole for piece in _at_corners(walk)]

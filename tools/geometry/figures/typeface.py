@@ -13,7 +13,6 @@ from importlib.resources import files
 
 import numpy as np
 
-from ...errors import InputError
 from ..outline import FloatArray
 from .letters import ARC_STEP, Glyph, in_a_row
 
@@ -31,14 +30,8 @@ def letter_outlines(text: str) -> tuple[FloatArray, ...]:
     Raises:
         InputError: nothing to write, or a character that the font lacks.
     """
-    glyphs = _glyphs()
-    lacking = sorted({c for c in text if c not in glyphs and c != " "})
-    if lacking or not text.strip():
-        named = ", ".join(map(repr, lacking)) or repr(text)
-        raise InputError(
-            f"Outlined letters are printing ASCII and blanks; {named} cannot be drawn."
-        )
-    return in_a_row(text, glyphs, SPACE)
+    refusal = "Outlined letters are printing ASCII and blanks; {} cannot be drawn."
+    return in_a_row(text, _glyphs(), SPACE, refusal)
 
 
 @cache

@@ -1,6 +1,5 @@
 """What a detector is: a picture and perhaps a noun phrase go in, candidates come out."""
 
-from collections.abc import Callable
 from typing import Protocol
 
 from ..image import Picture
@@ -27,6 +26,3 @@ class Detector(Protocol):
                 and shape are then measured on what it found.
         """
         ...
-
-
-DetectorFactory = Callable[[], Detector]

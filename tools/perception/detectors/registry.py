@@ -1,11 +1,12 @@
 """The detectors by name: those built in, and those of packages with `formup.detectors`."""
 
+from collections.abc import Callable
 from functools import cache
 
 from ...registry import Registry
-from .protocol import Detector, DetectorFactory
+from .protocol import Detector
 
-DETECTORS = Registry[DetectorFactory](
+DETECTORS = Registry[Callable[[], Detector]](
     "detector",
     "formup.detectors",
     {"standout": "formup.tools.perception.detectors.candidates:StandoutDetector"},

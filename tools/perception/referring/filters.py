@@ -15,7 +15,7 @@ from shapely.geometry import Polygon
 
 from ...errors import ToolError
 from ...geometry.outline import FloatArray
-from .attributes import Candidate, ShapeName
+from .attributes import Attributes, Candidate, ShapeName
 from .query import Description, Trait
 
 IntArray = NDArray[np.int64]
@@ -67,6 +67,10 @@ class Things:
     width: int
     height: int
 
+    def each(self, measured: Callable[[Attributes], float]) -> FloatArray:
+        """A number of every thing, (n,)."""
+        return np.array([measured(c.attributes) for c in self.candidates], dtype=float)
+
     @cached_property
     def centres(self) -> FloatArray:
         """(n, 2), px."""
@@ -81,7 +85,7 @@ class Things:
     @cached_property
     def areas(self) -> FloatArray:
         """(n,), square px."""
-        return np.array([c.attributes.area for c in self.candidates], dtype=float)
+        return self.each(lambda a: a.area)
 
     @cached_property
     def labs(self) -> FloatArray:
@@ -196,20 +200,9 @@ def _there_are(names: list[str]) -> str:
 
 def _colour_filter(things: Things, description: Description) -> Filter:
     word = " or ".join(description.colours)
-    shares = np.array(
-        [
-            sum(share for name, share in c.attributes.colours if name in description.colours)
-            for c in things.candidates
-        ],
-        dtype=float,
-    )
-    others = np.array(
-        [
-            max((v for n, v in c.attributes.colours if n not in description.colours), default=0.0)
-            for c in things.candidates
-        ],
-        dtype=float,
-    )
+    asked = description.colours
+    shares = things.each(lambda a: sum(v for name, v in a.colours if name in asked))
+    others = things.each(lambda a: max((v for n, v in a.colours if n not in asked), default=0.0))
     degrees = graded(shares + 1e-9, COLOUR)
     degrees[(shares >= MAIN) & (shares >= MAIN_LEAD * others)] = SURE
     return Filter(
@@ -232,15 +225,9 @@ def _shade_filter(things: Things, shade: str) -> Filter:
 
 def _shape_filter(things: Things, description: Description) -> Filter:
     word = " or ".join(description.shapes)
-    fits = [dict(c.attributes.shapes) for c in things.candidates]
-    asked = np.array([max(f.get(s, 0.0) for s in description.shapes) for f in fits], dtype=float)
-    other = np.array(
-        [
-            max((v for s, v in f.items() if s not in (*description.shapes, UNNAMED)), default=0.0)
-            for f in fits
-        ],
-        dtype=float,
-    )
+    asked = things.each(lambda a: _best_fit(a, description.shapes))
+    named = (*description.shapes, UNNAMED)
+    other = things.each(lambda a: max((v for s, v in a.shapes if s not in named), default=0.0))
     lead = asked - other + 1e-9
     return Filter(
         f"of shape {word}",
@@ -251,11 +238,10 @@ def _shape_filter(things: Things, description: Description) -> Filter:
 
 
 def _trait_filter(things: Things, trait: Trait) -> Filter:
-    attributes = [c.attributes for c in things.candidates]
     if trait == "round":
         return _round_filter(things)
     if trait == "whole":
-        cut = np.array([a.touches_border for a in attributes], dtype=bool)
+        cut = things.each(lambda a: a.touches_border)
         degrees = np.where(cut, NO, SURE).astype(np.int64)
         return Filter(
             trait,
@@ -265,10 +251,10 @@ def _trait_filter(things: Things, trait: Trait) -> Filter:
         )
     if trait == "long":
         name, limits = "long over short side", LONG
-        values = np.array([a.elongation for a in attributes], dtype=float)
+        values = things.each(lambda a: a.elongation)
     elif trait == "hollow":
         name, limits = "share of holes", HOLLOW
-        values = np.array([a.hole for a in attributes], dtype=float)
+        values = things.each(lambda a: a.hole)
     else:
         name, limits = "share of its convex hull", SOLID
         polygons = np.array([c.outline.polygon for c in things.candidates], dtype=object)
@@ -282,17 +268,14 @@ def _trait_filter(things: Things, trait: Trait) -> Filter:
     )
 
 
+def _best_fit(attributes: Attributes, names: tuple[ShapeName, ...]) -> float:
+    """How well the best of some shapes fits, 0 to 1."""
+    return max((fit for name, fit in attributes.shapes if name in names), default=0.0)
+
+
 def _round_filter(things: Things) -> Filter:
-    attributes = [c.attributes for c in things.candidates]
-    roundness = np.array([a.roundness for a in attributes], dtype=float)
-    elongation = np.array([a.elongation for a in attributes], dtype=float)
-
-    def best(fits: dict[ShapeName, float], names: tuple[ShapeName, ...]) -> float:
-        return max(fits.get(name, 0.0) for name in names)
-
-    fits: list[dict[ShapeName, float]] = [dict(a.shapes) for a in attributes]
-    leads = [best(f, ANGULAR_SHAPES) - best(f, ROUND_SHAPES) for f in fits]
-    angular = np.array(leads, dtype=float)
+    roundness, elongation = things.each(lambda a: a.roundness), things.each(lambda a: a.elongation)
+    angular = things.each(lambda a: _best_fit(a, ANGULAR_SHAPES) - _best_fit(a, ROUND_SHAPES))
     by_shape = graded(angular, ANGULAR)
     degrees = np.minimum(graded(roundness, ROUNDNESS), graded(elongation, ROUND_ELONGATION))
     return Filter(

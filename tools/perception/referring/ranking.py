@@ -176,7 +176,7 @@ def _area_measure(things: Things, members: IntArray, sign: int) -> Measure:
 
 def _length_measure(things: Things, members: IntArray) -> Measure:
     lengths = np.array([things.candidates[int(i)].outline.long_axis[1] for i in members])
-    built = np.array([things.candidates[int(i)].attributes.elongation for i in members])
+    built = things.each(lambda a: a.elongation)[members]
     ahead = _ahead_by(np.log(lengths), np.log(LENGTH_RATIO))
     # A plate is longer than a pencil, yet the pencil may be meant.
     ahead &= (built[:, None] >= LONGISH) | (built[None] < LONGER_BUILT * built[:, None])
@@ -184,7 +184,7 @@ def _length_measure(things: Things, members: IntArray) -> Measure:
 
 
 def _roundest(things: Things, members: IntArray) -> Measure:
-    values = np.array([things.candidates[int(i)].attributes.roundness for i in members])
+    values = things.each(lambda a: a.roundness)[members]
     shown = [f"{v:.2f}" for v in values]
     return Measure(values, _ahead_by(values, ROUNDER), "roundness", "round", shown)
 

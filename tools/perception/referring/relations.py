@@ -7,6 +7,7 @@ else a person is to choose from the matches.
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -257,7 +258,9 @@ def _ordering_steps(things: Things, query: Description, others: Others) -> list[
     """What orders the things that fit: nearness, then the picks, or else the shade."""
     relations = query.relations if isinstance(query, Query) else ()
     steps = [
-        _Step(f"nearest to {things.candidates[other].id}", _nearest_to(things, other))
+        _Step(
+            f"nearest to {things.candidates[other].id}", partial(rank_nearest, things, other=other)
+        )
         for relation, (other, *_) in zip(relations, others, strict=True)
         if relation.kind == "nearest"
     ]
@@ -267,10 +270,6 @@ def _ordering_steps(things: Things, query: Description, others: Others) -> list[
         extreme = Pick(by="darkest" if query.shade == "dark" else "lightest")
         steps.append(_Step(extreme.by, _pick(things, extreme)))
     return steps
-
-
-def _nearest_to(things: Things, other: int) -> Callable[[IntArray], Ranked]:
-    return lambda members: rank_nearest(things, members, other)
 
 
 def _pick(things: Things, pick: Pick) -> Callable[[IntArray], Ranked]:

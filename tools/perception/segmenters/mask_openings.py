@@ -4,8 +4,6 @@ GrabCut learns the ground inside a loop as one of the thing's own colours. On pl
 be told apart; on a patterned one a window or a marking looks just the same, and stays.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

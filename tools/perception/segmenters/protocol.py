@@ -1,6 +1,6 @@
 """What a segmenter is: a picture and a prompt go in, a mask and its confidence come out."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -22,13 +22,11 @@ class Segmentation:
         confidence: in [0, 1], compared with the threshold t; what it is made of is the
             segmenter's choice, but never a claim about accuracy.
         parts: the cues in [0, 1] that the confidence combines, by name.
-        box: x0, y0, x1, y1 in pixels, as given or found.
     """
 
     mask: NDArray[np.bool_]
     confidence: float
     parts: Mapping[str, float]
-    box: tuple[float, float, float, float]
 
 
 class Segmenter(Protocol):
@@ -62,6 +60,3 @@ class Segmenter(Protocol):
                 y down, pixel centres at .0. Boxes and outlines may reach beyond the picture.
         """
         ...
-
-
-SegmenterFactory = Callable[[], Segmenter]

@@ -4,8 +4,6 @@ A click says where a thing is but not how large it is. The few regions with cont
 their edge are the proposals that the segmentation proper then has to confirm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
@@ -206,10 +204,15 @@ def ends_inside(mask: Mask, window: Window) -> bool:
 def region_score(mask: Mask, window: Window) -> float:
     """How much a region looks like a thing: edge contrast, compactness and, weakly, size."""
     contrast = _edge_contrast(window.features.astype(np.float32), mask)
-    compact = solidity(np.argwhere(mask), int(np.count_nonzero(mask)))
+    compact = mask_solidity(mask)
     inside = BORDER_DISCOUNT ** int(touches_border(mask).sum())
     clear = contrast / (contrast + CLEAR_CONTRAST)
     return clear * compact * inside * window.picture_area(mask) ** SIZE_PREFERENCE
+
+
+def mask_solidity(mask: Mask) -> float:
+    """Share of its convex hull that a mask fills."""
+    return solidity(np.argwhere(mask), int(np.count_nonzero(mask)))
 
 
 def solidity(pixels: npt.NDArray[np.integer], area: int) -> float:

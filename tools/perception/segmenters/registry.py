@@ -1,11 +1,12 @@
 """The segmenters by name: those built in, and those of packages with `formup.segmenters`."""
 
+from collections.abc import Callable
 from functools import cache
 
 from ...registry import Registry
-from .protocol import Segmenter, SegmenterFactory
+from .protocol import Segmenter
 
-SEGMENTERS = Registry[SegmenterFactory](
+SEGMENTERS = Registry[Callable[[], Segmenter]](
     "segmenter",
     "formup.segmenters",
     {"grabcut": "formup.tools.perception.segmenters.grabcut_segmenter:GrabCutSegmenter"},

@@ -4,8 +4,6 @@ Pointing with a box, points or a rough outline is enough for classical segmentat
 real photographs, so formup runs with no download and no GPU.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -17,7 +15,7 @@ from . import grabcut as gc
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
 from .mask_openings import cut_openings
 from .protocol import Segmentation
-from .region_growing import Region, box_iou, edge_support, pin, propose, solidity
+from .region_growing import Region, box_iou, edge_support, mask_solidity, pin, propose
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
 RING = 0.1
@@ -137,20 +135,18 @@ def segment_points(
     whole_objects = _tried_regions(pixels, propose_whole(pixels, points, PROPOSALS), points, off)
     if best is not None:
         whole_objects = [tried for tried in whole_objects if _is_whole_of(tried, best)]
-    solid = [
-        tried
-        for tried in whole_objects
-        if solidity(np.argwhere(tried.mask), int(np.count_nonzero(tried.mask))) >= SOLID
-    ]
+    solid = [tried for tried in whole_objects if mask_solidity(tried.mask) >= SOLID]
     chosen = max(solid, key=lambda tried: tried.distinctness, default=best)
     if chosen is None:
-        return _empty_segmentation((pixels.shape[0], pixels.shape[1]), _bounding_box(points))
+        return _empty_segmentation((pixels.shape[0], pixels.shape[1]))
     proposer = propose if chosen is best else propose_whole
     agreement = _reproposal_agreement(pixels, chosen.prompt, chosen.mask, proposer)
     found = _rated(chosen.prompt, chosen.mask, agreement)
     if chosen is best and whole_objects:  # it may well be a part of one of them
         rival = max(tried.distinctness for tried in whole_objects)
-        return _with_rival(found, chosen.distinctness / (chosen.distinctness + rival))
+        share = chosen.distinctness / (chosen.distinctness + rival)
+        parts = {**found.parts, "unrivalled": share}
+        return Segmentation(found.mask, found.confidence * share, parts)
     return found
 
 
@@ -177,7 +173,7 @@ def _object_mask(prompt: _Prompt, trimap: Bytes) -> Mask:
 def _rated(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
     window = prompt.window
     if not mask.any() or mask.all():
-        return _empty_segmentation(window.picture, prompt.box)
+        return _empty_segmentation(window.picture)
     mask = cut_openings(window.features, mask, prompt.positive)
     flooded = gc.watershed(window.features, prompt.core, prompt.trimaps[0])
     parts = {
@@ -190,11 +186,11 @@ def _rated(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
     # Cues that agree are worth nothing where the mask ends in the middle of nowhere.
     parts["edge_support"] = edge_support(window.features, mask)
     confidence = agreed if prompt.drawn else agreed * parts["edge_support"] ** EDGE_WEIGHT
-    return Segmentation(window.to_picture(mask), confidence, parts, prompt.box)
+    return Segmentation(window.to_picture(mask), confidence, parts)
 
 
-def _empty_segmentation(picture: tuple[int, int], box: Box) -> Segmentation:
-    return Segmentation(np.zeros(picture, dtype=np.bool_), 0.0, {}, box)
+def _empty_segmentation(picture: tuple[int, int]) -> Segmentation:
+    return Segmentation(np.zeros(picture, dtype=np.bool_), 0.0, {})
 
 
 def _prompt_fit(prompt: _Prompt, mask: Mask) -> float:
@@ -278,11 +274,6 @@ def _is_whole_of(outer: _Trial, part: _Trial) -> bool:
     held = int(np.count_nonzero(shared & outer.mask)) >= HELD * int(np.count_nonzero(shared))
     larger = outer.area >= MUCH_LARGER * part.area
     return held and larger and outer.distinctness >= RIVAL * part.distinctness
-
-
-def _with_rival(found: Segmentation, share: float) -> Segmentation:
-    parts = {**found.parts, "unrivalled": share}
-    return Segmentation(found.mask, found.confidence * share, parts, found.box)
 
 
 def _cut_short(prompt: _Prompt, mask: Mask) -> bool:

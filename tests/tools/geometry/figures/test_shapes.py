@@ -12,14 +12,13 @@ from formup.tools.geometry.figures.shapes import (
     arc_sketch,
     fitted,
     grid_sketch,
-    letters_sketch,
     line_sketch,
-    outlined_letters_sketch,
     polygon_sketch,
     polyline_sketch,
     star_sketch,
 )
 from formup.tools.geometry.figures.strokes import split_at_crossings, spread, stretches
+from formup.tools.geometry.figures.typeface import letter_outlines
 from formup.tools.geometry.outline import FloatArray, distances
 from formup.tools.geometry.sampling import min_spacing
 from hypothesis import given, settings
@@ -33,9 +32,9 @@ SKETCHES = {
     "circle": arc_sketch(),
     "hexagon": polygon_sketch(6),
     "star": star_sketch(5),
-    "UP": letters_sketch("UP"),
-    "go 42": letters_sketch("go 42"),
-    "R8 in outline": outlined_letters_sketch("R8"),
+    "UP": polyline_sketch(*letter_strokes("UP")),
+    "go 42": polyline_sketch(*letter_strokes("go 42")),
+    "R8 in outline": polyline_sketch(*letter_outlines("R8")),
     "zigzag": polyline_sketch(np.array([(0.0, 0), (30, 40), (60, 0), (90, 40), (20, 20)])),
 }
 NECK = {"R8 in outline": 25.0}
@@ -51,7 +50,9 @@ def lines_of(sketch: Sketch) -> shapely.MultiLineString:
 @pytest.mark.parametrize("glyph", stroke_glyphs())
 @pytest.mark.parametrize("height", [3.0, 97.3, 4000.0])
 def test_a_letter_is_in_one_piece_wherever_it_lies(glyph: str, height: float) -> None:
-    drawn = fitted(letters_sketch(glyph), (11.3, 7.7, 11.3 + height, 7.7 + height))
+    drawn = fitted(
+        polyline_sketch(*letter_strokes(glyph)), (11.3, 7.7, 11.3 + height, 7.7 + height)
+    )
     parts = split_at_crossings(drawn.lines)
     assert len(parts) == WALKS.get(glyph, len(split_at_crossings(letter_strokes(glyph))))
     joined = shapely.union_all([shapely.LineString(p).buffer(height / 1000) for p in parts])
@@ -63,7 +64,10 @@ def test_a_letter_is_in_one_piece_wherever_it_lies(glyph: str, height: float) ->
 
 def test_every_letter_looks_like_itself_alone() -> None:
     """No two glyphs lie within a fifth of the height of each other's lines all along."""
-    drawn = {g: lines_of(fitted(letters_sketch(g), (0, 0, 100, 100))) for g in stroke_glyphs()}
+    drawn = {
+        g: lines_of(fitted(polyline_sketch(*letter_strokes(g)), (0, 0, 100, 100)))
+        for g in stroke_glyphs()
+    }
     alike = {
         (a, b)
         for a, one in drawn.items()
@@ -94,7 +98,7 @@ def test_robots_stand_on_the_lines_and_no_gap_is_much_wider_than_another(name: s
 
 @pytest.mark.parametrize("n", [10, 24, 60])
 def test_ends_and_corners_come_first(n: int) -> None:
-    star, word = fitted(star_sketch(5), BOX), fitted(letters_sketch("LT"), BOX)
+    star, word = fitted(star_sketch(5), BOX), fitted(polyline_sketch(*letter_strokes("LT")), BOX)
     tips = star.lines[0][:-1]
     ends = np.array([word.lines[0][0], word.lines[0][1], word.lines[0][2], word.lines[2][1]])
     for corners, lines in ((tips, star.lines), (ends, word.lines)):

@@ -88,7 +88,6 @@ def test_four_vertices_are_a_rotated_box():
 def test_a_point_finds_the_disc(where: tuple[int, int]):
     found = segment_points(scene(DISC), [where])
     assert iou(found.mask, DISC) > 0.93
-    assert found.box == pytest.approx(box_around(DISC), abs=8)
 
 
 def test_points_on_two_colours_find_the_whole():
