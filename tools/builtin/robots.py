@@ -37,7 +37,7 @@ async def with_robots(context: Context, node: PlanNode) -> World:
         points = plan.formation.points
         found = await in_thread(lambda: assign_robots(poses, points))
     except FleetSizeError as error:
-        if error.available < error.needed and context.settings.fleet != "simulated":
+        if context.settings.fleet != "simulated":
             raise ToolError(str(error), "too_many_robots") from None
         return world.with_plan(node)  # more than are simulated can be planned
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])

@@ -144,9 +144,7 @@ def open_fleet(request: FleetRequest) -> SimulatedFleet:
     if request.robots > MAX_ROBOTS:
         raise FleetSizeError(
             f"{request.robots} robots can be placed and certified, but motion is simulated only "
-            f"up to {MAX_ROBOTS} so far: the plan stands, nothing was moved.",
-            available=MAX_ROBOTS,
-            needed=request.robots,
+            f"up to {MAX_ROBOTS} so far: the plan stands, nothing was moved."
         )
     speed = SPEED_SHARE * math.hypot(*request.size)
     radius = request.radius or None
