@@ -108,11 +108,7 @@ class Assigned:
 
 
 def assign_robots(poses: Sequence[Pose], places: FloatArray) -> Assigned:
-    """The robots for all places with the least sum of squared ways; others stay idle.
-
-    Args:
-        poses: of all robots of the fleet.
-        places: (n, 2) px.
+    """The robots for all places, (n, 2) px, with the least sum of squared ways; others stay idle.
 
     Raises:
         FleetSizeError: the fleet has fewer robots than there are places.
@@ -147,9 +143,6 @@ async def deploy(
     fleet that are not named stay where they are and are driven around.
 
     Args:
-        plan: its places.
-        site: the outlines of its targets, and the picture.
-        fleet: that has the robots.
         robots: ids; robot i takes place i.
         watch: is called with the poses of the whole fleet whenever they have been observed; last,
             also after a failure or before CancelledError goes on, with where they ended.

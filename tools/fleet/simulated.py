@@ -189,13 +189,7 @@ def _staying(request: FleetRequest) -> dict[str, Pose]:
 
 
 def spread_starts(n: int, frame: Frame, solid: BaseGeometry, radius: float) -> FloatArray:
-    """Starting positions along the picture's border, off what is solid, evenly apart, (n, 2).
-
-    Args:
-        n: how many.
-        frame: the picture.
-        solid: what robots may not stand on.
-        radius: of a robot, px.
+    """Starting positions along the picture's border, off what is solid, evenly apart, (n, 2) px.
 
     Raises:
         InputError: there is no room for n robots.

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict
 
 from ..errors import ToolError
 from ..geometry.outline import FloatArray
@@ -65,7 +64,7 @@ class Formation(Value):
         return tuple(self.robots[i] for group in self.members for i in group)
 
 
-class Shortfall(BaseModel):
+class Shortfall(Value):
     """What a partial plan falls short of: robots, or the clearance asked for.
 
     Attributes:
@@ -75,8 +74,6 @@ class Shortfall(BaseModel):
         clearance: the greatest found that can be held instead, px.
         sentence: the same in words.
     """
-
-    model_config = ConfigDict(frozen=True)
 
     asked: int
     placed: int
@@ -143,8 +140,6 @@ def make_plan(
     """Write out the contract's defaults, place the robots unless placed, and certify.
 
     Args:
-        contract: as stated.
-        site: outlines of every target it names, and the picture's size.
         scene_version: of the scene the outlines were measured in.
         positions: (N, 2) image pixels, in order over all groups; None to place them here.
 
@@ -178,6 +173,4 @@ def scene_version(
 ) -> str:
     """Hash of what a certificate depends on: the picture, every outline in it, its scale if any."""
     scale = () if metres_per_pixel is None else (metres_per_pixel,)
-    content = [picture_sha256, dict(sorted(outlines.items())), *scale]
-    text = json.dumps(content, separators=(",", ":"))
-    return "s-" + hashlib.sha256(text.encode()).hexdigest()[:10]
+    return "s-" + _digest([picture_sha256, dict(outlines), *scale])

@@ -156,7 +156,8 @@ class _Ground:
     ) -> list[FloatArray]:
         """Shortest paths around the obstacles and around all of some bodies."""
         ways = np.stack([starts, goals], axis=1)
-        paths, straight = list(ways), shapely.linestrings(ways)
+        paths = list(ways)
+        straight = np.asarray(shapely.linestrings(ways), dtype=object)
         left = np.arange(len(paths))
         keeps = self._keeps(np.concatenate([starts, goals]))
         for keep, bounded in [*((keep, True) for keep in keeps), (keeps[-1], False)]:
