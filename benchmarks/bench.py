@@ -241,11 +241,7 @@ def _bare_inside(context: Context) -> Work:
     random = np.random.default_rng(0)
     cells = random.uniform((x0, y0), (x1, y1), (6000, 2))
     robots = random.uniform((x0, y0), (x1, y1), (ROBOTS, 2))
-
-    def work() -> object:
-        return [cKDTree(robots).query(cells) for _ in range(4 * 40)]
-
-    return work
+    return lambda: [cKDTree(robots).query(cells) for _ in range(4 * 40)]
 
 
 def _bare_between(context: Context) -> Work:

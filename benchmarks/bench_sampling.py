@@ -5,11 +5,12 @@ how fast the time grows with the number of robots and of vertices.
 """
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
+from shapely.geometry.base import BaseGeometry
 
 from ..tools.formation.checking.check import certify
 from ..tools.formation.contract import Contract, Group, with_defaults
@@ -138,26 +139,24 @@ def _checked(relation: str, outline: Outline, n: int) -> tuple[Work, FloatArray]
 
 def _bare_around(outline: Outline, points: FloatArray) -> Work:
     """Distances to the outline and to the ring, and to the nearest other robot."""
-    loop = shapely.LineString(ring(outline, 100, 200).lines[0])
-
-    def work() -> object:
-        places = np.asarray(shapely.points(points), dtype=object)
-        near = [nearest_segments(line, places) for line in (outline.filled, loop)]
-        return near, cKDTree(points).query(points, k=2)
-
-    return work
+    lines = outline.filled, shapely.LineString(ring(outline, 100, 200).lines[0])
+    return lambda: (_near(lines, points), cKDTree(points).query(points, k=2))
 
 
 def _bare_in(outline: Outline, points: FloatArray) -> Work:
     """Distances to the outline and to the nearest other robot, and how far all ground is."""
 
     def work() -> object:
-        places = np.asarray(shapely.points(points), dtype=object)
-        near = nearest_segments(outline.polygon, places)
         cells = cells_of(outline.polygon, len(points))
+        near = _near((outline.polygon,), points)
         return near, cKDTree(points).query(points, k=2), cKDTree(points).query(cells)
 
     return work
+
+
+def _near(lines: Sequence[BaseGeometry], points: FloatArray) -> object:
+    places = np.asarray(shapely.points(points), dtype=object)
+    return [nearest_segments(line, places) for line in lines]
 
 
 def _growth() -> Iterator[str]:

@@ -18,7 +18,7 @@ from ..evals.experiments.gate import Paired, gate
 from ..evals.statistics.intervals import ICC, Interval, wilson
 from ..tools.geometry.outline import FloatArray
 
-COMPARISONS = 2000
+COMPARISONS, SEED = 2000, 0
 SIZES = ((15, 2), (15, 10), (30, 10), (60, 10), (150, 10))
 """Tasks and trials of each."""
 MEAN, TASK_SD = 0.7, 0.05
@@ -56,7 +56,6 @@ def simulate(
     *,
     task_sd: float = 0.0,
     comparisons: int = COMPARISONS,
-    seed: int = 0,
 ) -> Blocked:
     """Put simulated comparisons through the gate.
 
@@ -64,7 +63,7 @@ def simulate(
         regression: what the new version loses on every task, as far as its rate goes.
         task_sd: spread of the effect it has on each task but those that must pass.
     """
-    random = np.random.default_rng([seed, tasks, trials, round(1000 * regression)])
+    random = np.random.default_rng([SEED, tasks, trials, round(1000 * regression)])
     paired = (_versions(random, tasks, trials, regression, task_sd) for _ in range(comparisons))
     return _judged(tasks, trials, regression, paired)
 
@@ -108,9 +107,7 @@ def _paired(
     return Paired(names, pairs, score, invalid, tokens, must_pass)
 
 
-def planted(
-    tasks: int, trials: int, share: float, *, comparisons: int = COMPARISONS, seed: int = 0
-) -> Blocked:
+def planted(tasks: int, trials: int, share: float, *, comparisons: int = COMPARISONS) -> Blocked:
     """Put a version through the gate that fails in a share of trials which the old one all passes.
 
     The lapse befalls any trial alike, as do those of evals/experiments/simulated_model.py.
@@ -118,7 +115,7 @@ def planted(
     Args:
         share: of trials that lapse.
     """
-    random = np.random.default_rng([seed, tasks, trials, round(1000 * share)])
+    random = np.random.default_rng([SEED, tasks, trials, round(1000 * share)])
     nothing, tokens = np.zeros((2, tasks)), np.full((2, tasks), TOKENS)
 
     def versions() -> Paired:

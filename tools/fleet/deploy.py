@@ -210,12 +210,12 @@ class _Drive:
             while not self._arrived() and not self._fleet.stopped and corrections < CORRECTIONS:
                 corrections += 1
                 await self._drive(self._motion())
-        except asyncio.CancelledError:
-            await self._observe_after_failure()
+        except (asyncio.CancelledError, FleetError) as error:
+            with suppress(FleetError):
+                self._saw(await self._fleet.observe())
+            if isinstance(error, FleetError):
+                return self._report(corrections, error)
             raise
-        except FleetError as error:
-            await self._observe_after_failure()
-            return self._report(corrections, error)
         return self._report(corrections)
 
     async def _drive(self, motion: Motion) -> None:
@@ -235,10 +235,6 @@ class _Drive:
                 missing,
             )
         self._saw(poses)
-
-    async def _observe_after_failure(self) -> None:
-        with suppress(FleetError):
-            self._saw(await self._fleet.observe())
 
     def _saw(self, poses: tuple[Pose, ...]) -> None:
         """Keep poses, and thin the frames to every second one whenever there are too many."""

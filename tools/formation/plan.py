@@ -7,6 +7,7 @@ scene version. Whoever approves an id approves exactly that; a changed scene voi
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -109,7 +110,7 @@ class Plan(Value):
         return "p-" + _digest(content)
 
     def for_robots(self, taking: Sequence[str], fleet: Sequence[str]) -> "Plan":
-        """The plan with robots named: positions in the fleet's order, findings by robot id.
+        """The plan with robots named and its positions in the fleet's order.
 
         Args:
             taking: the id of the robot that takes each place, in the order of the groups.
@@ -118,17 +119,13 @@ class Plan(Value):
         robots = tuple(name for name in fleet if name in set(taking))
         index = {name: i for i, name in enumerate(robots)}
         places = dict(zip(taking, self.formation.points.tolist(), strict=True))
-        members: list[tuple[int, ...]] = []
-        first = 0
-        for group in self.formation.contract.groups:
-            mine = taking[first : first + group.robots]
-            members.append(tuple(index[name] for name in mine))
-            first += group.robots
+        taken = map(index.__getitem__, taking)
+        members = tuple(tuple(islice(taken, g.robots)) for g in self.formation.contract.groups)
         formation = self.formation.model_copy(
             update={
                 "positions": tuple((x, y) for x, y in map(places.__getitem__, robots)),
                 "robots": robots,
-                "members": tuple(members),
+                "members": members,
             }
         )
         return self.model_copy(update={"formation": formation})

@@ -4,7 +4,6 @@ Code reacts to the kind and reads the numbers; sentences are for people and mode
 """
 
 import json
-from collections.abc import Sequence
 from importlib import resources
 
 from pydantic import ConfigDict, computed_field
@@ -62,12 +61,6 @@ class Finding(Value):
             gap=gap,
             remedy=unknown if self.needed is None else known.format(needed=self.needed),
         )
-
-    def renumbered(self, mapping: Sequence[int]) -> "Finding":
-        """With other robots' numbers, see `Verdict.renumbered`."""
-        robot = None if self.robot is None else mapping[self.robot - 1]
-        others = tuple(mapping[other - 1] for other in self.others)
-        return self.model_copy(update={"robot": robot, "others": others})
 
     def _shown(self, value: float | None) -> str:
         if value is None:

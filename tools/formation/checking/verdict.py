@@ -44,16 +44,6 @@ class Verdict(Value):
     notes: tuple[str, ...] = ()
     escape: Escape | None = None
 
-    def renumbered(self, mapping: Sequence[int]) -> "Verdict":
-        """The verdict on the same positions in another order.
-
-        Args:
-            mapping: by old index, from 0, the new number of that robot, from 1.
-        """
-        return self.model_copy(
-            update={"findings": tuple(f.renumbered(mapping) for f in self.findings)}
-        )
-
 
 @dataclass(frozen=True)
 class Part:
