@@ -8,7 +8,7 @@ import asyncio
 import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -27,7 +27,7 @@ from ..tools.geometry.outline import FloatArray, distances, outline_of
 from ..tools.perception.contours import mask_of_outline
 from ..tools.perception.image import load_picture, picture_from_array
 from ..tools.perception.target_prompt import TargetPrompt
-from .growth import Work, best, growth
+from .growth import Work, beside, best, growth, heading, show
 
 SIZE = (1920, 1080)
 REPEATS = 5
@@ -35,27 +35,30 @@ ROBOTS, PROBES = 24, 1000
 SIDES = (0.25, 0.5, 1, 2)
 """Sides of the pictures for the growth, by those of SIZE."""
 TEAMS = (6, 24, 96)
+FINDING = "k-means, 150 thresholds at 384 px, contours"
+RING = "shapely buffer, interpolate"
+SPREADING = "4 x 40 cKDTree queries of 6000 cells"
+MOVING = "scipy assignment, shapely intersects"
 PLACING = ("sample_along_edges", "sample_inside", "sample_shape", "propose_formation", "deploy")
-Case = tuple[str, dict[str, Any], tuple[str, Work]]
-"""What is called, its arguments, and the bare calls in words and as a function."""
 
 
-def main() -> None:
-    """Print the table and how the times grow."""
+class Case(NamedTuple):
+    """A tool with its arguments, and the bare library calls in words and as a function."""
+
+    tool: str
+    arguments: dict[str, Any]
+    calls: str
+    bare: Work
+
+
+def rows() -> Iterator[str]:
+    """The table and how the times grow."""
     context = _with_plan(_with_targets(SIZE))
-    print(f"{SIZE[0]} x {SIZE[1]} px, CPU milliseconds, best of {REPEATS}")  # noqa: T201
-    print(f"{'tool':20} {'formup':>9} {'bare':>9} {'ratio':>7}  bare calls")  # noqa: T201
+    yield f"{SIZE[0]} x {SIZE[1]} px, CPU milliseconds, best of {REPEATS}"
+    yield heading("tool", "bare calls")
     for case in _cases(context):
-        name, _, (words, bare) = case
-        ours, theirs = _timed(context, case), best(bare, REPEATS)
-        print(f"{name:20} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.1f}  {words}")  # noqa: T201
-    print(f"\n{'growth':28} fitted")  # noqa: T201
-    for line in _growths(context):
-        print(line, flush=True)  # noqa: T201
-
-
-def _growths(context: Context) -> Iterator[str]:
-    """Every tool against the picture's pixels; those that place robots against their number."""
+        yield beside(case.tool, _timed(context, case), best(case.bare, REPEATS), case.calls)
+    yield f"\n{'growth':28} fitted"
     sizes = [(round(SIZE[0] * share), round(SIZE[1] * share)) for share in SIDES]
     pixels = [width * height for width, height in sizes]
     yield from _growth("pixels", pixels, [_with_plan(_with_targets(size)) for size in sizes])
@@ -66,15 +69,14 @@ def _growth(
     what: str, numbers: Sequence[int], contexts: list[Context], names: Sequence[str] | None = None
 ) -> Iterator[str]:
     for cases in zip(*map(_cases, contexts), strict=True):
-        if names is None or cases[0][0] in names:
+        if names is None or cases[0].tool in names:
             found = [_timed(c, case) for c, case in zip(contexts, cases, strict=True)]
-            yield growth(cases[0][0], what, numbers, found)
+            yield growth(cases[0].tool, what, numbers, found)
 
 
 def _timed(context: Context, case: Case) -> float:
-    name, arguments, _ = case
-    tool = next(t for t in TOOLS if t.name == name.partition(" ")[0])
-    return best(lambda: asyncio.run(tool.call(_anew(context), arguments)), REPEATS)
+    tool = next(t for t in TOOLS if t.name == case.tool.partition(" ")[0])
+    return best(lambda: asyncio.run(tool.call(_anew(context), case.arguments)), REPEATS)
 
 
 def _anew(context: Context) -> Context:
@@ -112,8 +114,11 @@ def _after(context: Context, name: str, arguments: dict[str, Any]) -> Context:
 
 def _with_plan(context: Context, robots: int = ROBOTS) -> Context:
     """The context with a plan around the red car."""
-    group = {"relation": "around", "targets": ["t1"], "robots": robots}
-    return _after(context, "propose_formation", {"contract": {"groups": [group]}})
+    return _after(context, "propose_formation", {"contract": {"groups": [_group(robots)]}})
+
+
+def _group(robots: int) -> dict[str, Any]:
+    return {"relation": "around", "targets": ["t1"], "robots": robots}
 
 
 def _cases(context: Context) -> list[Case]:
@@ -121,62 +126,37 @@ def _cases(context: Context) -> list[Case]:
     box = [round(v) for v in context.world.target("t1").box]
     plan = context.world.plan().plan
     robots = plan.formation.contract.robots
-    group = {"relation": "around", "targets": ["t1"], "robots": robots}
+    group = _group(robots)
     probes = np.random.default_rng(0).uniform((0, 0), size, (PROBES, 2))
-    points = plan.formation.points
-    return [
-        *_seeing_cases(context, box),
-        (
-            "describe_shape",
-            {"target": "t1"},
-            ("findContours, approxPolyDP, minAreaRect", _bare_describe(context)),
-        ),
+    cut = "bilateral, 5 x GrabCut at 160 px"
+    red = {"colours": ["red"], "picks": [{"by": "largest"}]}
+    between = {"kind": "between", "n": robots // 3, "targets": ["t1", "t2"]}
+    one = {"target": "t1"}
+    cases: list[tuple[str, dict[str, Any], str, Work]] = [
+        ("look", {}, "Pillow resize, PNG", lambda: _bare_look(context)),
+        ("locate_object", {}, cut, lambda: _bare_segment(context, box)),
+        ("locate_object query", {"query": red}, FINDING, lambda: _bare_candidates(context)),
+        ("segment", {"id": "t1", "box": box}, cut, lambda: _bare_segment(context, box)),
+        ("describe_shape", one, "findContours, approxPolyDP, minAreaRect", _bare_describe(context)),
         (
             "check_point",
-            {"target": "t1", "points": probes.tolist()},
-            ("shapely contains, distance", _bare_check(context, probes)),
+            one | {"points": probes.tolist()},
+            "shapely contains, distance",
+            _bare_check(context, probes),
         ),
-        (
-            "sample_along_edges",
-            {"target": "t1", "n": robots},
-            ("shapely buffer, interpolate", _bare_ring(context)),
-        ),
-        (
-            "sample_inside",
-            {"target": "t1", "n": robots},
-            ("4 x 40 cKDTree queries of 6000 cells", _bare_inside(context)),
-        ),
-        (
-            "sample_shape",
-            {"kind": "between", "n": robots // 3, "targets": ["t1", "t2"]},
-            ("shapely difference, interpolate", _bare_between(context)),
-        ),
-        ("measure", {"a": "t1", "b": "t2"}, ("shapely distance", _bare_measure(context))),
+        ("sample_along_edges", one | {"n": robots}, RING, _bare_ring(context)),
+        ("sample_inside", one | {"n": robots}, SPREADING, _bare_inside(context)),
+        ("sample_shape", between, "shapely difference, interpolate", _bare_between(context)),
+        ("measure", {"a": "t1", "b": "t2"}, "shapely distance", _bare_measure(context)),
         (
             "propose_formation",
             {"contract": {"groups": [group]}},
-            ("shapely buffer, distance; cKDTree", _bare_propose(context)),
+            "shapely buffer, distance; cKDTree",
+            _bare_propose(context),
         ),
-        (
-            "deploy",
-            {"plan_id": plan.id},
-            ("scipy assignment, shapely intersects", _bare_deploy(context, points)),
-        ),
+        ("deploy", {"plan_id": plan.id}, MOVING, _bare_deploy(context, plan.formation.points)),
     ]
-
-
-def _seeing_cases(context: Context, box: list[int]) -> list[Case]:
-    cut = ("bilateral, 5 x GrabCut at 160 px", lambda: _bare_segment(context, box))
-    return [
-        ("look", {}, ("Pillow resize, PNG", lambda: _bare_look(context))),
-        ("locate_object", {}, cut),
-        (
-            "locate_object query",
-            {"query": {"colours": ["red"], "picks": [{"by": "largest"}]}},
-            ("k-means, 150 thresholds at 384 px, contours", lambda: _bare_candidates(context)),
-        ),
-        ("segment", {"id": "t1", "box": box}, cut),
-    ]
+    return [Case(*case) for case in cases]
 
 
 def _bare_look(context: Context) -> bytes:
@@ -261,11 +241,7 @@ def _bare_inside(context: Context) -> Work:
     random = np.random.default_rng(0)
     cells = random.uniform((x0, y0), (x1, y1), (6000, 2))
     robots = random.uniform((x0, y0), (x1, y1), (ROBOTS, 2))
-
-    def work() -> object:
-        return [cKDTree(robots).query(cells) for _ in range(4 * 40)]
-
-    return work
+    return lambda: [cKDTree(robots).query(cells) for _ in range(4 * 40)]
 
 
 def _bare_between(context: Context) -> Work:
@@ -308,4 +284,4 @@ def _bare_deploy(context: Context, goals: FloatArray) -> Work:
 
 
 if __name__ == "__main__":
-    main()
+    show(rows())

@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 
 from ..tools.geometry.assignment import assign
 from ..tools.geometry.outline import FloatArray
-from .growth import best, growth, peak
+from .growth import best, growth, peak, show
 
 PITCH = 10.0
 """Distance of neighbours in the block robots start from, px."""
@@ -32,12 +32,6 @@ CASES = (
     ("distant", 10_000),
     ("overlapping", 10_000),
 )
-
-
-def main() -> None:
-    """Print the rows."""
-    for row in rows():
-        print(row, flush=True)  # noqa: T201
 
 
 def rows() -> Iterator[str]:
@@ -115,4 +109,4 @@ def _bare(starts: FloatArray, goals: FloatArray) -> NDArray[np.intp]:
 
 
 if __name__ == "__main__":
-    main()
+    show(rows())

@@ -21,7 +21,7 @@ from ..tools.geometry.cages.rigid import Obstacles, body_of
 from ..tools.geometry.curves import ring
 from ..tools.geometry.outline import FloatArray, make_outline
 from ..tools.geometry.sampling import along_curve
-from .growth import Work, best, growth, peak, times
+from .growth import Work, beside, best, growth, heading, peak, show, times
 
 REPEATS = 5
 SIZE = 100.0
@@ -35,19 +35,22 @@ COPIES = 40
 """As many bodies, each a little aside, so that nothing is kept from the call before."""
 
 
-def main() -> None:
-    """Print the tables."""
+def rows() -> Iterator[str]:
+    """The tables."""
     region = make_outline(np.asarray(ELL) * SIZE + 300).filled
-    print(f"CPU milliseconds, best of {REPEATS}; disc: 60 corners; flood: an L of 6 corners")  # noqa: T201
-    print(f"{'test':32} {'formup':>9} {'bare':>9} {'ratio':>7}  state")  # noqa: T201
-    discs = [_disc(_coin(60), n) for n in COUNTS]
+    yield f"CPU milliseconds, best of {REPEATS}; disc: 60 corners; flood: an L of 6 corners"
+    yield heading("test", "state")
+    discs: list[float] = []
+    for n in COUNTS:
+        ours, bare, state = _disc(_coin(60), n)
+        discs.append(ours)
+        yield beside(f"disc, {n} robots", ours, bare, state)
     for n in FLOODED:
         for levels in (QUICK, THOROUGH):
-            _flood(region, n, levels)
-    print(f"\n{'growth':28} fitted")  # noqa: T201
-    print(growth("disc", "robots", COUNTS, discs))  # noqa: T201
-    for line in _growths(region):
-        print(line, flush=True)  # noqa: T201
+            yield _flood(region, n, levels)
+    yield f"\n{'growth':28} fitted"
+    yield growth("disc", "robots", COUNTS, discs)
+    yield from _growths(region)
 
 
 def _growths(region: Polygon) -> Iterator[str]:
@@ -88,7 +91,8 @@ def _level(region: Polygon, robots: FloatArray) -> Work:
     return lambda: flood(body, obstacles, 1, escapes=False)
 
 
-def _disc(region: Polygon, n: int) -> float:
+def _disc(region: Polygon, n: int) -> tuple[float, float, str]:
+    """Milliseconds of the disc test and of the bare calls, and what the test says."""
     robots = _around(region, n)
     moved = [(translate(region, x), robots + np.array([x, 0.0])) for x in np.arange(COPIES) / 8]
     turn, again = itertools.cycle(moved), itertools.cycle(moved)
@@ -101,17 +105,16 @@ def _disc(region: Polygon, n: int) -> float:
 
     ours = best(lambda: [cage(*next(turn), levels=0) for _ in range(inner)], REPEATS) / inner
     theirs = best(lambda: [bare(*next(again)) for _ in range(inner)], REPEATS) / inner
-    _row(f"disc, {n} robots", ours, theirs, cage(region, robots, levels=0).state)
-    return ours
+    return ours, theirs, cage(region, robots, levels=0).state
 
 
-def _flood(region: Polygon, n: int, levels: int) -> None:
+def _flood(region: Polygon, n: int, levels: int) -> str:
     robots = _around(region, n)
     found = cage(region, robots, levels=levels)
     how = f"{found.state}, by the {found.test}" if found.test else found.state
     ours = best(lambda: cage(region, robots, levels=levels), REPEATS)
     bare = best(_bare_flood(region, robots), REPEATS)
-    _row(f"flood, {n} robots, {levels} levels", ours, bare, how)
+    return beside(f"flood, {n} robots, {levels} levels", ours, bare, how)
 
 
 def _around(region: Polygon, n: int) -> FloatArray:
@@ -142,9 +145,5 @@ def _bare_flood(region: Polygon, robots: FloatArray) -> Work:
     return work
 
 
-def _row(name: str, ours: float, theirs: float, state: str) -> None:
-    print(f"{name:32} {ours:9.2f} {theirs:9.2f} {ours / theirs:7.1f}  {state}", flush=True)  # noqa: T201
-
-
 if __name__ == "__main__":
-    main()
+    show(rows())

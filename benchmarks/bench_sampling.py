@@ -5,11 +5,12 @@ how fast the time grows with the number of robots and of vertices.
 """
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
+from shapely.geometry.base import BaseGeometry
 
 from ..tools.formation.checking.check import certify
 from ..tools.formation.contract import Contract, Group, with_defaults
@@ -20,7 +21,7 @@ from ..tools.geometry.lloyd import cells_of, grid
 from ..tools.geometry.outline import FloatArray, Outline, make_outline, nearest_segments
 from ..tools.geometry.rings import equal_chords
 from ..tools.geometry.sampling import along_curve, nearest
-from .growth import Work, best, growth, peak, times
+from .growth import Work, beside, best, growth, heading, peak, show, times
 
 REPEATS = 3
 SIZE = 12_000.0
@@ -31,15 +32,14 @@ HEXAGON = 5 / (18 * 3**0.5)
 """Energy of a hexagonal lattice, by area squared over the number of robots (Fejes Toth)."""
 
 
-def main() -> None:
-    """Print the tables."""
+def rows() -> Iterator[str]:
+    """The tables."""
     outline = bumpy(VERTICES)
-    print(f"CPU milliseconds, best of {REPEATS}; an outline of {VERTICES} vertices")  # noqa: T201
-    _placing(outline)
-    _checking(outline)
-    print(f"\n{'growth':28} fitted")  # noqa: T201
-    for line in _growth():
-        print(line, flush=True)  # noqa: T201
+    yield f"CPU milliseconds, best of {REPEATS}; an outline of {VERTICES} vertices"
+    yield from _placing(outline)
+    yield from _checking(outline)
+    yield f"\n{'growth':28} fitted"
+    yield from _growth()
 
 
 def bumpy(vertices: int) -> Outline:
@@ -56,29 +56,25 @@ def energy_ratio(outline: Outline, points: FloatArray) -> float:
     return mean * outline.area / (HEXAGON * outline.area**2 / len(points))
 
 
-def _placing(outline: Outline) -> None:
+def _placing(outline: Outline) -> Iterator[str]:
     plain = make_outline(shapely.get_coordinates(outline.filled.simplify(SIZE / 200)))
     loop = ring(outline, 100, 200)
     few = len(plain.polygon.exterior.coords) - 1
-    rows: list[tuple[str, Work, Work]] = [
-        (
-            f"around, 8, {few} vertices",
-            _eight(plain),
-            _bare_ring(plain, 8),
-        ),
+    cases: list[tuple[str, Work, Work]] = [
+        (f"around, 8, {few} vertices", _eight(plain), _bare_ring(plain, 8)),
         ("around, 8", _eight(outline), _bare_ring(outline, 8)),
         ("8 on the ring alone", lambda: along_curve(loop, 8), _bare_places(loop, 8)),
         (f"{MANY} on the ring alone", lambda: along_curve(loop, MANY), _bare_places(loop, MANY)),
         ("100 at equal chords", lambda: equal_chords(loop, 100), _bare_places(loop, 100)),
     ]
-    print(f"{'placing':28} {'formup':>10} {'bare':>10}")  # noqa: T201
-    for name, work, bare in rows:
-        print(f"{name:28} {best(work, REPEATS):10.2f} {best(bare, REPEATS):10.2f}")  # noqa: T201
+    yield heading("placing")
+    for name, work, bare in cases:
+        yield beside(name, best(work, REPEATS), best(bare, REPEATS))
     for n in (6, 50, 100, 1000, MANY):
         ratio = energy_ratio(outline, inside(outline, n, 10, SIZE, 0.0))
         ours = best(_inside(outline, n), REPEATS)
         theirs = best(_bare_lloyd(outline, n), REPEATS)
-        print(f"{f'inside, {n}':28} {ours:10.2f} {theirs:10.2f}   energy {ratio:.3f}")  # noqa: T201
+        yield beside(f"inside, {n}", ours, theirs, f"energy {ratio:.3f}")
 
 
 def _bare_ring(outline: Outline, n: int) -> Work:
@@ -123,13 +119,12 @@ def _inside(outline: Outline, n: int) -> Work:
     return lambda: inside(outline, n, next(margins), SIZE, 0.0)
 
 
-def _checking(outline: Outline) -> None:
-    print(f"\ncheck of {MANY:18} {'formup':>10} {'bare':>10} {'ratio':>7}")  # noqa: T201
+def _checking(outline: Outline) -> Iterator[str]:
+    yield "\n" + heading(f"check of {MANY}")
     for relation in ("around", "inside"):
         work, points = _checked(relation, outline, MANY)
         bare = _bare_around(outline, points) if relation == "around" else _bare_in(outline, points)
-        ours, theirs = best(work, REPEATS), best(bare, REPEATS)
-        print(f"{relation:28} {ours:10.1f} {theirs:10.1f} {ours / theirs:7.1f}")  # noqa: T201
+        yield beside(relation, best(work, REPEATS), best(bare, REPEATS))
 
 
 def _checked(relation: str, outline: Outline, n: int) -> tuple[Work, FloatArray]:
@@ -144,26 +139,24 @@ def _checked(relation: str, outline: Outline, n: int) -> tuple[Work, FloatArray]
 
 def _bare_around(outline: Outline, points: FloatArray) -> Work:
     """Distances to the outline and to the ring, and to the nearest other robot."""
-    loop = shapely.LineString(ring(outline, 100, 200).lines[0])
-
-    def work() -> object:
-        places = np.asarray(shapely.points(points), dtype=object)
-        near = [nearest_segments(line, places) for line in (outline.filled, loop)]
-        return near, cKDTree(points).query(points, k=2)
-
-    return work
+    lines = outline.filled, shapely.LineString(ring(outline, 100, 200).lines[0])
+    return lambda: (_near(lines, points), cKDTree(points).query(points, k=2))
 
 
 def _bare_in(outline: Outline, points: FloatArray) -> Work:
     """Distances to the outline and to the nearest other robot, and how far all ground is."""
 
     def work() -> object:
-        places = np.asarray(shapely.points(points), dtype=object)
-        near = nearest_segments(outline.polygon, places)
         cells = cells_of(outline.polygon, len(points))
+        near = _near((outline.polygon,), points)
         return near, cKDTree(points).query(points, k=2), cKDTree(points).query(cells)
 
     return work
+
+
+def _near(lines: Sequence[BaseGeometry], points: FloatArray) -> object:
+    places = np.asarray(shapely.points(points), dtype=object)
+    return [nearest_segments(line, places) for line in lines]
 
 
 def _growth() -> Iterator[str]:
@@ -192,4 +185,4 @@ def _growth() -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    main()
+    show(rows())

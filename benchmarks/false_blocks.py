@@ -7,15 +7,18 @@ output .02 is invalid.
 
 import sys
 import time
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..evals.experiments.gate import Paired, gate
 from ..evals.statistics.intervals import ICC, Interval, wilson
 from ..tools.geometry.outline import FloatArray
 
-COMPARISONS = 2000
+COMPARISONS, SEED = 2000, 0
 SIZES = ((15, 2), (15, 10), (30, 10), (60, 10), (150, 10))
 """Tasks and trials of each."""
 MEAN, TASK_SD = 0.7, 0.05
@@ -53,7 +56,6 @@ def simulate(
     *,
     task_sd: float = 0.0,
     comparisons: int = COMPARISONS,
-    seed: int = 0,
 ) -> Blocked:
     """Put simulated comparisons through the gate.
 
@@ -61,13 +63,15 @@ def simulate(
         regression: what the new version loses on every task, as far as its rate goes.
         task_sd: spread of the effect it has on each task but those that must pass.
     """
-    random = np.random.default_rng([seed, tasks, trials, round(1000 * regression)])
-    blocked = passed = 0
-    for _ in range(comparisons):
-        verdict = gate(_versions(random, tasks, trials, regression, task_sd)).verdict
-        blocked += verdict == "block"
-        passed += verdict == "pass"
-    return Blocked(tasks, trials, regression, blocked, passed, comparisons)
+    random = np.random.default_rng([SEED, tasks, trials, round(1000 * regression)])
+    paired = (_versions(random, tasks, trials, regression, task_sd) for _ in range(comparisons))
+    return _judged(tasks, trials, regression, paired)
+
+
+def _judged(tasks: int, trials: int, regression: float, paired: Iterable[Paired]) -> Blocked:
+    verdicts = Counter(gate(versions).verdict for versions in paired)
+    blocked, passed = verdicts["block"], verdicts["pass"]
+    return Blocked(tasks, trials, regression, blocked, passed, verdicts.total())
 
 
 def rates(random: np.random.Generator, shape: tuple[int, ...], mean: float = MEAN) -> FloatArray:
@@ -86,19 +90,24 @@ def _versions(
     after = np.clip(before + effect - regression, 0, 1)
     both = np.stack([before, after])
     tokens = TOKENS * (1 + TOKENS_SD * random.normal(size=both.shape) / np.sqrt(trials))
-    return Paired(
-        tasks=tuple(map(str, range(tasks))),
-        pairs=np.full(tasks, float(trials)),
-        score=random.binomial(trials, both) / trials,
-        invalid=random.binomial(trials, INVALID, both.shape) / trials,
-        tokens=tokens,
-        must_pass=always,
-    )
+    score = random.binomial(trials, both) / trials
+    invalid = random.binomial(trials, INVALID, both.shape) / trials
+    return _paired(trials, score, invalid, tokens, always)
 
 
-def planted(
-    tasks: int, trials: int, share: float, *, comparisons: int = COMPARISONS, seed: int = 0
-) -> Blocked:
+def _paired(
+    trials: int,
+    score: FloatArray,
+    invalid: FloatArray,
+    tokens: FloatArray,
+    must_pass: NDArray[np.bool_],
+) -> Paired:
+    tasks = len(must_pass)
+    names, pairs = tuple(map(str, range(tasks))), np.full(tasks, float(trials))
+    return Paired(names, pairs, score, invalid, tokens, must_pass)
+
+
+def planted(tasks: int, trials: int, share: float, *, comparisons: int = COMPARISONS) -> Blocked:
     """Put a version through the gate that fails in a share of trials which the old one all passes.
 
     The lapse befalls any trial alike, as do those of evals/experiments/simulated_model.py.
@@ -106,22 +115,15 @@ def planted(
     Args:
         share: of trials that lapse.
     """
-    random = np.random.default_rng([seed, tasks, trials, round(1000 * share)])
-    none, all_right = np.zeros((2, tasks)), np.ones(tasks)
-    verdicts = list[str]()
-    for _ in range(comparisons):
-        still = 1 - random.binomial(trials, share, tasks) / trials
-        paired = Paired(
-            tasks=tuple(map(str, range(tasks))),
-            pairs=np.full(tasks, float(trials)),
-            score=np.stack([all_right, still]),
-            invalid=none,
-            tokens=none + TOKENS,
-            must_pass=np.zeros(tasks, dtype=bool),
-        )
-        verdicts.append(gate(paired).verdict)
-    blocked, passed = verdicts.count("block"), verdicts.count("pass")
-    return Blocked(tasks, trials, share, blocked, passed, comparisons)
+    random = np.random.default_rng([SEED, tasks, trials, round(1000 * share)])
+    nothing, tokens = np.zeros((2, tasks)), np.full((2, tasks), TOKENS)
+
+    def versions() -> Paired:
+        lapses = random.binomial(trials, share, tasks) / trials
+        score = np.stack([np.ones(tasks), 1 - lapses])
+        return _paired(trials, score, nothing, tokens, np.zeros(tasks, dtype=bool))
+
+    return _judged(tasks, trials, share, (versions() for _ in range(comparisons)))
 
 
 def main() -> None:

@@ -5,11 +5,27 @@ All benches measure and fit here, so that their figures mean the same.
 
 import time
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 Work = Callable[[], object]
+
+
+def show(rows: Iterable[str]) -> None:
+    """Print a table as it is measured."""
+    for row in rows:
+        print(row, flush=True)  # noqa: T201
+
+
+def heading(what: str, last: str = "") -> str:
+    """The head of a table of rows that `beside` makes."""
+    return f"{what:32} {'formup':>10} {'bare':>10} {'ratio':>7}  {last}"
+
+
+def beside(name: str, ours: float, bare: float, last: str = "") -> str:
+    """One row: milliseconds beside those of the bare library calls."""
+    return f"{name:32} {ours:10.2f} {bare:10.2f} {ours / bare:7.1f}  {last}"
 
 
 def best(work: Work, repeats: int) -> float:
@@ -34,18 +50,13 @@ def peak(work: Work) -> float:
         tracemalloc.stop()
 
 
-def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
-    """The power of the size that values grow with: the slope of a line through the logarithms."""
-    return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
-
-
 def growth(
     name: str, of: str, sizes: Sequence[float], values: Sequence[float], unit: str = "ms"
 ) -> str:
-    """One line that says what was measured and the power law fitted to it."""
+    """One line that says what was measured and the power of the size that it grows with."""
     measured = ", ".join(f"{value:.3g}" for value in values)
     span = f"{sizes[0]:,.0f} to {sizes[-1]:,.0f}"
-    power = exponent(sizes, values)
+    power = float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
     return f"{name:28} ~ {of}^{power:<5.2f} {measured} {unit} for {span}"
 
 

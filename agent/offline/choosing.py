@@ -47,7 +47,7 @@ def find(things: Sequence[Reference], needed: int, history: History) -> list[Fou
     A question that is asked again says that the answer chose nothing.
     """
     found = _find(things, needed, history)
-    asked = [c for c in _calls(history) if c.name == "ask_user" and c.arguments.get("candidates")]
+    asked = [c for c in calls_in(history) if c.name == "ask_user" and c.arguments.get("candidates")]
     if isinstance(found, list) or found.name != "ask_user" or not asked:
         return found
     answer = next((m.text for m in history if _answers(m, asked[-1])), "")
@@ -82,7 +82,7 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
     An answer that names more than are needed, or says which it is not, chooses nothing.
     """
     chosen: list[str] = []
-    for call in _calls(history):
+    for call in calls_in(history):
         if call.name == "ask_user" and call.arguments.get("candidates"):
             answer = next((m.text for m in history if _answers(m, call)), "").lower()
             numbers = re.findall(r"(?<![-.\w])c?([0-9]{1,4})(?!\.?[0-9])\b", answer)
@@ -204,7 +204,7 @@ def _ask_all(question: str, history: History) -> Step:
 
 def _located(query: dict[str, Any] | None, history: History) -> dict[str, Any] | None:
     """What locate_object answered to a query, if it was asked."""
-    for call in _calls(history):
+    for call in calls_in(history):
         if call.name == "locate_object" and call.arguments.get("query") == query:
             result = next(m for m in history if isinstance(m, Result) and m.call_id == call.id)
             return json.loads(result.text)
@@ -221,7 +221,8 @@ def located_reasons(history: History) -> dict[str, list[str]]:
     return found
 
 
-def _calls(history: History) -> list[Call]:
+def calls_in(history: History) -> list[Call]:
+    """All that was called, in order."""
     return [call for m in history if isinstance(m, Reply) for call in m.calls]
 
 

@@ -14,7 +14,7 @@ from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
 from .arrangements import Reading, understand
-from .choosing import Step, find, located_reasons
+from .choosing import Step, calls_in, find, located_reasons
 from .drawn_forms import ENCLOSING, READING, Form, faced_in, form_in
 from .references import Reading as Words
 from .references import references
@@ -162,21 +162,14 @@ def _refusals(history: History) -> int:
 
 def _left_off(result: Result, history: History) -> str:
     """What there is to say when a call was refused or took too long: what it was about, and why."""
-    calls = [c for m in history if isinstance(m, Reply) for c in m.calls]
-    meant = next(c.arguments for c in calls if c.id == result.call_id)
+    meant = next(c.arguments for c in calls_in(history) if c.id == result.call_id)
     said = meant.get("question") or meant.get("reason") or "The thing meant was not looked for."
     return f"{said} {result.text}"
 
 
 def _spoken_answers(history: History) -> list[str]:
     """Answers in words and numbers of robots, not those that choose a candidate."""
-    offered = {
-        c.id
-        for m in history
-        if isinstance(m, Reply)
-        for c in m.calls
-        if c.arguments.get("candidates")
-    }
+    offered = {c.id for c in calls_in(history) if c.arguments.get("candidates")}
     asked = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
     return [m.text for m in asked if m.call_id not in offered]
 
@@ -322,8 +315,7 @@ def _planned(plan: dict[str, Any], history: History) -> str:
 
 def _taken(history: History) -> list[str]:
     """Which candidates were taken for the things meant, and why."""
-    proposals = [c for m in history if isinstance(m, Reply) for c in m.calls]
-    last = next(p for p in proposals[::-1] if p.name == "propose_formation")
+    last = next(c for c in calls_in(history)[::-1] if c.name == "propose_formation")
     reasons = located_reasons(history)
     return [
         f"Took {p['candidate']} for the {p.get('label') or 'thing chosen'}"

@@ -1,6 +1,7 @@
 """The floor: a bare httpx loop with json, and nothing else."""
 
 import json
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import httpx
@@ -13,6 +14,8 @@ POINTS = {"type": "array", "items": POINT_SCHEMA, "description": "the points to 
 PARAMETERS = {"type": "object", "required": ["points"], "properties": {"points": POINTS}}
 FUNCTION = {"name": "check_points", "description": DESCRIPTION, "parameters": PARAMETERS}
 TOOLS = [{"type": "function", "function": FUNCTION}]
+Json = dict[str, Any]
+Turn = Callable[[str, Json], Awaitable[Json]]
 _clients: list[httpx.AsyncClient] = []
 
 
@@ -22,60 +25,51 @@ def _client() -> httpx.AsyncClient:
     return _clients[0]
 
 
-def _call(arguments: str) -> str:
-    return compute((p["x"], p["y"]) for p in json.loads(arguments)["points"])
-
-
 async def run(base_url: str) -> str:
     """A conversation."""
-    messages: list[Any] = [{"role": "system", "content": SYSTEM}, {"role": "user", "content": USER}]
-    while True:
-        body = {"model": "bench-model", "messages": messages, "tools": TOOLS}
-        response = await _client().post(base_url + "/chat/completions", json=body)
-        response.raise_for_status()
-        message = response.json()["choices"][0]["message"]
-        if not message.get("tool_calls"):
-            return message["content"]
-        messages.append(message)
-        for call in message["tool_calls"]:
-            text = _call(call["function"]["arguments"])
-            messages.append({"role": "tool", "tool_call_id": call["id"], "content": text})
+    return await _converse(base_url + "/chat/completions", _whole)
 
 
 async def run_stream(base_url: str) -> str:
     """A conversation, streamed."""
+    return await _converse(base_url + "/chat/completions", _streamed)
+
+
+async def _converse(url: str, turn: Turn) -> str:
     messages: list[Any] = [{"role": "system", "content": SYSTEM}, {"role": "user", "content": USER}]
-    options = {"stream": True, "stream_options": {"include_usage": True}}
     while True:
-        body = {"model": "bench-model", "messages": messages, "tools": TOOLS} | options
-        text, calls = await _turn(base_url + "/chat/completions", body)
-        if not calls:
-            return text
-        messages.append({"role": "assistant", "content": None, "tool_calls": calls})
-        for call in calls:
-            result = _call(call["function"]["arguments"])
-            messages.append({"role": "tool", "tool_call_id": call["id"], "content": result})
+        message = await turn(url, {"model": "bench-model", "messages": messages, "tools": TOOLS})
+        if not message.get("tool_calls"):
+            return message["content"]
+        messages.append(message)
+        for call in message["tool_calls"]:
+            points = json.loads(call["function"]["arguments"])["points"]
+            text = compute((p["x"], p["y"]) for p in points)
+            messages.append({"role": "tool", "tool_call_id": call["id"], "content": text})
 
 
-async def _turn(url: str, body: dict[str, Any]) -> tuple[str, list[dict[str, Any]]]:
-    text, calls = "", dict[int, dict[str, Any]]()
+async def _whole(url: str, body: Json) -> Json:
+    response = await _client().post(url, json=body)
+    response.raise_for_status()
+    return response.json()["choices"][0]["message"]
+
+
+async def _streamed(url: str, body: Json) -> Json:
+    text, calls = "", dict[int, Json]()
+    body |= {"stream": True, "stream_options": {"include_usage": True}}
     async with _client().stream("POST", url, json=body) as response:
         response.raise_for_status()
         async for line in response.aiter_lines():
             if not line.startswith("data: ") or line == "data: [DONE]":
                 continue
             choices: list[Any] = json.loads(line[6:])["choices"]
-            delta: dict[str, Any] = choices[0]["delta"] if choices else {}
+            delta: Json = choices[0]["delta"] if choices else {}
             text += delta.get("content") or ""
             for part in delta.get("tool_calls") or ():
                 call = calls.get(part["index"])
                 if call is None:
-                    function = dict(part["function"])
-                    calls[part["index"]] = {
-                        "id": part["id"],
-                        "type": "function",
-                        "function": function,
-                    }
+                    names = ("id", "type", "function")
+                    calls[part["index"]] = {name: part[name] for name in names}
                 else:
                     call["function"]["arguments"] += part["function"]["arguments"]
-    return text, list(calls.values())
+    return {"role": "assistant", "content": text or None, "tool_calls": list(calls.values())}

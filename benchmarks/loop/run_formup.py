@@ -10,20 +10,12 @@ from formup.agent.providers.registry import model_named
 from formup.tools.context import Context
 from formup.tools.perception.image import picture_from_array
 from formup.tools.tool import ToolResult, tool
-from pydantic import BaseModel
 from task import SYSTEM, USER, compute
+from typed import Point
 
 UNLIMITED = Limits(requests=None, tool_calls=None)
 CONTEXT = Context.of(picture_from_array(np.full((20, 20, 3), 60, np.uint8)))
 _models: dict[tuple[str, bool], Model] = {}
-
-
-class Point(BaseModel):
-    """One of them."""
-
-    label: str
-    x: float
-    y: float
 
 
 @tool("read")

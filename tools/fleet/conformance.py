@@ -148,19 +148,13 @@ async def _close_drive(fleet: Fleet, motion: Motion) -> None:
 
 
 async def _cancel_drive(fleet: Fleet, motion: Motion) -> None:
-    under_way = asyncio.Event()
-
     async def go() -> None:
-        try:
-            async with aclosing(fleet.drive(motion)) as moving:
-                async for _ in moving:
-                    under_way.set()
-        finally:
-            under_way.set()
+        async with aclosing(fleet.drive(motion)) as moving:
+            await anext(moving)
+            task.cancel()
+            await _run_out(moving)
 
     task = asyncio.ensure_future(go())
-    await under_way.wait()
-    task.cancel()
     with suppress(asyncio.CancelledError):
         await task
 

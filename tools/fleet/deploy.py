@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from ..errors import FleetError, ToolError
 from ..formation.checking.check import certify
 from ..formation.contract import MIN_SPACING, Contract, with_defaults
 from ..formation.placement.place import Site
 from ..formation.plan import Plan, Point
+from ..formation.value import Value
 from ..geometry.assignment import assign
 from ..geometry.outline import FloatArray
 from ..motion.motion import obstacles, routes
@@ -44,7 +44,7 @@ _in_deployment: set[int] = set()
 """`id` of the fleets that are being deployed; a deployment holds its fleet, so none is reused."""
 
 
-class Arrival(BaseModel):
+class Arrival(Value):
     """Requested against observed, per place of the formation.
 
     Attributes:
@@ -58,8 +58,6 @@ class Arrival(BaseModel):
         corrections: how many times robots were sent again after the first drive.
         track: hash of the file that holds where they were on their way.
     """
-
-    model_config = ConfigDict(frozen=True)
 
     arrived: bool
     ended: Ended
@@ -110,36 +108,24 @@ class Assigned:
 
 
 def assign_robots(poses: Sequence[Pose], places: FloatArray) -> Assigned:
-    """The robots for all places with the least sum of squared ways; others stay idle.
-
-    Args:
-        poses: of all robots of the fleet.
-        places: (n, 2) px.
+    """The robots for all places, (n, 2) px, with the least sum of squared ways; others stay idle.
 
     Raises:
         FleetSizeError: the fleet has fewer robots than there are places.
     """
-    if len(poses) < len(places):
-        raise FleetSizeError(
-            f"The fleet has {len(poses)} robots; the plan needs {len(places)}.",
-            available=len(poses),
-            needed=len(places),
-        )
-    points = points_of(poses)
-    chosen = np.arange(len(poses))
-    if len(poses) > len(places):
-        chosen = _least_squares_choice(points, places)
-    found = assign(points[chosen], places)
-    robots = tuple(poses[int(i)].id for i in chosen[found.robots])
-    return Assigned(robots, found.gap if found.method == "approximate" else None)
-
-
-def _least_squares_choice(points: FloatArray, places: FloatArray) -> np.ndarray:
-    """Indices of the robots that take part in the least sum of squares, ascending."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
-    return np.sort(linear_sum_assignment(cdist(places, points, "sqeuclidean"))[1])
+    if len(poses) < len(places):
+        raise FleetSizeError(f"The fleet has {len(poses)} robots; the plan needs {len(places)}.")
+    points = points_of(poses)
+    chosen = np.arange(len(poses))
+    if len(poses) > len(places):
+        cost = cdist(places, points, "sqeuclidean")
+        chosen = np.sort(linear_sum_assignment(cost)[1])
+    found = assign(points[chosen], places)
+    robots = tuple(poses[int(i)].id for i in chosen[found.robots])
+    return Assigned(robots, found.gap if found.method == "approximate" else None)
 
 
 async def deploy(
@@ -157,9 +143,6 @@ async def deploy(
     fleet that are not named stay where they are and are driven around.
 
     Args:
-        plan: its places.
-        site: the outlines of its targets, and the picture.
-        fleet: that has the robots.
         robots: ids; robot i takes place i.
         watch: is called with the poses of the whole fleet whenever they have been observed; last,
             also after a failure or before CancelledError goes on, with where they ended.
@@ -213,9 +196,7 @@ class _Drive:
         if len(set(self._robots)) != len(self._goals):
             raise FleetSizeError(
                 f"{len(set(self._robots))} robots are named; the plan has {len(self._goals)} "
-                "places, and each takes one robot.",
-                available=len(set(self._robots)),
-                needed=len(self._goals),
+                "places, and each takes one robot."
             )
         if self._fleet.stopped:
             raise FleetStoppedError(
@@ -229,12 +210,12 @@ class _Drive:
             while not self._arrived() and not self._fleet.stopped and corrections < CORRECTIONS:
                 corrections += 1
                 await self._drive(self._motion())
-        except asyncio.CancelledError:
-            await self._observe_after_failure()
+        except (asyncio.CancelledError, FleetError) as error:
+            with suppress(FleetError):
+                self._saw(await self._fleet.observe())
+            if isinstance(error, FleetError):
+                return self._report(corrections, error)
             raise
-        except FleetError as error:
-            await self._observe_after_failure()
-            return self._report(corrections, error)
         return self._report(corrections)
 
     async def _drive(self, motion: Motion) -> None:
@@ -254,10 +235,6 @@ class _Drive:
                 missing,
             )
         self._saw(poses)
-
-    async def _observe_after_failure(self) -> None:
-        with suppress(FleetError):
-            self._saw(await self._fleet.observe())
 
     def _saw(self, poses: tuple[Pose, ...]) -> None:
         """Keep poses, and thin the frames to every second one whenever there are too many."""

@@ -30,16 +30,7 @@ class FleetClosedError(FleetError):
 
 
 class FleetSizeError(FleetError):
-    """The fleet has fewer robots than are needed, or can drive fewer.
-
-    Attributes:
-        available: how many there are, or can be driven.
-        needed: how many were asked for.
-    """
-
-    def __init__(self, sentence: str, *, available: int, needed: int) -> None:
-        super().__init__(sentence)
-        self.available, self.needed = available, needed
+    """The fleet has, or can drive, another number of robots than is needed."""
 
 
 class RobotsFailedError(FleetError):

@@ -144,9 +144,7 @@ def open_fleet(request: FleetRequest) -> SimulatedFleet:
     if request.robots > MAX_ROBOTS:
         raise FleetSizeError(
             f"{request.robots} robots can be placed and certified, but motion is simulated only "
-            f"up to {MAX_ROBOTS} so far: the plan stands, nothing was moved.",
-            available=MAX_ROBOTS,
-            needed=request.robots,
+            f"up to {MAX_ROBOTS} so far: the plan stands, nothing was moved."
         )
     speed = SPEED_SHARE * math.hypot(*request.size)
     radius = request.radius or None
@@ -191,13 +189,7 @@ def _staying(request: FleetRequest) -> dict[str, Pose]:
 
 
 def spread_starts(n: int, frame: Frame, solid: BaseGeometry, radius: float) -> FloatArray:
-    """Starting positions along the picture's border, off what is solid, evenly apart, (n, 2).
-
-    Args:
-        n: how many.
-        frame: the picture.
-        solid: what robots may not stand on.
-        radius: of a robot, px.
+    """Starting positions along the picture's border, off what is solid, evenly apart, (n, 2) px.
 
     Raises:
         InputError: there is no room for n robots.

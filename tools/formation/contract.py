@@ -201,6 +201,16 @@ class Group(Value):
         within = self.shape is not None and self.shape.where in ("inside", "on")
         return within or self.relation in ("inside", "centre")
 
+    def offsets(self, radius: float = 0.0) -> tuple[float, float]:
+        """Least and greatest distance of robots' centres from the outline, px.
+
+        Args:
+            radius: of a robot, px; for 0 that of their edges, the clearance.
+        """
+        assert self.clearance is not None  # the contract's defaults are written out
+        least, greatest = self.clearance
+        return least + radius, greatest + radius
+
     def _missing(self) -> Iterator[str]:
         wanted = {"between": 2, "shape": 0}.get(self.relation, 1)
         if self.relation != "shape" and len(self.targets) != wanted:
@@ -297,13 +307,7 @@ def broken_rules(error: ValidationError) -> str:
 def with_defaults(
     contract: Contract, outlines: Mapping[str, Outline], room: tuple[float, float]
 ) -> Contract:
-    """The contract with every length it leaves open written out, so that all can be read.
-
-    Args:
-        contract: as stated.
-        outlines: of every target it names.
-        room: width and height of the picture, px.
-    """
+    """The contract with every length it leaves open written out, in a picture of a size in px."""
     groups = tuple(
         group.model_copy(update=_defaults(group, outlines, room, contract))
         for group in contract.groups

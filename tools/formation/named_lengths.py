@@ -18,9 +18,14 @@ UNITS: tuple[tuple[str, Unit, float], ...] = (
     (r"met(?:re|er)s?|m", "m", 1.0),
 )
 """Spellings, the unit they come to, and how much of it."""
+NUMBERS = (
+    *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"),
+    *("eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen"),
+    *("nineteen", "twenty"),
+)
 WORDS = {
-    **{"half a": 0.5, "half an": 0.5, "a": 1.0, "an": 1.0, "one": 1.0, "two": 2.0, "three": 3.0},
-    **{"four": 4.0, "five": 5.0, "six": 6.0, "seven": 7.0, "eight": 8.0, "nine": 9.0, "ten": 10.0},
+    **{"half a": 0.5, "half an": 0.5, "a": 1.0, "an": 1.0},
+    **{name: float(number) for number, name in enumerate(NUMBERS[:11]) if number},
 }
 LENGTH = re.compile(
     rf"(?P<number>(?<![\w.,/])(?:[0-9]{{1,3}}(?:,[0-9]{{3}})+|[0-9]+)(?:\.[0-9]+)?|"

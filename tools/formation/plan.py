@@ -7,11 +7,11 @@ scene version. Whoever approves an id approves exactly that; a changed scene voi
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict
 
 from ..errors import ToolError
 from ..geometry.outline import FloatArray
@@ -65,7 +65,7 @@ class Formation(Value):
         return tuple(self.robots[i] for group in self.members for i in group)
 
 
-class Shortfall(BaseModel):
+class Shortfall(Value):
     """What a partial plan falls short of: robots, or the clearance asked for.
 
     Attributes:
@@ -75,8 +75,6 @@ class Shortfall(BaseModel):
         clearance: the greatest found that can be held instead, px.
         sentence: the same in words.
     """
-
-    model_config = ConfigDict(frozen=True)
 
     asked: int
     placed: int
@@ -112,7 +110,7 @@ class Plan(Value):
         return "p-" + _digest(content)
 
     def for_robots(self, taking: Sequence[str], fleet: Sequence[str]) -> "Plan":
-        """The plan with robots named: positions in the fleet's order, findings by robot id.
+        """The plan with robots named and its positions in the fleet's order.
 
         Args:
             taking: the id of the robot that takes each place, in the order of the groups.
@@ -121,17 +119,13 @@ class Plan(Value):
         robots = tuple(name for name in fleet if name in set(taking))
         index = {name: i for i, name in enumerate(robots)}
         places = dict(zip(taking, self.formation.points.tolist(), strict=True))
-        members: list[tuple[int, ...]] = []
-        first = 0
-        for group in self.formation.contract.groups:
-            mine = taking[first : first + group.robots]
-            members.append(tuple(index[name] for name in mine))
-            first += group.robots
+        taken = map(index.__getitem__, taking)
+        members = tuple(tuple(islice(taken, g.robots)) for g in self.formation.contract.groups)
         formation = self.formation.model_copy(
             update={
                 "positions": tuple((x, y) for x, y in map(places.__getitem__, robots)),
                 "robots": robots,
-                "members": tuple(members),
+                "members": members,
             }
         )
         return self.model_copy(update={"formation": formation})
@@ -143,8 +137,6 @@ def make_plan(
     """Write out the contract's defaults, place the robots unless placed, and certify.
 
     Args:
-        contract: as stated.
-        site: outlines of every target it names, and the picture's size.
         scene_version: of the scene the outlines were measured in.
         positions: (N, 2) image pixels, in order over all groups; None to place them here.
 
@@ -178,6 +170,4 @@ def scene_version(
 ) -> str:
     """Hash of what a certificate depends on: the picture, every outline in it, its scale if any."""
     scale = () if metres_per_pixel is None else (metres_per_pixel,)
-    content = [picture_sha256, dict(sorted(outlines.items())), *scale]
-    text = json.dumps(content, separators=(",", ":"))
-    return "s-" + hashlib.sha256(text.encode()).hexdigest()[:10]
+    return "s-" + _digest([picture_sha256, dict(outlines), *scale])

@@ -6,6 +6,7 @@ Frame: image pixels. Robots do not yet avoid each other.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -75,37 +76,16 @@ def routes(
     Raises:
         NoRouteError: a goal is walled off.
     """
+    ground = _Ground(solid, radius, frame)
     ends = np.concatenate([starts, goals])
-    exits = _exit_points(starts, goals, solid, radius, frame, _bodies(idle, ends, radius))
+    exits = ground.exits(starts, goals, _bodies(idle, ends, radius))
     bodies = _bodies(idle, np.concatenate([ends, exits]), radius)
-    paths = _paths_past(exits, goals, solid, radius, frame, bodies)
+    paths = ground.paths(exits, goals, bodies)
     leaving = np.flatnonzero((exits != starts).any(axis=1))
-    ways_out = _paths_past(starts[leaving], exits[leaving], Polygon(), radius, frame, bodies)
+    ways_out = _Ground(Polygon(), radius, frame).paths(starts[leaving], exits[leaving], bodies)
     for i, way_out in zip(leaving, ways_out, strict=True):
         paths[i] = np.concatenate([way_out[:-1], paths[i]])
     return paths
-
-
-def _exit_points(
-    starts: FloatArray,
-    goals: FloatArray,
-    solid: BaseGeometry,
-    radius: float,
-    frame: Frame,
-    bodies: Bodies,
-) -> FloatArray:
-    """Starts, (n, 2), those on the obstacles moved off them as far as the goals are."""
-    if solid.is_empty or not (on := distances(solid, starts) <= radius).any():
-        return starts
-    away = max(float(distances(solid, goals).min()), LEAST_EXIT)
-    rim = solid.buffer(away / ROUND_DIP, quad_segs=ROUND_SEGMENTS)
-    free = shapely.difference(rim.boundary, shapely.union_all(bodies))
-    inside = shapely.intersection(free, frame.box)
-    line = next(part for part in (inside, free, rim.boundary) if not part.is_empty)
-    exits = starts.copy()
-    shortest = shapely.shortest_line(shapely.points(starts[on]), line)
-    exits[on] = shapely.get_coordinates(shortest)[1::2]
-    return exits
 
 
 def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
@@ -118,32 +98,6 @@ def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
     return np.asarray(discs, dtype=object)
 
 
-def _paths_past(
-    starts: FloatArray,
-    goals: FloatArray,
-    solid: BaseGeometry,
-    radius: float,
-    frame: Frame,
-    bodies: Bodies,
-) -> list[FloatArray]:
-    """Shortest paths past the obstacles and those bodies that would be in the way."""
-    paths = _paths_around(starts, goals, solid, radius, frame, bodies[:0])
-    if not len(bodies) or not len(paths):
-        return paths
-    tree, cluster = shapely.STRtree(bodies), _clusters(bodies)
-    in_the_way = np.zeros(len(bodies), dtype=bool)
-    while True:
-        lines = np.asarray([LineString(path) for path in paths], dtype=object)
-        blocked, hit = tree.query(lines, predicate="intersects")
-        if not len(hit):
-            return paths
-        again = np.unique(blocked)
-        in_the_way |= np.isin(cluster, cluster[hit])
-        found = _paths_around(starts[again], goals[again], solid, radius, frame, bodies[in_the_way])
-        for i, path in zip(again, found, strict=True):
-            paths[i] = path
-
-
 def _clusters(bodies: Bodies) -> NDArray[np.intp]:
     """The number of the cluster each body belongs to, (m,); nobody fits between its members."""
     from scipy.sparse import coo_array
@@ -154,67 +108,91 @@ def _clusters(bodies: Bodies) -> NDArray[np.intp]:
     return np.asarray(connected_components(graph)[1], dtype=np.intp)
 
 
-def _paths_around(
-    starts: FloatArray,
-    goals: FloatArray,
-    solid: BaseGeometry,
-    radius: float,
-    frame: Frame,
-    bodies: Bodies,
-) -> list[FloatArray]:
-    """Shortest paths around the obstacles and around all of some bodies."""
-    paths = list(np.stack([starts, goals], axis=1))
-    if solid.is_empty and not len(bodies):
-        return paths
-    near = 0.0
-    if not solid.is_empty:
-        near = float(min(distances(solid, starts).min(), distances(solid, goals).min()))
-    keeps = [_keep(radius, near, share) for share in ROOM_SHARES]
-    widest = _barrier(solid, keeps[0], bodies)
-    straight = shapely.linestrings(np.stack([starts, goals], axis=1))
-    open_ends = [int(i) for i in np.flatnonzero(shapely.intersects(straight, widest))]
-    if not open_ends:
-        return paths
-    for keep in keeps:
-        barrier = _barrier(solid, keep, bodies)
-        nodes = _nodes(solid, keep, bodies, barrier)
-        graph = _Visibility(nodes[shapely.intersects_xy(frame.box, nodes)], barrier)
-        open_ends = [i for i in open_ends if not _settled(paths, i, graph, barrier)]
-        if not open_ends:
+@dataclass(frozen=True)
+class _Ground:
+    """Obstacles, and the picture around which robots of a radius drive."""
+
+    solid: BaseGeometry
+    radius: float
+    frame: Frame
+
+    def exits(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> FloatArray:
+        """Starts, (n, 2), those on the obstacles moved off them as far as the goals are."""
+        if self.solid.is_empty:
+            return starts
+        on = distances(self.solid, starts) <= self.radius
+        if not on.any():
+            return starts
+        away = max(float(distances(self.solid, goals).min()), LEAST_EXIT)
+        rim = self.solid.buffer(away / ROUND_DIP, quad_segs=ROUND_SEGMENTS)
+        free = shapely.difference(rim.boundary, shapely.union_all(bodies))
+        inside = shapely.intersection(free, self.frame.box)
+        line = next(part for part in (inside, free, rim.boundary) if not part.is_empty)
+        exits = starts.copy()
+        shortest = shapely.shortest_line(shapely.points(starts[on]), line)
+        exits[on] = shapely.get_coordinates(shortest)[1::2]
+        return exits
+
+    def paths(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> list[FloatArray]:
+        """Shortest paths past the obstacles and those bodies that would be in the way."""
+        paths = self._paths_around(starts, goals, bodies[:0])
+        if not len(bodies) or not len(paths):
             return paths
-    barrier = _barrier(solid, keeps[-1], bodies)
-    anywhere = _Visibility(_nodes(solid, keeps[-1], bodies, barrier), barrier)
-    for i in open_ends:
-        if not _settled(paths, i, anywhere, barrier):
+        tree, cluster = shapely.STRtree(bodies), _clusters(bodies)
+        in_the_way = np.zeros(len(bodies), dtype=bool)
+        while True:
+            lines = np.asarray([LineString(path) for path in paths], dtype=object)
+            blocked, hit = tree.query(lines, predicate="intersects")
+            if not len(hit):
+                return paths
+            again = np.unique(blocked)
+            in_the_way |= np.isin(cluster, cluster[hit])
+            found = self._paths_around(starts[again], goals[again], bodies[in_the_way])
+            for i, path in zip(again, found, strict=True):
+                paths[i] = path
+
+    def _paths_around(
+        self, starts: FloatArray, goals: FloatArray, bodies: Bodies
+    ) -> list[FloatArray]:
+        """Shortest paths around the obstacles and around all of some bodies."""
+        ways = np.stack([starts, goals], axis=1)
+        paths = list(ways)
+        straight = np.asarray(shapely.linestrings(ways), dtype=object)
+        left = np.arange(len(paths))
+        keeps = self._keeps(np.concatenate([starts, goals]))
+        for keep, bounded in [*((keep, True) for keep in keeps), (keeps[-1], False)]:
+            barrier = self._barrier(keep, bodies)
+            left = left[shapely.intersects(straight[left], barrier)]
+            if not len(left):
+                return paths
+            nodes = _nodes(self.solid, keep, bodies, barrier)
+            if bounded:
+                nodes = nodes[shapely.intersects_xy(self.frame.box, nodes)]
+            graph = _Visibility(nodes, barrier)
+            bent = {int(i): graph.path(*ways[i]) for i in left}
+            for i, path in bent.items():
+                paths[i] = paths[i] if path is None else path
+            left = np.array([i for i, path in bent.items() if path is None], dtype=np.intp)
+        if len(left):
             what = "the target and the robots that stay" if len(bodies) else "the target"
-            x, y = goals[i]
+            x, y = goals[left[0]]
             raise NoRouteError(f"There is no way around {what} to place ({x:.0f}, {y:.0f}).")
-    return paths
+        return paths
 
+    def _keeps(self, ends: FloatArray) -> list[float]:
+        """Distances to keep from the obstacles, px, the one that is tried first at the front."""
+        near = 0.0 if self.solid.is_empty else float(distances(self.solid, ends).min())
+        if near <= self.radius:
+            return [0.99 * near]
+        return [self.radius + share * (near - self.radius) for share in ROOM_SHARES]
 
-def _barrier(solid: BaseGeometry, keep: float, bodies: Bodies) -> BaseGeometry:
-    """What paths must not touch: the obstacles grown by nearly what is kept, and the bodies."""
-    barrier = solid.buffer(keep * 0.999)
-    if len(bodies):
-        barrier = shapely.union_all([barrier, *bodies])
-    shapely.prepare(barrier)
-    return barrier
-
-
-def _keep(radius: float, near: float, share: float) -> float:
-    """Distance kept from the obstacles, px, where starts and goals have `near` of room."""
-    return radius + share * (near - radius) if near > radius else 0.99 * near
-
-
-def _settled(paths: list[FloatArray], i: int, graph: "_Visibility", barrier: BaseGeometry) -> bool:
-    """Whether path i clears the barrier, straight or by the bends it is now given."""
-    start, goal = paths[i][0], paths[i][-1]
-    if not LineString([start, goal]).intersects(barrier):
-        return True
-    bent = graph.path(start, goal)
-    if bent is not None:
-        paths[i] = bent
-    return bent is not None
+    def _barrier(self, keep: float, bodies: Bodies) -> BaseGeometry:
+        """What paths must not touch: the obstacles grown by nearly what is kept, and bodies."""
+        barrier = self.solid.buffer(keep * 0.999)
+        if len(bodies):
+            barrier = shapely.union_all([barrier, *bodies])
+        shapely.prepare(barrier)
+        return barrier
 
 
 def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:

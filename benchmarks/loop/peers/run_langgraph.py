@@ -7,25 +7,11 @@ from typing import Any
 from langchain.agents import create_agent
 from langchain_core.tools import tool
 from langchain_openai import ChatOpenAI
-from pydantic import BaseModel
-from task import SYSTEM, USER, compute
+from task import SYSTEM, USER
+from typed import check_points
 
 os.environ["LANGSMITH_TRACING"] = "false"
 DEEP = {"recursion_limit": 5000}
-
-
-class Point(BaseModel):
-    """One of them."""
-
-    label: str
-    x: float
-    y: float
-
-
-@tool
-async def check_points(points: list[Point]) -> str:
-    """Count the points that lie inside the unit circle."""
-    return compute((p.x, p.y) for p in points)
 
 
 @cache
@@ -38,7 +24,7 @@ def _agent(base_url: str, streams: bool) -> Any:
         streaming=streams,
         stream_usage=streams,
     )
-    return create_agent(model, tools=[check_points], system_prompt=SYSTEM)
+    return create_agent(model, tools=[tool(check_points)], system_prompt=SYSTEM)
 
 
 def _asked() -> dict[str, Any]:

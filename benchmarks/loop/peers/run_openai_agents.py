@@ -10,31 +10,18 @@ from agents import (
     set_tracing_disabled,
 )
 from openai import AsyncOpenAI
-from pydantic import BaseModel
-from task import SYSTEM, USER, compute
+from task import SYSTEM, USER
+from typed import check_points
 
 set_tracing_disabled(True)
-
-
-class Point(BaseModel):
-    """One of them."""
-
-    label: str
-    x: float
-    y: float
-
-
-@function_tool
-async def check_points(points: list[Point]) -> str:
-    """Count the points that lie inside the unit circle."""
-    return compute((p.x, p.y) for p in points)
 
 
 @cache
 def _agent(base_url: str) -> Agent:
     client = AsyncOpenAI(base_url=base_url, api_key="k")
     model = OpenAIChatCompletionsModel(model="bench-model", openai_client=client)
-    return Agent(name="bench", instructions=SYSTEM, tools=[check_points], model=model)
+    tools = [function_tool(check_points)]
+    return Agent(name="bench", instructions=SYSTEM, tools=tools, model=model)
 
 
 async def run(base_url: str) -> str:

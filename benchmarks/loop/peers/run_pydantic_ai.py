@@ -2,27 +2,14 @@
 
 from functools import cache
 
-from pydantic import BaseModel
 from pydantic_ai import Agent
 from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers.openai import OpenAIProvider
 from pydantic_ai.usage import UsageLimits
-from task import SYSTEM, USER, compute
+from task import SYSTEM, USER
+from typed import check_points
 
 UNLIMITED = UsageLimits(request_limit=None)
-
-
-class Point(BaseModel):
-    """One of them."""
-
-    label: str
-    x: float
-    y: float
-
-
-async def check_points(points: list[Point]) -> str:
-    """Count the points that lie inside the unit circle."""
-    return compute((p.x, p.y) for p in points)
 
 
 @cache

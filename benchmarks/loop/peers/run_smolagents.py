@@ -9,7 +9,6 @@ from smolagents.memory import FinalAnswerStep
 from smolagents.monitoring import LogLevel
 from task import USER, compute
 
-FINAL_IS_A_CALL = True
 _pool = ThreadPoolExecutor(64)
 
 

@@ -45,6 +45,5 @@ def test_an_assignment_says_what_it_may_have_left_to_save_only_if_it_is_approxim
 
 
 def test_more_places_than_robots_cannot_be_assigned() -> None:
-    with pytest.raises(FleetSizeError, match="has 2 robots; the plan needs 9") as error:
+    with pytest.raises(FleetSizeError, match="has 2 robots; the plan needs 9"):
         assign_robots(*scattered(2, 9, 0))
-    assert (error.value.available, error.value.needed) == (2, 9)

@@ -39,8 +39,7 @@ def certify(positions: ArrayLike, contract: Contract, site: Site) -> Verdict:
 
     Args:
         positions: (N, 2) image pixels, robots in order over all groups.
-        contract: what they must satisfy.
-        site: outlines of every target the contract names, and the picture's size.
+        site: with every target the contract names.
 
     Raises:
         InputError: the positions are no (N, 2) array.

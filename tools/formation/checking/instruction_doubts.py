@@ -8,14 +8,9 @@ import re
 from collections.abc import Iterator, Sequence
 
 from ..contract import Contract, Relation
-from ..named_lengths import LENGTH, named_lengths
+from ..named_lengths import LENGTH, NUMBERS, named_lengths
 from ..units import length_text
 
-NUMBERS = (
-    *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"),
-    *("eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen"),
-    *("nineteen", "twenty"),
-)
 NEGATION = re.compile(r"(?:\b(?:not|no|never|without|except|instead of)|n't)(?:\W+\w+){0,3}\W*\Z")
 PLAIN: tuple[tuple[str, str, frozenset[Relation]], ...] = (
     (

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, SupportsFloat, SupportsInt
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field
 
 from ...geometry.outline import FloatArray, Outline
 from ..contract import Contract, Group
 from ..placement.place import Site
+from ..value import Value
 from .finding import Finding
 
 TOLERANCE = 5e-3
@@ -17,7 +18,7 @@ DECIMALS = 3
 """Places of a pixel that findings give."""
 
 
-class Escape(BaseModel):
+class Escape(Value):
     """A way out of a cage that was checked all along.
 
     Attributes:
@@ -25,8 +26,6 @@ class Escape(BaseModel):
         poses: x, y of the point it turns about, px, and the turn, radians from x to y; the first
             is where it is.
     """
-
-    model_config = ConfigDict(frozen=True)
 
     target: str
     poses: tuple[tuple[float, float, float], ...]
@@ -36,26 +35,14 @@ Measure = float | str
 """A number, or a word such as the state of a cage."""
 
 
-class Verdict(BaseModel):
+class Verdict(Value):
     """`certified` means every demand of the contract holds; `measures` say by how much."""
-
-    model_config = ConfigDict(frozen=True)
 
     certified: bool
     findings: tuple[Finding, ...] = ()
-    measures: dict[str, Measure] = {}
+    measures: dict[str, Measure] = Field(default_factory=dict[str, Measure])
     notes: tuple[str, ...] = ()
     escape: Escape | None = None
-
-    def renumbered(self, mapping: Sequence[int]) -> "Verdict":
-        """The verdict on the same positions in another order.
-
-        Args:
-            mapping: by old index, from 0, the new number of that robot, from 1.
-        """
-        return self.model_copy(
-            update={"findings": tuple(f.renumbered(mapping) for f in self.findings)}
-        )
 
 
 @dataclass(frozen=True)
@@ -81,8 +68,7 @@ class Part:
     @property
     def clearance(self) -> tuple[float, float]:
         """Least and greatest, px; the contract's defaults are written out by now."""
-        assert self.group.clearance is not None
-        return self.group.clearance
+        return self.group.offsets()
 
 
 @dataclass

@@ -43,11 +43,6 @@ class Affine(NamedTuple):
 def form_after(group: Group, figure: Sketch, there: Affine) -> tuple[Group, bool]:
     """The group whose form a map has taken elsewhere, and whether it has places of its own.
 
-    Args:
-        group: with a shape.
-        figure: what it draws now, in its place.
-        there: the map.
-
     Returns:
         The second is true where the images of its robots' places are no places of the new form.
     """

@@ -6,20 +6,17 @@ and groups are numbered from 1.
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from ..contract import SideName
+from ..value import Value
 
 Finite = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)]
 Number = Annotated[int, Field(ge=1, le=10_000)]
 
 
-class _Edit(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class _GroupEdit(_Edit):
+class _GroupEdit(Value):
     group: int | None = Field(
         default=None, ge=1, description="Which group of the contract, from 1; all where left out."
     )
@@ -97,7 +94,7 @@ class Remove(_GroupEdit):
         return self
 
 
-class Swap(_Edit):
+class Swap(Value):
     """Two robots take each other's place."""
 
     kind: Literal["swap"] = "swap"
@@ -112,7 +109,7 @@ class SideOnly(_GroupEdit):
     side: SideName
 
 
-class Skip(_Edit):
+class Skip(Value):
     """Robots leave and their places stay empty."""
 
     kind: Literal["skip"] = "skip"

@@ -10,19 +10,19 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
 from ...errors import ToolError
 from ...geometry.outline import FloatArray
 from ..placement.place import Site
 from ..plan import Plan, make_plan
+from ..value import Value
 from .edit_kinds import Add, Edit, Offset, Remove, SideOnly, Skip, Swap
 from .edit_rules import RULES, Part, closed_up, skipped
 
 IntArray = NDArray[np.intp]
 
 
-class Diff(BaseModel):
+class Diff(Value):
     """What an edit changes, robots numbered from 1.
 
     Attributes:
@@ -32,18 +32,14 @@ class Diff(BaseModel):
         removed: old numbers of robots that are not there any more.
     """
 
-    model_config = ConfigDict(frozen=True)
-
     was: tuple[int | None, ...]
     moved_px: tuple[float | None, ...]
     added: tuple[int, ...]
     removed: tuple[int, ...]
 
 
-class Edited(BaseModel):
+class Edited(Value):
     """The plan after an edit, certified or with findings, and what the edit changed."""
-
-    model_config = ConfigDict(frozen=True)
 
     plan: Plan
     parent: str
@@ -51,12 +47,7 @@ class Edited(BaseModel):
 
 
 def edited(plan: Plan, edit: Edit, site: Site) -> Edited:
-    """The plan after an edit.
-
-    Args:
-        plan: certified or not.
-        edit: what is to change.
-        site: what the plan was made in.
+    """The plan, certified or not, after an edit in the site it was made in.
 
     Raises:
         ToolError: the edit makes no sense for this plan; the text says why.

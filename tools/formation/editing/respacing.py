@@ -17,6 +17,7 @@ from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import along_curve
 from ..contract import Group
 from ..placement.place import Site, reference_curve
+from ..placement.spacing import stations_on
 
 IntArray = NDArray[np.intp]
 
@@ -52,12 +53,7 @@ class Track:
 
     def stations(self, points: FloatArray) -> FloatArray:
         """Arc lengths of (n, 2) points' feet, pieces laid end to end, (n,), px."""
-        lines = [LineString(line) for line in self.curve.lines]
-        places = shapely.points(points)
-        piece = np.argmin(np.stack([distances(line, points) for line in lines]), axis=0)
-        before = np.cumsum([0.0, *(line.length for line in lines)])
-        along = np.stack([shapely.line_locate_point(line, places) for line in lines])
-        return before[piece] + along[piece, np.arange(len(points))]
+        return stations_on(points, self.curve)[0]
 
     def at(self, stations: FloatArray) -> FloatArray:
         """Points of a curve in one piece at arc lengths, on a loop all the way round, (n, 2)."""
@@ -99,12 +95,7 @@ def moved_out(points: FloatArray, old: Track, new: Track) -> FloatArray:
     """The robots of a ring or side on a curve further out or in.
 
     On a loop one of them moves straight out and the others keep their shares of the way round.
-    Where robots are spread over several curves each moves straight out.
-
-    Args:
-        points: (n, 2) where they stand.
-        old: the curve they stand on.
-        new: the one to go to, with some of it in the picture.
+    Where robots, (n, 2), are spread over several curves each moves straight out.
     """
     by = new.offset - old.offset
     apart = distances(old.base, points)
@@ -150,19 +141,14 @@ def pushed(base: BaseGeometry, points: FloatArray, origins: FloatArray, by: floa
 
 
 def respaced(here: Track, points: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
-    """Slots evenly along a curve for more robots than stand on it, and who takes which.
+    """Slots evenly along a curve for as many robots as stand on it or more, and who takes which.
 
     Robots keep their order along the curve; on a loop its phase is free. Both are chosen for
     the least sum of squared ways along it, so that robots put in and taken out again leave
     everybody where they were.
 
-    Args:
-        here: the curve.
-        points: (n, 2) of the robots that stay.
-        count: of slots, n or more.
-
     Returns:
-        slots, (count, 2), and for each robot its slot, (n,).
+        slots, (count, 2), and for each of the (n, 2) robots that stay its slot, (n,).
     """
     if not here.curve.closed:
         slots = along_curve(here.curve, count)

@@ -23,7 +23,6 @@ class CageError(PlacementError):
     """
 
     def __init__(self, group: Group, needed: int | None, fits: int, site: Site) -> None:
-        assert group.clearance is not None
         way = (
             f"{needed} robots would do"
             if needed
@@ -32,7 +31,7 @@ class CageError(PlacementError):
             else "no other number is known to do: allow a nearer clearance or take the closure ring"
         )
         super().__init__(
-            f"No places were found where {group.robots} robots, {site.length(group.clearance)} "
+            f"No places were found where {group.robots} robots, {site.length(group.offsets())} "
             f"from {group.targets[0]}, certainly cage it; {way}.",
             "cage",
             robots_needed=needed,
@@ -52,10 +51,9 @@ def caged_places(group: Group, site: Site, radius: float, curve: Curve) -> Float
     Raises:
         CageError: none were found; it says how many robots would do.
     """
-    assert group.clearance is not None
     demand = Demand(
         site.outlines[group.targets[0]],
-        group.clearance,
+        group.offsets(),
         radius,
         site.frame(radius),
         group.min_spacing or 0.0,

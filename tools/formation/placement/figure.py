@@ -41,13 +41,7 @@ SHRINKS = 0.95 ** np.arange(90)
 
 
 def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sketch:
-    """The shape a group draws, in its place.
-
-    Args:
-        group: with its defaults written out.
-        shape: the group's.
-        site: outlines of the targets and the picture.
-        radius: of a robot, px.
+    """The shape a group, with its defaults written out, draws, in its place.
 
     Raises:
         ToolError: there is no room for it.
@@ -138,10 +132,9 @@ def _figure_placed(
     outline = site.outlines[group.targets[0]]
     if shape.where == "on":
         return fitted(sketch, outline.bounds)
-    assert group.clearance is not None
     if shape.where == "inside":
-        return _figure_inside(sketch, group, site, group.clearance[0] + radius)
-    gap = nominal(group.clearance) + radius
+        return _figure_inside(sketch, group, site, group.offsets(radius)[0])
+    gap = nominal(group.offsets()) + radius
     if shape.where == "around":
         return _figure_around(sketch, outline, gap)
     return _figure_beside(sketch, group, site, shape.where, gap, radius)

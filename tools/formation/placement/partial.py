@@ -39,10 +39,7 @@ def best_partial(
     that can be held. Nothing is done about a clearance that was left open.
 
     Args:
-        contract: as stated.
         refusal: why the robots cannot all be placed; None where they can, but not certified.
-        site: outlines of every target it names, and the picture's size.
-        scene_version: of the scene the outlines were measured in.
 
     Returns:
         None where nothing that is certified was found, as where a cage needs more robots.
@@ -192,8 +189,7 @@ def _greatest(
 ) -> Plan | None:
     """The plan at the greatest clearance of a group that certifies and suits, found by halving."""
     group = full.groups[index]
-    assert group.clearance is not None
-    least, greatest = group.clearance
+    least, greatest = group.offsets()
     aim = least or greatest
     works, fails, best = 0, int(aim * TENTH), None
     steps = COARSE if escape_proof(group) else fails.bit_length()
@@ -216,8 +212,7 @@ def _uncut(plan: Plan) -> bool:
 
 def _at_share(group: Group, share: float) -> tuple[float, float]:
     """A share of the group's clearance; inside only the least one is in the way."""
-    assert group.clearance is not None
-    least, greatest = group.clearance
+    least, greatest = group.offsets()
     deep = greatest >= OPEN or group.relation == "inside"
     return round(least * share, 3), greatest if deep else max(round(greatest * share, 3), 0.1)
 
@@ -231,7 +226,7 @@ def _tried(attempt: Attempt, contract: Contract) -> Plan | None:
 
 
 def _clearance_text(group: Group, site: Site) -> str:
-    assert group.clearance is not None
-    if group.clearance[1] >= OPEN or group.relation == "inside":
-        return f"{site.length(group.clearance[0])} or more"
-    return site.length(group.clearance)
+    least, greatest = group.offsets()
+    if greatest >= OPEN or group.relation == "inside":
+        return f"{site.length(least)} or more"
+    return site.length((least, greatest))

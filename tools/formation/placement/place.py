@@ -51,7 +51,6 @@ def place(contract: Contract, site: Site, sound: Sound = lambda group, points: T
 
     Args:
         contract: with its defaults written out.
-        site: the outlines of every target named, and the picture.
         sound: asked where a group has to be placed otherwise than it would be alone.
 
     Raises:
@@ -85,8 +84,6 @@ def reference_curve(group: Group, site: Site, radius: float, offset: float | Non
 
     Args:
         group: with its defaults written out.
-        site: outlines and picture.
-        radius: of a robot, px.
         offset: of robots' centres from the outline, px; None for the one the clearance aims at.
     """
     frame = site.frame(radius)
@@ -99,10 +96,9 @@ def reference_curve(group: Group, site: Site, radius: float, offset: float | Non
     if group.relation == "between":
         return _curve_between(group, site, frame)
     outline = site.outlines[group.targets[0]]
-    assert group.clearance is not None
-    offset = nominal(group.clearance) + radius if offset is None else offset
+    offset = nominal(group.offsets()) + radius if offset is None else offset
     if group.relation != "along":
-        least, greatest = (bound + radius for bound in group.clearance)
+        least, greatest = group.offsets(radius)
         return ring(outline, offset, max(greatest, offset), frame, keep=min(least, offset))
     if group.edges is not None:
         last = len(outline.edges) - 1
@@ -157,9 +153,8 @@ def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
 
     A rounded outline falls short of its corners; a reflex one is reached along its bisector.
     """
-    assert group.clearance is not None
     short = distances(outline.filled, corner_points(outline, group.robots))
-    return REFLEX * (group.clearance[1] + radius) + short
+    return REFLEX * group.offsets(radius)[1] + short
 
 
 def _elsewhere(
@@ -200,8 +195,7 @@ def _otherwise(
     if group.relation in ("corners", "centre"):
         yield _place_at_target(group, site, radius, earlier)[0]
     elif group.relation == "inside":
-        assert group.clearance is not None
-        least, greatest = (bound + radius for bound in group.clearance)
+        least, greatest = group.offsets(radius)
         left = without(site.visible(group.targets[0]), group, earlier, least)
         if left is not None:
             yield inside(left, n, least, greatest, spacing)
@@ -266,10 +260,9 @@ def _place_at_target(
         why = f"{group.targets[0]} has {count} corners, less those without room in the picture"
         return _corner_places(group, site, radius, earlier), why
     if group.relation == "inside":
-        assert group.clearance is not None
-        least, greatest = group.clearance
-        points = inside(outline, n, least + radius, greatest + radius, spacing)
-        return points, f"spaced {site.length(spacing, 'g')} and {site.length(least)} from the edge"
+        points = inside(outline, n, *group.offsets(radius), spacing)
+        edge = site.length(group.offsets()[0])
+        return points, f"spaced {site.length(spacing, 'g')} and {edge} from the edge"
     pitch = max(spacing * 1.05, min(0.1 * outline.size, CENTRE_SHARE * outline.size / n**0.5))
     most = CENTRE_SHARE * outline.size
 
@@ -297,16 +290,15 @@ def _corner_places(
     group: Group, site: Site, radius: float, earlier: Sequence[Stand] = ()
 ) -> FloatArray:
     """Places at the corners, drawn in from the picture's border, less those without room."""
-    assert group.clearance is not None
     outline, box = site.outlines[group.targets[0]], site.frame(radius).box
-    points = at_corners(outline, group.robots, nominal(group.clearance) + radius)
+    points = at_corners(outline, group.robots, nominal(group.offsets()) + radius)
     if box.is_empty:
         return points[:0]
     x0, y0, x1, y1 = box.bounds
     points = np.clip(points, (x0, y0), (x1, y1))
     corners = corner_points(outline, group.robots)
     near = np.linalg.norm(points - corners, axis=1) <= corner_reach(group, outline, radius)
-    least = group.clearance[0] + radius - ROUNDING
+    least = group.offsets(radius)[0] - ROUNDING
     free = points[near & (distances(outline.filled, points) >= least)]
     free = free[clear(free, group, earlier)]
     if len(free) > group.robots:

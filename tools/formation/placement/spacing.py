@@ -92,7 +92,7 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
 
     What is to be escape-proof is judged by its certificate, openings only where one is named.
     """
-    order = _order(part.points, curve)
+    order = np.argsort(stations_on(part.points, curve)[0], kind="stable")
     points = part.points[order]
     opening = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) - 2 * part.radius
     allowed = part.group.max_gap
@@ -143,12 +143,7 @@ def corner_matching(part: Part, audit: Audit) -> None:
             audit.find("off_corner", distance[i, k], reach[k], robot=part.first + i, about=about)
 
 
-def _order(points: FloatArray, curve: Curve) -> NDArray[np.intp]:
-    """Indices of the points in the order met along the curve."""
-    return np.argsort(_stations_on(points, curve)[0], kind="stable")
-
-
-def _stations_on(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
+def stations_on(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
     """Arc length of each point's foot on the curve, pieces laid end to end, and its piece."""
     if len(curve.lines) == 1:
         return locate(curve.lines[0], points), np.zeros(len(points), dtype=np.intp)
@@ -175,7 +170,7 @@ class _Spread:
 
 
 def _spread(part: Part, curve: Curve) -> _Spread:
-    station, piece = _stations_on(part.points, curve)
+    station, piece = stations_on(part.points, curve)
     order = np.argsort(station, kind="stable")
     names = [int(i) + part.first for i in order]
     cut = 0.0 if curve.closed else curve.cut(len(part.points))

@@ -21,19 +21,6 @@ def verdict(points: np.ndarray, relation: str = "around") -> Verdict:
     return certify(points, with_defaults(Contract(groups=(group,)), SITE.outlines, SITE.room), SITE)
 
 
-@pytest.mark.parametrize("relation", ["around", "cage", "inside", "centre"])
-def test_a_renumbered_verdict_is_that_of_the_positions_in_their_new_order(relation: str) -> None:
-    order = np.array([4, 0, 6, 2, 5, 1, 3])
-    mapping = [int(i) + 1 for i in np.argsort(order)]
-    old, new = verdict(POINTS, relation), verdict(POINTS[order], relation)
-    renumbered = old.renumbered(mapping)
-    assert not old.certified
-    assert sorted(f.sentence for f in renumbered.findings) == sorted(
-        f.sentence for f in new.findings
-    )
-    assert renumbered.renumbered([int(i) + 1 for i in order]) == old
-
-
 def test_a_verdict_is_read_back_as_it_was_with_its_sentences_written_out() -> None:
     made = verdict(POINTS)
     text = made.model_dump_json()

@@ -1,25 +1,25 @@
-"""`python -m formup.benchmarks.cage_trials`: does anything escape from what is certified caged?
+"""Nothing gets out of what is certified caged, as random searches by other code find.
 
-Bodies of random shapes are moved and turned at random among robots that stand still, by code that
-shares nothing with what certifies. One body that gets out refutes a certificate. Rings known to
-leak are searched as well: a search that gets out of none of them would prove nothing.
+Bodies of random shapes are moved and turned at random among robots that stand still. One that gets
+out refutes a certificate; rings known to leak are searched as well, to show that a search can fail.
 """
 
-import argparse
 import math
-import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
+import pytest
 import shapely
+from formup.tools.geometry.cages.cages import Cage, cage
+from formup.tools.geometry.outline import FloatArray, largest_part
 from shapely.geometry import MultiPoint, Polygon
 
-from ..tools.geometry.cages.cages import Cage, cage
-from ..tools.geometry.outline import FloatArray, largest_part
-
+CAGES, LOOSE_RINGS = 3, 2
+SEARCHES, STEPS = 10, 60
+"""For each of them, and moves of each search; more of all find more, and take longer."""
 SIZE = 100.0
 """Square root of the area of every body, px."""
 BLOCKS: tuple[list[tuple[float, float]], ...] = (
@@ -163,46 +163,40 @@ def _rings(rng: np.random.Generator, body: Polygon, radius: float) -> Iterator[F
         yield shapely.get_coordinates(points)
 
 
-def trials(caged: int, loose: int, searches: int, steps: int, seed: int) -> str:
-    """Search certified cages and rings that leak; what came of it, in words."""
-    rng = np.random.default_rng(seed)
-    wanted = {"caged": caged, "escape": loose}
+SQUARE = Polygon([(-50, -50), (50, -50), (50, 50), (-50, 50)])
+UNKNOWN = Cage("not certified", None, 100.0)
+
+
+def ring(n: int, reach: float) -> FloatArray:
+    t = (np.arange(n) + 0.5) / n * 2 * np.pi
+    return np.stack([np.cos(t), np.sin(t)], axis=1) * reach
+
+
+@pytest.mark.parametrize(
+    ("n", "reach", "radius", "out"),
+    [
+        (3, 100.0, 0.0, True),
+        (4, 120.0, 10.0, True),
+        (12, 75.0, 0.0, False),
+        (5, 127.0, 40.0, False),
+    ],
+)
+def test_a_search_gets_out_where_there_is_a_way(
+    n: int, reach: float, radius: float, out: bool
+) -> None:
+    case = Case(SQUARE, ring(n, reach), radius, UNKNOWN)
+    found = search(case, 20, 150, np.random.default_rng(0))
+    assert found > 5 if out else found == 0
+
+
+def test_nothing_gets_out_of_certified_cages_and_much_out_of_leaky_rings() -> None:
+    rng, wanted = np.random.default_rng(3), {"caged": CAGES, "escape": LOOSE_RINGS}
     got_out: Counter[str] = Counter()
-    left: Counter[str] = Counter()
-    tests: Counter[str] = Counter()
-    for case in islice(cases(seed), 100 * (caged + loose)):
+    for case in islice(cases(3), 100 * (CAGES + LOOSE_RINGS)):
         state = case.verdict.state
-        if not wanted.get(state):
-            continue
-        wanted[state] -= 1
-        tests[str(case.verdict.test)] += state == "caged"
-        found = search(case, searches, steps, rng)
-        got_out[state] += found
-        left[state] += found > 0
-        if not any(wanted.values()):
-            break
-    disc, flooded = tests["disc"], tests["configuration space"]
-    return (
-        f"{got_out['caged']} of {(disc + flooded) * searches} searches got out of certified cages "
-        f"({disc} by the disc, {flooded} by the configuration space);\n"
-        f"{got_out['escape']} of {(loose - wanted['escape']) * searches} got out of rings known to "
-        f"leak, at least one out of {left['escape']} of {loose - wanted['escape']} rings."
-    )
-
-
-def main() -> None:
-    """Print what came of it."""
-    parser = argparse.ArgumentParser(description="Random searches for ways out of cages.")
-    parser.add_argument("--cages", type=int, default=200)
-    parser.add_argument("--loose", type=int, default=40)
-    parser.add_argument("--searches", type=int, default=50, help="for each cage")
-    parser.add_argument("--steps", type=int, default=400, help="moves of each search")
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
-    began = time.process_time()
-    print(trials(given.cages, given.loose, given.searches, given.steps, given.seed))  # noqa: T201
-    print(f"{time.process_time() - began:.0f} s of CPU time, seed {given.seed}")  # noqa: T201
-
-
-if __name__ == "__main__":
-    main()
+        if wanted.get(state):
+            wanted[state] -= 1
+            got_out[state] += search(case, SEARCHES, STEPS, rng)
+    assert not any(wanted.values())
+    assert got_out["caged"] == 0
+    assert got_out["escape"] > 0
