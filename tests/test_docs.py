@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 
 ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(language: str) -> list[tuple[str, str]]:
@@ -29,15 +29,16 @@ def blocks(language: str) -> list[tuple[str, str]]:
 
 
 COMMANDS = [
-    line.removeprefix("$ ")
+    [line.removeprefix("$ ") for line in block.splitlines() if line.startswith("$ formup")]
     for page, block in blocks("console")
-    for line in block.splitlines()
-    if line.startswith("$ formup") and page != "prompts.md"  # tests/apps/test_prompts.py runs those
+    if page != "prompts.md"  # tests/apps/test_prompts.py runs those
 ]
+"""Commands by the block they stand in: a later one may go on where an earlier one ended."""
 
 
 SHOWN = {
     "formup run": "deployed:",
+    "formup resume": "deployed:",
     "formup eval suites": "zerocap15",
     "formup eval run": "chance GCR",
     "formup prompts": "former",
@@ -98,19 +99,20 @@ def test_python_blocks_run(page: str, code: str, provider: str, tmp_path: Path) 
     assert "deployed" in done.stdout
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_commands_run_as_written(command: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("commands", COMMANDS, ids=lambda commands: "; ".join(commands)[:40])
+def test_commands_run_as_written(commands: list[str], tmp_path: Path) -> None:
     for folder in ("evals", "docs"):
         (tmp_path / folder).symlink_to(ROOT / folder)
-    arguments = [sys.executable, "-m", *shlex.split(command)]
-    done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    shown = (text for start, text in SHOWN.items() if command.startswith(start))
-    assert next(shown, '"settled": true') in done.stdout
+    for command in commands:
+        arguments = [sys.executable, "-m", *shlex.split(command)]
+        done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        shown = (text for start, text in SHOWN.items() if command.startswith(start))
+        assert next(shown, '"settled": true') in done.stdout
 
 
 def test_there_is_something_to_run() -> None:
-    assert len(COMMANDS) >= 3
+    assert sum(map(len, COMMANDS)) >= 3
     assert blocks("python")
 
 

@@ -137,7 +137,10 @@ def read_events(path: Path) -> tuple[Event, ...]:
         data = log_path(path).read_bytes()
     except OSError as error:
         raise StorageError(f"{log_path(path)} cannot be read: {error.strerror}.") from None
-    return _read_events(data[: data.rfind(b"\n") + 1], path)
+    events = _read_events(data[: data.rfind(b"\n") + 1], path)
+    if not events:
+        raise StorageError(f"{path} was broken off before anything began; run again.")
+    return events
 
 
 def log_path(path: Path) -> Path:

@@ -15,9 +15,9 @@ from formup.benchmarks.false_blocks import PLANTED, REGRESSION, planted
 from formup.evals.experiments.journal import read_rows
 from formup.evals.experiments.simulated_model import DUTIES
 from formup.prompts import PromptLibrary, load_prompt
-from formup.tools import world as workspace
 from formup.tools.errors import InputError
 from formup.tools.perception import measure as measure_module
+from formup.tools.perception.detectors import candidates as detector
 from formup.tools.perception.referring.attributes import Candidate
 from numpy.typing import NDArray
 
@@ -61,7 +61,7 @@ def forgetful(tmp_path: Path) -> Path:
 @pytest.fixture
 def seen_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The one picture is searched and measured once instead of in every trial, for the time."""
-    search, measure = workspace.find_candidates, measure_module.segment_candidate
+    search, measure = detector.find_candidates, measure_module.segment_candidate
     found, measured = dict[bytes, Any](), dict[tuple[bytes, str], Any]()
 
     def searched(pixels: NDArray[np.uint8]) -> Any:
@@ -76,7 +76,7 @@ def seen_once(monkeypatch: pytest.MonkeyPatch) -> None:
             measured[key] = measure(segment, candidate, **how)
         return measured[key]
 
-    monkeypatch.setattr(workspace, "find_candidates", searched)
+    monkeypatch.setattr(detector, "find_candidates", searched)
     monkeypatch.setattr(measure_module, "segment_candidate", closely)
 
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -122,7 +123,9 @@ def test_requests_to_a_model_keep_its_pace(folder: Path, monkeypatch: pytest.Mon
     async def sleep(seconds: float) -> None:
         slept.append(seconds)
 
-    monkeypatch.setattr("formup.evals.experiments.rate_limiter.asyncio.sleep", sleep)
+    monkeypatch.setattr(
+        "formup.evals.experiments.rate_limiter.asyncio", SimpleNamespace(sleep=sleep)
+    )
     arm = Method("agent", "simulated", "former@v003", rate=0.01)
     work, trials = work_for(folder, arm)
     assert [work(trial).status for trial in trials[:2]] == ["pass", "pass"]

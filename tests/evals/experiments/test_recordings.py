@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from formup.agent.store.folder import read_trace
+from formup.agent.store.folder import read_events
 from formup.evals.experiments.methods import Method
 from formup.evals.experiments.recordings import Recordings
 from formup.evals.experiments.trials import TrialRow
@@ -50,8 +50,9 @@ def rows(folder: str) -> list[TrialRow]:
 @pytest.mark.parametrize("path", ALL, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_ends_as_recorded(path: Path) -> None:
     row, attempt = replay(path)
-    end = read_trace(path).end
-    assert end is not None
+    *_, last = read_events(path)
+    assert last.kind == "end"
+    end = last.data
     assert (row.outcome, attempt["message"]) == (end["status"], end["message"])
     assert row.requests == end["usage"]["requests"]
 

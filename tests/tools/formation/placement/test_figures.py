@@ -198,9 +198,7 @@ def test_facing_needs_another_target_and_no_side() -> None:
     assert Contract(groups=(facing(2),)).target_ids == ("t2", "t1")
 
 
-def test_contracts_that_use_neither_are_written_as_before() -> None:
-    plain = Group(relation="around", targets=("t1",), robots=3).model_dump()
-    assert not {"facing", "shape"} & set(plain)
+def test_groups_with_forms_and_faced_things_are_read_as_written() -> None:
     group = facing(2)
     assert Group.model_validate(group.model_dump(mode="json")) == group
     form = drawn(8, {"kind": "circle", "box": BOX}).formation.contract.groups[0]
