@@ -71,18 +71,16 @@ def traced_tool(tool: Tool, tracer: "Tracer") -> Tool:
         "gen_ai.tool.description": tool.description,
     }
     function: Callable[..., Any] = tool.function
-
-    @functools.wraps(function)
-    def plain(*args: Any, **values: Any) -> Any:
-        with _span(tracer, "execute_tool", tool.name, facts):
-            return function(*args, **values)
+    if not inspect.iscoroutinefunction(function):
+        spanned = _span(tracer, "execute_tool", tool.name, facts)  # a new one for each call
+        return replace(tool, function=spanned(function))
 
     @functools.wraps(function)
     async def waiting(*args: Any, **values: Any) -> Any:
         with _span(tracer, "execute_tool", tool.name, facts):
             return await function(*args, **values)
 
-    return replace(tool, function=waiting if inspect.iscoroutinefunction(function) else plain)
+    return replace(tool, function=waiting)
 
 
 @contextmanager

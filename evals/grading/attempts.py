@@ -21,6 +21,7 @@ from .ring import escape_proof, ring
 SAME = 0.5
 """Overlap (intersection over union) above which an outline found is the thing meant."""
 Rule = Callable[[Goal, FloatArray, NDArray[np.bool_]], Part]
+"""Judges a goal with its rule, by positions, (m, 2) px, and which can be right at all, (m,)."""
 RULES: dict[str, Rule] = {
     "boundary": ring,
     "cage": escape_proof,
@@ -159,15 +160,11 @@ def _robots_of_goals(goals: Sequence[Goal], points: FloatArray) -> list[NDArray[
         return [np.arange(len(points))]
     slots = [i for i, goal in enumerate(goals) for _ in range(goal.robots)]
     places = shapely.points(points)
-    far = np.stack([shapely.distance(_ground(goal), places) for goal in goals], axis=1)
+    far = np.stack([shapely.distance(goal.target.region, places) for goal in goals], axis=1)
     rows, columns = linear_sum_assignment(far[:, slots])
     owner = np.full(len(points), len(goals) - 1)
     owner[rows] = np.asarray(slots)[columns]
     return [np.flatnonzero(owner == i) for i in range(len(goals))]
-
-
-def _ground(goal: Goal) -> Polygon:
-    return Polygon(goal.target.polygon, goal.target.holes)
 
 
 def _meant(found: Sequence[Polygon], things: Sequence[Thing]) -> bool:

@@ -7,7 +7,7 @@ credit a crowd with one robot in every part. The lesser of the two counts.
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from ...tools.geometry.outline import FloatArray, distances
 from ...tools.geometry.sampling import min_spacing, nearest
@@ -23,13 +23,8 @@ def infill(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
 
     A robot is right if it stands deep enough inside and belongs to a set of robots that are far
     enough apart, chosen as large as choosing the least crowded first makes it.
-
-    Args:
-        goal: with the rule.
-        points: (m, 2), px.
-        free: which of them can be right at all, (m,).
     """
-    rule, target = goal.success, Polygon(goal.target.polygon, goal.target.holes)
+    rule, target = goal.success, goal.target.region
     sign = np.where(shapely.contains_xy(target, points), 1.0, -1.0)
     depth = distances(target.boundary, points) * sign
     least, floor = rule["min_clearance_px"], rule["min_spacing_px"]
@@ -43,13 +38,14 @@ def infill(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
         problems.append(f"two robots {apart:.0f} px apart, {floor} needed")
     elif apart < STRICT_SPREAD * floor:
         strict.append(f"two robots {apart:.0f} px apart, {STRICT_SPREAD * floor:.0f} wanted")
-    bare = _bareness(goal, target, points)
+    cells = cells_within(target, target.bounds, goal.target.outline.size / CELLS)
+    bare = _bareness(cells, points)
     most = rule["max_uncovered_px"]
     if bare.max() > most:
         problems.append(f"a part {bare.max():.0f} px from the nearest robot, {most} allowed")
     elif STRICT_SPREAD * bare.max() > most:
         strict.append(f"a part {bare.max():.0f} px from a robot, {most / STRICT_SPREAD:.0f} wanted")
-    covered = float((_bareness(goal, target, points[right]) <= most).mean()) if right.any() else 0.0
+    covered = float((_bareness(cells, points[right]) <= most).mean()) if right.any() else 0.0
     measures = {"covered": covered, "uncovered_px": float(bare.max())}
     return Part(right, covered, tuple(problems), tuple(strict), measures)
 
@@ -69,11 +65,16 @@ def separated(points: FloatArray, allowed: NDArray[np.bool_], spacing: float) ->
     return apart
 
 
-def _bareness(goal: Goal, target: Polygon, points: FloatArray) -> FloatArray:
-    """Distance of the region's cells to the nearest point, px."""
-    x0, y0, x1, y1 = target.bounds
-    step = goal.target.outline.size / CELLS
+def cells_within(
+    region: BaseGeometry, bounds: tuple[float, float, float, float], step: float
+) -> FloatArray:
+    """Points of a grid over bounds, `step` apart, that lie within a region, (n, 2), px."""
+    x0, y0, x1, y1 = bounds
     columns, rows = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
     cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
-    cells = cells[shapely.contains_xy(target, cells)]
+    return cells[shapely.contains_xy(region, cells)]
+
+
+def _bareness(cells: FloatArray, points: FloatArray) -> FloatArray:
+    """Distance of the region's cells to the nearest point, px."""
     return np.asarray(nearest(points, cells, 1)[0], dtype=float).reshape(len(cells))

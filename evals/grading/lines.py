@@ -15,16 +15,10 @@ OFF = 0.1
 
 
 def corners(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
-    """Judge one robot at each of `points`, outside the target.
-
-    Args:
-        goal: with the rule.
-        points: (m, 2), px.
-        free: which of them can be right at all, (m,).
-    """
+    """Judge one robot at each of `points`, outside the target."""
     rule = goal.success
     slots, most = np.asarray(rule["points"], dtype=float), rule["tolerance_px"]
-    near = distances(Polygon(goal.target.polygon, goal.target.holes), points)
+    near = distances(goal.target.region, points)
     stands = free & (near > 0) & (near >= rule.get("min_clearance_px", 0))
     held = np.full(len(points), -1, dtype=np.intp)
     held[stands] = matched(points[stands], slots, most)
@@ -41,13 +35,7 @@ def corners(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
 
 
 def side(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
-    """Judge a row on one side by `band_px` and `min_span_frac`.
-
-    Args:
-        goal: with the rule.
-        points: (m, 2), px.
-        free: which of them can be right at all, (m,).
-    """
+    """Judge a row on one side by `band_px` and `min_span_frac`."""
     rule, target = goal.success, Polygon(goal.target.polygon)
     name, (low, high) = rule["where"].partition(":")[2], rule["band_px"]
     axis = 0 if name in ("top", "bottom") else 1
@@ -71,13 +59,7 @@ def side(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
 
 
 def line_between(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
-    """Judge robots on the segment between `points`.
-
-    Args:
-        goal: with the rule.
-        points: (m, 2), px.
-        free: which of them can be right at all, (m,).
-    """
+    """Judge robots on the segment between `points`."""
     a, b = np.asarray(goal.success["points"], dtype=float)
     most = goal.success["tolerance_px"]
     off = distances(LineString([a, b]), points)
@@ -89,13 +71,7 @@ def line_between(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Par
 
 
 def centre(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
-    """Judge robots at the first of `points`.
-
-    Args:
-        goal: with the rule.
-        points: (m, 2), px.
-        free: which of them can be right at all, (m,).
-    """
+    """Judge robots at the first of `points`."""
     middle, most = np.asarray(goal.success["points"][0]), goal.success["tolerance_px"]
     off = np.linalg.norm(points - middle, axis=1)
     problems, strict = (), ()

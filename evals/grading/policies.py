@@ -14,7 +14,6 @@ from shapely.geometry import LineString
 from ...tools.geometry.outline import FloatArray
 from ..tasks.task import Goal
 from .attempts import grade_goals
-from .grades import Graded
 
 DRAWS = 4
 """Repetitions of the policies that draw lots, for a chance level."""
@@ -58,11 +57,7 @@ def line(goal: Goal, random: Generator) -> FloatArray:
 
 Policy = Callable[[Goal, Generator], FloatArray]
 POLICIES: dict[str, Policy] = {
-    "pile": pile,
-    "scatter": scatter,
-    "boundary": boundary,
-    "circle": circle,
-    "line": line,
+    policy.__name__: policy for policy in (pile, scatter, boundary, circle, line)
 }
 
 
@@ -77,13 +72,13 @@ def scores(name: str, goals: Sequence[Goal], draws: int = DRAWS) -> tuple[float,
     if not goals:
         return 0.0, 0.0
     count = draws if name in ("scatter", "boundary") else 1
-    graded: list[Graded] = [grade_goals(goals, positions(name, goals, i)) for i in range(count)]
+    graded = [grade_goals(goals, positions(name, goals, i)) for i in range(count)]
     return float(np.mean([g.sr for g in graded])), float(np.mean([g.gcr for g in graded]))
 
 
-def chance(tasks: Sequence[Sequence[Goal]], draws: int = DRAWS) -> tuple[float, float]:
+def chance(tasks: Sequence[Sequence[Goal]]) -> tuple[float, float]:
     """SR and GCR of the best policy over tasks, each the goals of one: the chance level."""
-    means = [np.mean([scores(name, goals, draws) for goals in tasks], axis=0) for name in POLICIES]
+    means = [np.mean([scores(name, goals) for goals in tasks], axis=0) for name in POLICIES]
     return float(max(m[0] for m in means)), float(max(m[1] for m in means))
 
 

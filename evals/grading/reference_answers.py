@@ -6,7 +6,6 @@ If this does not score 1, the task or the grader is wrong: a test holds every ta
 from typing import Any
 
 import numpy as np
-import shapely
 from scipy.cluster.vq import kmeans2
 
 from ...tools.formation.contract import Contract, Group, Relation, with_defaults
@@ -15,6 +14,7 @@ from ...tools.geometry.outline import FloatArray
 from ...tools.geometry.sampling import nearest
 from ..tasks.task import Goal
 from .attempts import grade_goals
+from .infill import cells_within
 
 SPARE = 0.02
 """Share by which a place keeps clear of the ends of what the rule allows."""
@@ -35,29 +35,19 @@ def reference(goal: Goal) -> FloatArray:
         a, b = np.asarray(goal.success["points"], dtype=float)
         share = (np.arange(goal.robots) + 1) / (goal.robots + 1)
         return a + share[:, None] * (b - a)
-    if where == "inside":
-        quick = _spread_inside(goal)
-        return (
-            quick
-            if grade_goals([goal], quick).strict
-            else _place_by_contract(goal, where, WIDTHS[0])
-        )
-    bands = WIDTHS if "band_px" in goal.success else WIDTHS[:1]
-    placed = [_place_by_contract(goal, where, bands[0])]
-    if not grade_goals([goal], placed[0]).strict:
-        placed += [_place_by_contract(goal, where, width) for width in bands[1:]]
-    return placed[-1]
+    inside, (wide, narrow) = where == "inside", WIDTHS
+    placed = _spread_inside(goal) if inside else _place_by_contract(goal, where, wide)
+    if (inside or "band_px" in goal.success) and not grade_goals([goal], placed).strict:
+        placed = _place_by_contract(goal, where, narrow)
+    return placed
 
 
 def _spread_inside(goal: Goal) -> FloatArray:
     """Means of clusters of the region's cells, the nearest cells to them: quick and often even."""
     rule, target = goal.success, goal.target.outline.polygon
     inner = target.buffer(-rule["min_clearance_px"] * (1 + SPARE))
-    x0, y0, x1, y1 = target.bounds
     step = goal.target.outline.size / max(CELLS, 4 * goal.robots**0.5)
-    columns, rows = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
-    cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
-    cells = cells[shapely.contains_xy(inner, cells)]
+    cells = cells_within(inner, target.bounds, step)
     if len(cells) < goal.robots:
         return np.empty((0, 2))
     means, _ = kmeans2(cells, goal.robots, minit="++", seed=np.random.default_rng(0))

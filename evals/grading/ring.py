@@ -24,11 +24,6 @@ def ring(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
 
     A robot is right if it stands in the band and at least one of the gaps beside it is closed. Of
     the whole, the share of the way round that lies in closed gaps counts.
-
-    Args:
-        goal: with the rule.
-        points: (m, 2), px.
-        free: which of them can be right at all, (m,).
     """
     target = Polygon(goal.target.polygon)
     stands, problems = _in_band(goal, points, free)
@@ -60,11 +55,6 @@ def escape_proof(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Par
     A robot is right if it stands in the band. The whole is done where those that do certainly
     cage the target; else the share of the way round counts that they are spread along. Evenness
     is not asked for, so strict is the same.
-
-    Args:
-        goal: with the rule.
-        points: (m, 2), px.
-        free: which of them can be right at all, (m,).
     """
     stands, problems = _in_band(goal, points, free)
     complete = len(points) == goal.robots and bool(stands.all())

@@ -106,8 +106,8 @@ def drawing(task: Task, attempt: StoredAttempt | None, picture: PagePicture, tit
 def _truth_paths(goal: Goal) -> Iterator[Path]:
     """The true outlines, and where robots may stand as far as the rule says it."""
     for thing in goal.things:
-        yield from _paths(Polygon(thing.polygon, thing.holes), "truth", thing.name)
-    rule, target = goal.success, Polygon(goal.target.polygon, goal.target.holes)
+        yield from _paths(thing.region, "truth", thing.name)
+    rule, target = goal.success, goal.target.region
     if "band_px" in rule:
         low, high = rule["band_px"]
         yield from _paths(target.buffer(low), "band", f"{low:g} px off")

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.random import Generator
@@ -95,15 +96,13 @@ def _look(random: Generator, things: Sequence[Thing]) -> Look:
     )
 
 
-def _some(
-    random: Generator, choices: Sequence[Choice], fits: Sequence[bool] | None = None
-) -> Choice | None:
-    left = [c for i, c in enumerate(choices) if fits is None or fits[i]]
-    nouns = sorted({sort.noun for sort, _ in left})
+def _some(random: Generator, choices: Sequence[Choice]) -> Choice | None:
+    """One of the choices, each noun as likely as another; None of none."""
+    nouns = sorted({sort.noun for sort, _ in choices})
     if not nouns:
         return None
     noun = nouns[random.integers(len(nouns))]
-    same = [c for c in left if c[0].noun == noun]
+    same = [c for c in choices if c[0].noun == noun]
     return same[random.integers(len(same))]
 
 
@@ -150,7 +149,7 @@ def _odd(
 ) -> list[Thing] | Rows | None:
     """Things alike, the first one differing in what the kind says."""
     turned = kind == "askew"
-    usual = _some(random, solid, [s.upright or not turned for s, _ in solid])
+    usual = _some(random, [c for c in solid if c[0].upright or not turned])
     if usual is None:
         return None
     count = int(random.integers(5, 12))
@@ -158,9 +157,10 @@ def _odd(
     size, odd = where.base(share), usual
     sizes = size * random.uniform(0.98, 1.02, count)
     if kind == "odd_colour":
-        odd = _other_colour(random, solid, usual)
+        here, own = shade(random, usual[1]), [c for c in solid if c[0] is usual[0]]
+        odd = _some(random, [c for c in own if difference(shade(random, c[1]), here) > 38])
     elif kind == "odd_shape":
-        odd = _some(random, solid, [_unlike(c, usual) for c in solid])
+        odd = _some(random, [c for c in solid if _unlike(c, usual)])
     elif kind == "odd_size":
         sizes[0] *= (
             random.uniform(1.45, 1.75) if random.random() < 0.6 else 1 / random.uniform(1.45, 1.7)
@@ -188,13 +188,6 @@ def _odd(
     return _arranged(random, where, things, base, turns, max(where.family.rows, 0.5))
 
 
-def _other_colour(random: Generator, solid: list[Choice], usual: Choice) -> Choice | None:
-    here = shade(random, usual[1])
-    return _some(
-        random, solid, [s is usual[0] and difference(shade(random, c), here) > 38 for s, c in solid]
-    )
-
-
 def _unlike(choice: Choice, usual: Choice) -> bool:
     """The same colour in a form of another kind."""
     a, b = make_one(choice), make_one(usual)
@@ -214,18 +207,13 @@ def make_one(choice: Choice) -> Thing:
 
 def _cluster(random: Generator, where: Stage, things: list[Thing]) -> list[Thing] | None:
     """All but the first near each other, the first far away."""
-    x0, y0, x1, y1 = where.area
     share, flipped = random.uniform(0.5, 0.62), random.random() < 0.5
-    if x1 >= y1:
-        cut = x0 + share * (x1 - x0)
-        part, rest = (x0, y0, cut, y1), (x0 + (share + 0.1) * (x1 - x0), y0, x1, y1)
-        if flipped:
-            part, rest = (x1 - cut, y0, x1, y1), (x0, y0, x1 - rest[0], y1)
+    axis = int(where.area[2] < where.area[3])
+    long, part, rest = where.area[axis + 2], list(where.area), list(where.area)
+    if flipped:
+        part[axis], rest[axis + 2] = long - share * long, long - (share + 0.1) * long
     else:
-        cut = y0 + share * (y1 - y0)
-        part, rest = (x0, y0, x1, cut), (x0, y0 + (share + 0.1) * (y1 - y0), x1, y1)
-        if flipped:
-            part, rest = (x0, y1 - cut, x1, y1), (x0, y0, x1, y1 - rest[1])
+        part[axis + 2], rest[axis] = share * long, (share + 0.1) * long
     base, turns = _turns_of_things(random, where, len(things))
     turns = [base + turn for turn in turns]
     near = rows(random, part, things[1:], base, [t - base for t in turns[1:]])
@@ -274,18 +262,18 @@ def _choices_for(
     pool = [_some(random, solid) for _ in range(int(random.integers(2, 5)))]
     nouns, colours = {c[0].noun for c in pool if c}, {c[1] for c in pool if c}
     mixed = [c for c in solid if c[0].noun in nouns and c[1] in colours]
-    first = _some(random, mixed, [_leads(c, kind) for c in mixed])
+    first = _some(random, [c for c in mixed if _leads(c, kind)])
     if first is None:
         return None
-    named = [first, *(_some(random, mixed) for _ in range(_NAMED.get(kind, 0)))]
+    more = [_some(random, mixed) for _ in range(_NAMED.get(kind, 0))]
+    named = [first, *filter(None, more)]
     left = [[c for c in some if _leaves(c, first, kind)] for some in (mixed, solid)]
     for other in named[1:]:
-        left = [[c for c in some if other and not _confused(c, other)] for some in left]
+        left = [[c for c in some if not _confused(c, other)] for some in left]
     rest = left[0] or left[1]
-    if not rest or (kind in _NAMED and _clash(named)):
+    if not rest or (kind in _NAMED and any(_confused(a, b) for a, b in combinations(named, 2))):
         return None
-    drawn: list[Choice] = [rest[i] for i in random.integers(len(rest), size=count - len(named))]
-    return [c for c in named if c] + drawn
+    return named + [rest[i] for i in random.integers(len(rest), size=count - len(named))]
 
 
 _NAMED = {"left_of": 1, "right_of": 1, "above": 1, "below": 1, "nearest": 1, "between": 2}
@@ -295,11 +283,6 @@ _NAMED = {"left_of": 1, "right_of": 1, "above": 1, "below": 1, "nearest": 1, "be
 def _confused(a: Choice, b: Choice) -> bool:
     """Whether colour and noun do not tell them apart."""
     return a[0] is b[0] and (a[1] == b[1] or not a[0].by_colour)
-
-
-def _clash(named: Sequence[Choice | None]) -> bool:
-    some = [c for c in named if c]
-    return any(_confused(a, b) for i, a in enumerate(some) for b in some[i + 1 :])
 
 
 def _leads(choice: Choice, kind: str) -> bool:
@@ -344,10 +327,9 @@ def _on_one_side(
     own = random.random() < 0.5
     free = [i for i in range(2, len(things)) if own and things[i].sort is not things[0].sort]
     others = [i for i in range(2, len(things)) if i not in free]
-    for group, area in ((others, tuple(beyond)), (free, where.area)):
+    for group, area in ((others, beyond), (free, where.area)):
         some = [things[i] for i in group]
-        x0, y0, x1, y1 = area
-        pair += scatter(random, (x0, y0, x1, y1), some, [turns[i] for i in group], {}, pair) or []
+        pair += scatter(random, area, some, [turns[i] for i in group], {}, pair) or []
     return pair
 
 
@@ -371,7 +353,7 @@ def _enclosed(
     random: Generator, where: Stage, choices: list[Choice], things: list[Thing], turns: list[float]
 ) -> list[Thing] | None:
     """The first thing within one that encloses it, the others elsewhere."""
-    around = _some(random, choices, [sort.encloses for sort, _ in choices])
+    around = _some(random, [c for c in choices if c[0].encloses])
     if around is None:
         return None
     inner = things[0]

@@ -1,8 +1,10 @@
 """Grounds of the families: a texture in a fitting colour, with marks that are no things."""
 
 import math
+from pathlib import Path
 
 import shapely
+import yaml
 from numpy.random import Generator
 from shapely import affinity
 from shapely.geometry import Polygon
@@ -11,6 +13,9 @@ from .palette import RGB, lit
 from .things import Ground, Part
 
 Size = tuple[int, int]
+_COLOURS: dict[str, list[RGB]] = yaml.safe_load(
+    (Path(__file__).parent / "grounds.yaml").read_text(encoding="utf-8")
+)
 
 
 def _grey(random: Generator, low: float, high: float) -> RGB:
@@ -23,8 +28,10 @@ def _near_colour(random: Generator, colour: RGB, spread: float) -> RGB:
     return lit((red, green, blue), 1)
 
 
-def _one_of(random: Generator, colours: list[RGB]) -> RGB:
-    return colours[random.integers(len(colours))]
+def _one_of(random: Generator, material: str, spread: float) -> RGB:
+    """A colour of that material, each channel up to the share `spread` off."""
+    colours = _COLOURS[material]
+    return _near_colour(random, colours[random.integers(len(colours))], spread)
 
 
 def lot(random: Generator, size: Size) -> Ground:
@@ -36,16 +43,7 @@ def lot(random: Generator, size: Size) -> Ground:
 def table(random: Generator, size: Size) -> Ground:
     """Wood, a checked or a plain cloth, with crumbs at times."""
     texture = str(random.choice(["wood", "wood", "checks", "paper"]))
-    woods: list[RGB] = [(176, 128, 82), (120, 80, 50), (205, 170, 125), (90, 62, 45)]
-    cloths: list[RGB] = [
-        (225, 220, 205),
-        (120, 150, 165),
-        (165, 70, 70),
-        (70, 95, 80),
-        (60, 70, 100),
-        (190, 180, 140),
-    ]
-    colour = _near_colour(random, _one_of(random, woods if texture == "wood" else cloths), 0.08)
+    colour = _one_of(random, "wood" if texture == "wood" else "cloth", 0.08)
     crumbs = _specks(random, size, lit(colour, 1.25), 1.5) if random.random() < 0.4 else ()
     return Ground(texture, colour, crumbs)
 
@@ -71,26 +69,14 @@ def lawn(random: Generator, size: Size) -> Ground:
 
 def water(random: Generator, size: Size) -> Ground:
     """Water of a harbour, with flecks of foam."""
-    waters: list[RGB] = [(52, 96, 128), (40, 110, 120), (90, 135, 150), (38, 66, 96)]
-    colour = _near_colour(random, _one_of(random, waters), 0.08)
+    colour = _one_of(random, "water", 0.08)
     return Ground("water", colour, _specks(random, size, lit(colour, 1.3), 2))
 
 
 def sheet(random: Generator, size: Size) -> Ground:
     """Flat colour, paper, tiles or checks, dusty at times."""
-    sheets: list[RGB] = [
-        (245, 244, 240),
-        (232, 224, 205),
-        (205, 215, 225),
-        (60, 66, 78),
-        (200, 200, 200),
-        (170, 205, 190),
-        (235, 205, 200),
-        (35, 45, 60),
-        (150, 160, 150),
-    ]
     texture = str(random.choice(["flat", "paper", "paper", "tiles", "checks"]))
-    colour = _near_colour(random, _one_of(random, sheets), 0.03)
+    colour = _one_of(random, "sheet", 0.03)
     dust = _specks(random, size, lit(colour, 0.7), 1.3) if random.random() < 0.25 else ()
     return Ground(texture, colour, dust)
 

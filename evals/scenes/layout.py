@@ -19,7 +19,6 @@ GAP = 0.52
 """Least gap of two things, as a share of the larger one's size."""
 TRIES = 60
 Point = tuple[float, float]
-Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ def room(thing: Thing, size: tuple[int, int]) -> float:
 
 def scatter(
     random: Generator,
-    area: Box,
+    area: Sequence[float],
     things: Sequence[Thing],
     turns: Sequence[float],
     anchors: Mapping[int, Point],
@@ -82,7 +81,7 @@ def scatter(
     return [placed[i] for i in sorted(placed)]
 
 
-def _free_span(thing: Thing, area: Box) -> tuple[np.ndarray, np.ndarray]:
+def _free_span(thing: Thing, area: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
     x0, y0, x1, y1 = thing.polygon.bounds
     off = clearance(thing) + 3
     low = np.array([area[0] - x0 + off, area[1] - y0 + off])
@@ -105,7 +104,7 @@ def _free(thing: Thing, x: float, y: float, others: Sequence[Thing]) -> bool:
 
 def rows(
     random: Generator,
-    area: Box,
+    area: Sequence[float],
     things: Sequence[Thing],
     turn: float,
     turns: Sequence[float],

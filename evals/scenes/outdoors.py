@@ -1,15 +1,13 @@
 """Drawings of what stands outdoors: cars, gardens, boats; the first part is the whole outline."""
 
-import math
-
 import numpy as np
 import shapely
 from numpy.random import Generator
 from shapely import affinity
-from shapely.geometry import Polygon
+from shapely.geometry import Polygon, box
 
 from . import polygons as shapes
-from .drawing import GLASS, edged, shrunk
+from .drawing import GLASS, boarded, dots_around, edged, shrunk
 from .palette import RGB, lit
 from .things import Part
 
@@ -19,23 +17,19 @@ WOOD: RGB = (150, 104, 62)
 def car(random: Generator, colour: RGB) -> list[Part]:
     """A car from above, its bonnet to the right: mirrors, windows, lights."""
     wide = random.uniform(0.42, 0.48)
-    body = shapes.rounded(shapes.bar(-0.5, -wide / 2, 0.5, wide / 2), random.uniform(0.08, 0.14))
-    mirrors = [shapes.bar(0.1, s * wide / 2 - 0.03, 0.16, s * wide / 2 + 0.03) for s in (-1, 1)]
+    body = shapes.rounded(box(-0.5, -wide / 2, 0.5, wide / 2), random.uniform(0.08, 0.14))
+    mirrors = [box(0.1, s * wide / 2 - 0.03, 0.16, s * wide / 2 + 0.03) for s in (-1, 1)]
     outline = shapes.union([body, *mirrors])
     cabin = wide * 0.42
     front = Polygon([(0.1, -cabin), (0.22, -cabin * 0.92), (0.22, cabin * 0.92), (0.1, cabin)])
     back = Polygon([(-0.34, -cabin * 0.9), (-0.26, -cabin), (-0.26, cabin), (-0.34, cabin * 0.9)])
-    sides = [shapes.bar(-0.24, s * cabin - 0.012, 0.08, s * cabin + 0.012) for s in (-1, 1)]
-    lamps = [
-        shapes.bar(0.45, s * wide * 0.34 - 0.03, 0.49, s * wide * 0.34 + 0.03) for s in (-1, 1)
-    ]
-    rear = [
-        shapes.bar(-0.49, s * wide * 0.34 - 0.03, -0.46, s * wide * 0.34 + 0.03) for s in (-1, 1)
-    ]
+    sides = [box(-0.24, s * cabin - 0.012, 0.08, s * cabin + 0.012) for s in (-1, 1)]
+    lamps = [box(0.45, s * wide * 0.34 - 0.03, 0.49, s * wide * 0.34 + 0.03) for s in (-1, 1)]
+    rear = [box(-0.49, s * wide * 0.34 - 0.03, -0.46, s * wide * 0.34 + 0.03) for s in (-1, 1)]
     return [
         Part(outline, lit(colour, 0.8)),
         Part(body.buffer(-0.015), colour),
-        Part(shapes.rounded(shapes.bar(-0.25, -cabin, 0.1, cabin), 0.03), lit(colour, 1.12)),
+        Part(shapes.rounded(box(-0.25, -cabin, 0.1, cabin), 0.03), lit(colour, 1.12)),
         Part(shapely.union_all([front, back, *sides]), GLASS),
         Part(shapely.union_all(lamps), (250, 245, 215)),
         Part(shapely.union_all(rear), (150, 25, 25)),
@@ -45,11 +39,11 @@ def car(random: Generator, colour: RGB) -> list[Part]:
 def van(random: Generator, colour: RGB) -> list[Part]:
     """A van from above: a long box with a windscreen."""
     long = random.uniform(0.55, 0.62)
-    body = shapes.rounded(shapes.bar(-long, -0.24, long, 0.24), 0.05)
+    body = shapes.rounded(box(-long, -0.24, long, 0.24), 0.05)
     screen = Polygon(
         [(long - 0.2, -0.21), (long - 0.1, -0.17), (long - 0.1, 0.17), (long - 0.2, 0.21)]
     )
-    ribs = [shapes.bar(x, -0.2, x + 0.012, 0.2) for x in np.linspace(-long + 0.1, long - 0.3, 5)]
+    ribs = [box(x, -0.2, x + 0.012, 0.2) for x in np.linspace(-long + 0.1, long - 0.3, 5)]
     return [
         *edged(body, colour, 0.025, 0.75),
         Part(shapely.union_all(ribs), lit(colour, 0.85)),
@@ -138,21 +132,14 @@ def pot(random: Generator, colour: RGB) -> list[Part]:
 def bench(random: Generator, colour: RGB) -> list[Part]:
     """A bench: three boards."""
     ratio = random.uniform(2.6, 3.3)
-    boards = [shapes.bar(-ratio / 2, y, ratio / 2, y + 0.29) for y in (-0.5, -0.145, 0.21)]
-    return [
-        Part(shapes.rectangle(ratio), lit(colour, 0.6)),
-        Part(shapely.union_all(boards), colour),
-    ]
+    boards = [box(-ratio / 2, y, ratio / 2, y + 0.29) for y in (-0.5, -0.145, 0.21)]
+    return boarded(ratio, 0.6, boards, colour)
 
 
 def hedge(random: Generator, colour: RGB) -> list[Part]:
     """A hedge cut to a C."""
     outline = shapes.cee(random.uniform(0.4, 0.5), random.uniform(70, 110))
-    turns, radii = random.uniform(0, 6.3, 40), random.uniform(0.6, 0.95, 40)
-    tufts = [
-        shapes.circle(0.07, r * math.cos(t), r * math.sin(t))
-        for t, r in zip(turns, radii, strict=True)
-    ]
+    tufts = dots_around(random, 40, (0.6, 0.95), 0.07)
     return [
         *edged(outline, colour, 0.04, 0.75),
         *[Part(tuft, lit(colour, random.uniform(0.82, 1.2))) for tuft in tufts],
@@ -165,8 +152,7 @@ def boat(random: Generator, colour: RGB) -> list[Part]:
     outline = shapes.hull(ratio, random.uniform(0.55, 0.75))
     inner = outline.buffer(-0.1)
     seats = [
-        shapes.bar(x, -0.5, x + 0.13, 0.5).intersection(inner)
-        for x in (-0.3 * ratio, 0.0, 0.15 * ratio)
+        box(x, -0.5, x + 0.13, 0.5).intersection(inner) for x in (-0.3 * ratio, 0.0, 0.15 * ratio)
     ]
     return [
         Part(outline, colour),
@@ -179,7 +165,7 @@ def motorboat(random: Generator, colour: RGB) -> list[Part]:
     """A motor boat: a decked bow, a screen and a cockpit."""
     ratio = random.uniform(2.1, 2.5)
     outline = shapes.hull(ratio, 0.8)
-    cockpit = shapes.rounded(shapes.bar(-0.4 * ratio, -0.3, 0.05 * ratio, 0.3), 0.08)
+    cockpit = shapes.rounded(box(-0.4 * ratio, -0.3, 0.05 * ratio, 0.3), 0.08)
     screen = Polygon(
         [(0.05 * ratio, -0.34), (0.14 * ratio, -0.2), (0.14 * ratio, 0.2), (0.05 * ratio, 0.34)]
     )
@@ -203,30 +189,20 @@ def buoy(random: Generator, colour: RGB) -> list[Part]:
 def raft(random: Generator, colour: RGB) -> list[Part]:
     """A raft of planks."""
     ratio = random.uniform(1.15, 1.4)
-    planks = [shapes.bar(-ratio / 2, y, ratio / 2, y + 0.17) for y in np.linspace(-0.5, 0.33, 5)]
-    return [
-        Part(shapes.rectangle(ratio), lit(colour, 0.6)),
-        Part(shapely.union_all(planks), colour),
-    ]
+    planks = [box(-ratio / 2, y, ratio / 2, y + 0.17) for y in np.linspace(-0.5, 0.33, 5)]
+    return boarded(ratio, 0.6, planks, colour)
 
 
 def jetty(random: Generator, colour: RGB) -> list[Part]:
     """A long jetty of boards."""
     ratio = random.uniform(3.6, 4.6)
-    boards = [
-        shapes.bar(x + 0.03, -0.5, x + 0.2, 0.5) for x in np.arange(-ratio / 2, ratio / 2, 0.22)
-    ]
-    return [
-        Part(shapes.rectangle(ratio), lit(colour, 0.7)),
-        Part(shapely.union_all(boards), colour),
-    ]
+    boards = [box(x + 0.03, -0.5, x + 0.2, 0.5) for x in np.arange(-ratio / 2, ratio / 2, 0.22)]
+    return boarded(ratio, 0.7, boards, colour)
 
 
 def lifebuoy(random: Generator, colour: RGB) -> list[Part]:
     """A swimming ring with four pale bands."""
     outline = shapes.annulus(random.uniform(0.45, 0.55))
-    band = shapely.union_all(
-        [shapes.bar(-1.1, -0.13, 1.1, 0.13), shapes.bar(-0.13, -1.1, 0.13, 1.1)]
-    )
+    band = shapely.union_all([box(-1.1, -0.13, 1.1, 0.13), box(-0.13, -1.1, 0.13, 1.1)])
     pale: RGB = (240, 238, 232) if max(colour) - min(colour) > 60 else (205, 60, 45)
     return [*edged(outline, colour, 0.03, 0.8), Part(band, pale)]

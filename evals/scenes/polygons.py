@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from numpy.random import Generator
 from shapely import affinity
-from shapely.geometry import Point, Polygon
+from shapely.geometry import Point, Polygon, box
 
 
 def polar(radii: Sequence[float] | np.ndarray) -> Polygon:
@@ -34,14 +34,9 @@ def oval(ratio: float) -> Polygon:
     return affinity.scale(circle(), ratio, 1)
 
 
-def bar(x0: float, y0: float, x1: float, y1: float) -> Polygon:
-    """An upright rectangle."""
-    return shapely.box(x0, y0, x1, y1)
-
-
 def rectangle(ratio: float) -> Polygon:
     """A rectangle about the origin, 1 high and `ratio` long."""
-    return bar(-ratio / 2, -0.5, ratio / 2, 0.5)
+    return box(-ratio / 2, -0.5, ratio / 2, 0.5)
 
 
 def rounded(polygon: Polygon, radius: float) -> Polygon:
@@ -56,17 +51,17 @@ def star(points: int, waist: float) -> Polygon:
 
 def cross(arm: float) -> Polygon:
     """A plus sign with arms this wide and 2 long."""
-    return union([bar(-1, -arm / 2, 1, arm / 2), bar(-arm / 2, -1, arm / 2, 1)])
+    return union([box(-1, -arm / 2, 1, arm / 2), box(-arm / 2, -1, arm / 2, 1)])
 
 
 def ell(arm: float) -> Polygon:
     """The letter L."""
-    return union([bar(-0.8, -1, -0.8 + arm, 1), bar(-0.8, 1 - arm, 0.8, 1)])
+    return union([box(-0.8, -1, -0.8 + arm, 1), box(-0.8, 1 - arm, 0.8, 1)])
 
 
 def tee(arm: float) -> Polygon:
     """The letter T."""
-    return union([bar(-1, -1, 1, arm - 1), bar(-arm / 2, -1, arm / 2, 1)])
+    return union([box(-1, -1, 1, arm - 1), box(-arm / 2, -1, arm / 2, 1)])
 
 
 def arrow(shaft: float) -> Polygon:
@@ -96,7 +91,7 @@ def annulus(hole: float) -> Polygon:
 
 def frame(ratio: float, width: float) -> Polygon:
     """A rectangular frame, 1 high, `ratio` long, its sides this wide."""
-    hole = bar(width - ratio / 2, width - 0.5, ratio / 2 - width, 0.5 - width)
+    hole = box(width - ratio / 2, width - 0.5, ratio / 2 - width, 0.5 - width)
     return Polygon(rectangle(ratio).exterior, [hole.exterior])
 
 

@@ -7,8 +7,8 @@ the words that fill its template where it is beyond doubt, and None elsewhere.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
-from .families import LOOSELY
 from .layout import nearest_gap
 from .things import Thing
 
@@ -31,20 +31,15 @@ class View:
         return max(42.0, 0.062 * self.size[0])
 
 
-Rule = Callable[[Thing, list[Thing], View], Slots | None]
+Rule = Callable[[Thing, list[Thing], View], Slots | bool | None]
 
 
 def reference_slots(kind: str, thing: Thing, group: Sequence[Thing], view: View) -> Slots | None:
     """What fills the template of that kind for a thing of a group, or None where it is unclear."""
-    return _RULES[kind](thing, [t for t in group if t is not thing], view)
-
-
-def _slots_if(rule: Callable[[Thing, list[Thing], View], bool]) -> Rule:
-    return lambda thing, others, view: {} if rule(thing, others, view) else None
-
-
-def _single(thing: Thing, others: list[Thing], view: View) -> bool:
-    return not others
+    found = _RULES[kind](thing, [t for t in group if t is not thing], view)
+    if found is None or isinstance(found, dict):
+        return found
+    return {} if found else None
 
 
 def _by_colour(thing: Thing, others: list[Thing], view: View) -> Slots | None:
@@ -53,15 +48,14 @@ def _by_colour(thing: Thing, others: list[Thing], view: View) -> Slots | None:
 
 
 def _by_shape(thing: Thing, others: list[Thing], view: View) -> Slots | None:
-    if not thing.sort.shape or any(goes_by(t, thing) for t in view.things if t is not thing):
+    if not thing.sort.is_shape or any(goes_by(t, thing) for t in view.things if t is not thing):
         return None
-    return {"shape": thing.sort.shape}
+    return {"shape": thing.sort.noun}
 
 
 def goes_by(other: Thing, thing: Thing) -> bool:
     """Whether someone might call the other by the thing's noun."""
-    noun = thing.sort.noun
-    return other.sort.noun == noun or other.sort.noun in LOOSELY.get(noun, ())
+    return other.sort.noun in (thing.sort.noun, *thing.sort.also)
 
 
 def _by_both(thing: Thing, others: list[Thing], view: View) -> Slots | None:
@@ -69,9 +63,9 @@ def _by_both(thing: Thing, others: list[Thing], view: View) -> Slots | None:
     same_shape = [t for t in rest if goes_by(t, thing)]
     same_colour = [t for t in rest if t.colour == thing.colour]
     both = any(t.colour == thing.colour for t in same_shape)
-    if not thing.sort.shape or both or not same_shape or not same_colour:
+    if not thing.sort.is_shape or both or not same_shape or not same_colour:
         return None
-    return {"colour": thing.colour, "shape": thing.sort.shape}
+    return {"colour": thing.colour, "shape": thing.sort.noun}
 
 
 def _larger(thing: Thing, others: list[Thing], view: View) -> bool:
@@ -95,22 +89,16 @@ def _along_axis(thing: Thing, axis: int, sign: int) -> tuple[float, float]:
     return sign * thing.place[axis], sign * edge
 
 
-def _most(axis: int, sign: int) -> Callable[[Thing, list[Thing], View], bool]:
-    def rule(thing: Thing, others: list[Thing], view: View) -> bool:
-        centre, edge = _along_axis(thing, axis, sign)
-        rest = [_along_axis(t, axis, sign) for t in others]
-        return bool(rest) and all(centre >= c + view.margin and edge >= e + 8 for c, e in rest)
-
-    return rule
+def _most(axis: int, sign: int, thing: Thing, others: list[Thing], view: View) -> bool:
+    centre, edge = _along_axis(thing, axis, sign)
+    rest = [_along_axis(t, axis, sign) for t in others]
+    return bool(rest) and all(centre >= c + view.margin and edge >= e + 8 for c, e in rest)
 
 
-def _second(sign: int) -> Callable[[Thing, list[Thing], View], bool]:
-    def rule(thing: Thing, others: list[Thing], view: View) -> bool:
-        first = [t for t in others if _most(0, sign)(t, [thing], view)]
-        rest = [t for t in others if t not in first]
-        return len(first) == 1 and len(rest) > 1 and _most(0, sign)(thing, rest, view)
-
-    return rule
+def _second(sign: int, thing: Thing, others: list[Thing], view: View) -> bool:
+    first = [t for t in others if _most(0, sign, t, [thing], view)]
+    rest = [t for t in others if t not in first]
+    return len(first) == 1 and len(rest) > 1 and _most(0, sign, thing, rest, view)
 
 
 def phrase(thing: Thing, view: View) -> str | None:
@@ -123,23 +111,21 @@ def phrase(thing: Thing, view: View) -> str | None:
     return None
 
 
-def _beside_another(axis: int, sign: int) -> Rule:
+def _beside_another(
+    axis: int, sign: int, thing: Thing, others: list[Thing], view: View
+) -> Slots | None:
     """The only one of its group on that side of another thing."""
-
-    def rule(thing: Thing, others: list[Thing], view: View) -> Slots | None:
-        for other in view.things:
-            words = phrase(other, view) if other is not thing else None
-            rest = [t for t in others if t is not other]
-            if words is None or not rest or not _most(axis, sign)(thing, [other], view):
-                continue
-            ahead = _along_axis(other, axis, sign)[0] - 0.4 * view.margin
-            across = abs(thing.place[1 - axis] - other.place[1 - axis])
-            far = abs(thing.place[axis] - other.place[axis])
-            if across <= 0.8 * far and all(_along_axis(t, axis, sign)[0] <= ahead for t in rest):
-                return {"other": words}
-        return None
-
-    return rule
+    for other in view.things:
+        words = phrase(other, view) if other is not thing else None
+        rest = [t for t in others if t is not other]
+        if words is None or not rest or not _most(axis, sign, thing, [other], view):
+            continue
+        ahead = _along_axis(other, axis, sign)[0] - 0.4 * view.margin
+        across = abs(thing.place[1 - axis] - other.place[1 - axis])
+        far = abs(thing.place[axis] - other.place[axis])
+        if across <= 0.8 * far and all(_along_axis(t, axis, sign)[0] <= ahead for t in rest):
+            return {"other": words}
+    return None
 
 
 def _nearest_to_another(thing: Thing, others: list[Thing], view: View) -> Slots | None:
@@ -161,14 +147,14 @@ def _nearest_to_another(thing: Thing, others: list[Thing], view: View) -> Slots 
 def _inside_another(thing: Thing, others: list[Thing], view: View) -> Slots | None:
     for other in view.things:
         words = phrase(other, view) if other.sort.encloses else None
-        held = [t for t in view.things if t is not other and _lies_within(t, other)]
+        held = [
+            t
+            for t in view.things
+            if t is not other and other.polygon.convex_hull.contains(t.polygon)
+        ]
         if words and held == [thing]:
             return {"other": words}
     return None
-
-
-def _lies_within(thing: Thing, other: Thing) -> bool:
-    return other.polygon.convex_hull.contains(thing.polygon)
 
 
 def _between_two(thing: Thing, others: list[Thing], view: View) -> Slots | None:
@@ -240,11 +226,8 @@ def _stands_alone(thing: Thing, others: list[Thing], view: View) -> bool:
     return nearest_gap(thing, others) >= 2.0 * max(gaps)
 
 
-def _differs(of: Callable[[Thing], str]) -> Callable[[Thing, list[Thing], View], bool]:
-    def rule(thing: Thing, others: list[Thing], view: View) -> bool:
-        return {of(t) for t in others} == {of(others[0])} and of(thing) != of(others[0])
-
-    return rule
+def _differs(of: Callable[[Thing], str], thing: Thing, others: list[Thing], view: View) -> bool:
+    return {of(t) for t in others} == {of(others[0])} and of(thing) != of(others[0])
 
 
 def _odd_size(thing: Thing, others: list[Thing], view: View) -> bool:
@@ -254,35 +237,35 @@ def _odd_size(thing: Thing, others: list[Thing], view: View) -> bool:
 
 
 _RULES: dict[str, Rule] = {
-    "single": _slots_if(_single),
+    "single": lambda thing, others, view: not others,
     "colour": _by_colour,
     "shape": _by_shape,
     "colour_shape": _by_both,
-    "largest": _slots_if(_larger),
-    "smallest": _slots_if(_smaller),
-    "leftmost": _slots_if(_most(0, -1)),
-    "rightmost": _slots_if(_most(0, 1)),
-    "topmost": _slots_if(_most(1, -1)),
-    "bottommost": _slots_if(_most(1, 1)),
-    "second_left": _slots_if(_second(-1)),
-    "second_right": _slots_if(_second(1)),
+    "largest": _larger,
+    "smallest": _smaller,
+    "leftmost": partial(_most, 0, -1),
+    "rightmost": partial(_most, 0, 1),
+    "topmost": partial(_most, 1, -1),
+    "bottommost": partial(_most, 1, 1),
+    "second_left": partial(_second, -1),
+    "second_right": partial(_second, 1),
     "largest_colour": _larger_of_colour,
-    "left_of": _beside_another(0, -1),
-    "right_of": _beside_another(0, 1),
-    "above": _beside_another(1, -1),
-    "below": _beside_another(1, 1),
+    "left_of": partial(_beside_another, 0, -1),
+    "right_of": partial(_beside_another, 0, 1),
+    "above": partial(_beside_another, 1, -1),
+    "below": partial(_beside_another, 1, 1),
     "nearest": _nearest_to_another,
     "inside": _inside_another,
     "between": _between_two,
     "corner": _in_corner,
-    "middle": _slots_if(_in_middle),
-    "round": _slots_if(_round),
-    "long": _slots_if(_elongated),
-    "odd_colour": _slots_if(_differs(lambda t: t.colour)),
-    "odd_size": _slots_if(_odd_size),
-    "odd_shape": _slots_if(_differs(lambda t: t.sort.noun)),
-    "askew": _slots_if(_askew),
-    "alone": _slots_if(_stands_alone),
+    "middle": _in_middle,
+    "round": _round,
+    "long": _elongated,
+    "odd_colour": partial(_differs, lambda t: t.colour),
+    "odd_size": _odd_size,
+    "odd_shape": partial(_differs, lambda t: t.sort.noun),
+    "askew": _askew,
+    "alone": _stands_alone,
 }
 HIDDEN = ("odd_colour", "odd_size", "odd_shape", "askew", "alone")
 KINDS = tuple(kind for kind in _RULES if kind not in HIDDEN)

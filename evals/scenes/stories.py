@@ -26,6 +26,8 @@ SHARES = {"single": (0.01, 0.15), "multi": (0.004, 0.08), "hidden": (0.004, 0.08
 """Share of the picture a target may have."""
 FRESH = 1 / 3
 ATTEMPTS = 25
+Words = dict[str, dict[str, list[str]]]
+"""Templates by what they are for, arrangements or referring, and by its kind."""
 COUNTS = "one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen"
 NUMBERS = (*COUNTS.split(), "sixteen", "seventeen", "eighteen", "nineteen", "twenty")
 
@@ -132,6 +134,13 @@ def entry_of(story: Story) -> dict[str, Any]:
     }
 
 
+def retasked(story: Story, **changes: Any) -> dict[str, Any]:
+    """The entry of a story with these parts of its task changed."""
+    entry = entry_of(story)
+    entry["tasks"][0] |= changes
+    return entry
+
+
 def _object(name: str, thing: Thing) -> dict[str, Any]:
     rings = [
         [[round(float(x), 2), round(float(y), 2)] for x, y in list(ring.coords)[:-1]]
@@ -149,7 +158,7 @@ def _object(name: str, thing: Thing) -> dict[str, Any]:
 
 
 def _instruction_of(
-    random: Generator, story: Story, arrangement: str, robots: int, side: str, words: dict[str, Any]
+    random: Generator, story: Story, arrangement: str, robots: int, side: str, words: Words
 ) -> str:
     thing = named(random, story, words)
     templates = words["arrangements"][arrangement]
@@ -158,7 +167,7 @@ def _instruction_of(
     return text[:1].upper() + text[1:]
 
 
-def named(random: Generator, story: Story, words: dict[str, Any] | None = None) -> str:
+def named(random: Generator, story: Story, words: Words | None = None) -> str:
     """A phrase that says which thing is meant, in the known wordings if none are given."""
     kind = story.kind
     if kind in ("odd_colour", "odd_size", "odd_shape") and random.random() < 0.5:
@@ -168,7 +177,7 @@ def named(random: Generator, story: Story, words: dict[str, Any] | None = None) 
 
 
 @cache
-def wordings() -> list[dict[str, Any]]:
+def wordings() -> list[Words]:
     """The known wordings, and the fresh ones where there are any."""
     here = Path(__file__).parent
     paths = [here / "wordings.yaml", here / "fresh.yaml"]

@@ -59,13 +59,12 @@ def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str,
         low = max((0.03 if closed else 0.04) * size, 2.0)
         high = max((0.4 if closed else 0.5) * size, 16.0)
         loop = thing.outline.filled.buffer((low + high) / 2).exterior.length
-        slack = (1.8 if thing.hollow else 1.6) if closed else 2.0
         rule = {
             "where": "boundary",
             "side": "outside",
             "band_px": [round(low, 1), round(high, 1)],
             "even": True,
-            "max_gap_px": round(slack * loop / robots, 1),
+            "max_gap_px": round(slack(thing, arrangement) * loop / robots, 1),
         }
         return rule | ({"closed": True, "min_clearance_px": round(low, 1)} if closed else {})
     if arrangement == "inside":
@@ -94,6 +93,13 @@ def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str,
         "points": [[round(x, 1), round(y, 1)]],
         "tolerance_px": round(max(0.2 * size, 5), 1),
     }
+
+
+def slack(thing: Thing, arrangement: str) -> float:
+    """How much wider than an even ring's a gap may be."""
+    if arrangement == "around":
+        return 2.0
+    return 1.8 if thing.hollow else 1.6
 
 
 def _counted_corners(thing: Thing) -> list[tuple[float, float]]:

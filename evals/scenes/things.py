@@ -1,7 +1,7 @@
 """What a scene is made of: coloured parts, things made of parts, grounds, and the scene itself."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -33,19 +33,21 @@ class Sort:
         by_colour: whether a person would name it by its colour.
         upright: whether one sees how it is turned.
         scale: its usual size against other things of the scene.
-        shape: the word for its shape, where that is what it is.
+        is_shape: whether its noun is the word for a shape.
+        also: nouns of other things that some would call by this one.
     """
 
     noun: str
-    colours: tuple[str, ...]
+    colours: Sequence[str]
     draw: Callable[[Generator, RGB], list[Part]]
     corners: int = 0
     by_colour: bool = True
     upright: bool = False
     scale: float = 1.0
-    shape: str = ""
+    is_shape: bool = False
     plural: str = ""
     encloses: bool = False
+    also: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -210,4 +212,4 @@ class Family:
     turns: str = "free"
     rows: float = 0.0
     bays: bool = False
-    beyond: tuple[str, ...] = ("shape", "colour_shape")
+    beyond: Sequence[str] = ("shape", "colour_shape")

@@ -7,7 +7,7 @@ A prompt that holds them is graded on what it was told. Optimisers copy them in 
 import re
 from collections.abc import Iterable
 from functools import cache
-from typing import Any, cast
+from itertools import chain
 
 from ...prompts import Prompt
 from ...prompts.lint import Finding
@@ -37,7 +37,9 @@ def leaks(prompt: Prompt) -> list[Finding]:
 def _known_content() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[float, float]]]:
     """Runs of words, and places (x, y) in px, of the tasks that ship with formup."""
     tasks = [task for name in ("photos", "many") for task in load_suite(name).tasks]
-    texts = [task.instruction for task in tasks] + list(_strings(wordings()))
+    parts = [part for words in wordings() for part in words.values()]
+    templates = chain.from_iterable(some for part in parts for some in part.values())
+    texts = chain([task.instruction for task in tasks], templates)
     runs = {run for text in texts for run in _word_runs(text)}
     return frozenset(runs), frozenset(place for task in tasks for place in _places(task))
 
@@ -56,17 +58,3 @@ def _places(task: Task) -> Iterable[tuple[float, float]]:
         x0, y0, x1, y1 = thing.outline.bounds
         yield from ((x, y) for ring in (thing.polygon, *thing.holes) for x, y in ring)
         yield from ((x, y) for x in (x0, x1) for y in (y0, y1))
-
-
-def _strings(value: Any) -> Iterable[str]:
-    """All texts of a nested value."""
-    if isinstance(value, str):
-        yield value
-    for part in _parts_of_value(value):
-        yield from _strings(part)
-
-
-def _parts_of_value(value: Any) -> Iterable[Any]:
-    if isinstance(value, dict):
-        return cast(dict[str, Any], value).values()
-    return cast(list[Any], value) if isinstance(value, list) else ()

@@ -38,9 +38,14 @@ class Thing:
         """The outline as geometry."""
         return make_outline(self.polygon, tuple(self.holes))
 
+    @cached_property
+    def region(self) -> Polygon:
+        """What it covers, without its holes."""
+        return Polygon(self.polygon, self.holes)
+
     def overlap(self, found: Polygon) -> float:
         """Intersection over union of an outline that was found with the true one."""
-        truth = shapely.make_valid(Polygon(self.polygon, self.holes))
+        truth = shapely.make_valid(self.region)
         return float(found.intersection(truth).area / max(found.union(truth).area, 1e-9))
 
 

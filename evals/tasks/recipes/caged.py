@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ...scenes.stories import entry_of, named, story_of
+from ...scenes.stories import named, retasked, story_of
 from ...scenes.things import Thing
 from .length_rules import distance
 
@@ -37,15 +37,14 @@ def caged(seed: int) -> dict[str, Any]:
     text = words.format(thing=named(random, story), n=n, d=d)
     off = max(OFF, OFF_SHARE * d)
     rule = {"where": "cage", "band_px": [round(max(d - off, 1.0), 1), round(d + off, 1)]}
-    entry = entry_of(story)
-    entry["tasks"][0] |= {
-        "instruction": f"{text[:1].upper()}{text[1:]}.",
-        "robots": n,
-        "category": "caging",
-        "success": rule,
-        "style": "default",
-    }
-    return entry
+    return retasked(
+        story,
+        instruction=f"{text[:1].upper()}{text[1:]}.",
+        robots=n,
+        category="caging",
+        success=rule,
+        style="default",
+    )
 
 
 def _few_robots(thing: Thing, d: float, share: float) -> int:

@@ -10,26 +10,24 @@ import shapely
 from numpy.random import Generator
 
 from ...scenes.layout import room
-from ...scenes.success_rules import success
+from ...scenes.success_rules import slack, success
 from ...scenes.things import Thing
 
 LEAST = 5
 """A distance under this, px, is within what an outline can be off."""
 FINE_GAP = 8.0
 """Least distance of neighbours at which many robots are asked for, px."""
-SLACK = {"around": 2.0, "cage": 1.6}
-HOLLOW_SLACK = 1.8
 
 
 def ring_rule(thing: Thing, arrangement: str, robots: int, d: float, off: float) -> dict[str, Any]:
     """A ring at a named distance d, px; robots may be `off` px nearer or farther."""
     rule = success(thing, arrangement, robots, "left")
-    slack = SLACK[arrangement]
-    if arrangement == "cage" and thing.hollow:
-        slack = HOLLOW_SLACK
     loop = thing.outline.filled.buffer(d).exterior.length
     band = [round(max(d - off, 1.0), 1), round(d + off, 1)]
-    return rule | {"band_px": band, "max_gap_px": round(slack * loop / robots, 1)}
+    return rule | {
+        "band_px": band,
+        "max_gap_px": round(slack(thing, arrangement) * loop / robots, 1),
+    }
 
 
 def inner_rule(thing: Thing, robots: int, d: float, apart: float | None) -> dict[str, Any]:

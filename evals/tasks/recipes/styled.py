@@ -8,7 +8,7 @@ import numpy as np
 import yaml
 from numpy.random import Generator
 
-from ...scenes.stories import Story, entry_of, named, story_of
+from ...scenes.stories import Story, named, retasked, story_of
 from ...scenes.success_rules import arrangements, robots_for, success
 from .length_rules import distance, inner_cell, inner_rule, many, margin, ring_rule
 from .metric import OFF as SIZED_OFF
@@ -43,15 +43,8 @@ def styled(seed: int, scale: float | None = None) -> dict[str, Any]:
     if scale is not None:
         rule, lengths = _sized(seed, story, rule, robots, lengths, scale)
     style = STYLES[seed % len(STYLES)]
-    entry = entry_of(story)
-    task = entry["tasks"][0]
-    task |= {
-        "instruction": _instruction(random, story, style, (arrangement, side), robots, lengths),
-        "robots": robots,
-        "success": rule,
-        "style": style,
-    }
-    return entry
+    text = _instruction(random, story, style, (arrangement, side), robots, lengths)
+    return retasked(story, instruction=text, robots=robots, success=rule, style=style)
 
 
 def _robots_for(random: Generator, story: Story, arrangement: str) -> int:

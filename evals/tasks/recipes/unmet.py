@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from ...scenes.stories import Story, entry_of, named, story_of
+from ...scenes.stories import Story, named, retasked, story_of
 from ...scenes.things import Thing
 
 ABSENT = ("giraffe", "piano", "lighthouse", "bicycle", "umbrella stand", "telescope", "elephant")
@@ -24,15 +24,14 @@ def unmet(seed: int) -> dict[str, Any]:
     if kind == "ambiguous" and _one_of_several(story) is None:
         kind = "absent"
     words, robots, expects = _words_and_robots(random, story, kind)
-    entry = entry_of(story)
-    entry["tasks"][0] |= {
-        "instruction": f"{words[:1].upper()}{words[1:]}.",
-        "robots": robots,
-        "expects": list(expects),
-        "goals": [],
-        "style": kind,
-    }
-    return entry
+    return retasked(
+        story,
+        instruction=f"{words[:1].upper()}{words[1:]}.",
+        robots=robots,
+        expects=list(expects),
+        goals=[],
+        style=kind,
+    )
 
 
 def _words_and_robots(
