@@ -1,6 +1,7 @@
 """The house rules that a reader should be able to rely on: who imports whom, and sizes."""
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -138,6 +139,16 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     known |= {parts[:-1]: p for parts, p in known.items() if parts[-1] == "__init__"}
     graph = {path: modules_imported(path, known) for path in SOURCES}
     assert list(TopologicalSorter(graph).static_order())  # raises CycleError, which names them
+
+
+def test_private_helpers_of_one_name_are_two_at_most() -> None:
+    counts = Counter(
+        node.name
+        for path in SOURCES
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name.startswith("_")
+    )
+    assert not {name: n for name, n in counts.items() if n > 2}
 
 
 def test_modules_say_why_they_exist_in_five_lines() -> None:

@@ -94,7 +94,7 @@ class _Lengths:
         self._text = instruction.lower()
         self._named = named_lengths(self._text)
         metric = () if metres_per_pixel else [n for n in self._named if n.unit == "m"]
-        self.unscaled = tuple(n.said for n in metric)
+        self.unscaled = tuple(n.wording for n in metric)
         loose = [n for n in self._named if n not in metric and n.of in ("most", "something")]
         known = [n for n in self._named if n not in metric and n not in loose]
         self._px: dict[Of, list[float]] = {}

@@ -29,7 +29,7 @@ class Found:
     """The candidate that is meant, the words for it and the numbers that say so."""
 
     candidate: str
-    said: str
+    wording: str
     reasons: tuple[str, ...]
 
 
@@ -62,7 +62,7 @@ def _find(things: Sequence[Reference], needed: int, history: History) -> list[Fo
     if needed == 2 and len(things) == 1 and things[0].plural and not chosen:
         return _pair(things[0], history)
     if len(things) > needed:
-        named = " or ".join(f'"{t.said}"' for t in things)
+        named = " or ".join(f'"{t.wording}"' for t in things)
         return _ask_all(f"Which thing is the arrangement about: {named}?", history)
     found: list[Found] = []
     for thing in things[: needed - len(chosen)] if not chosen else ():
@@ -114,15 +114,15 @@ def _choose_one(thing: Reference, history: History) -> Found | Step:
     matches = reply["candidates"]
     alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and _is_told(thing))
     if reply["settled"] and (alone or not _says_little(thing, _is_clear(reply))):
-        return Found(matches[0]["id"], thing.said, tuple(matches[0].get("reasons", ())))
+        return Found(matches[0]["id"], thing.wording, tuple(matches[0].get("reasons", ())))
     if matches:
         why = reply["doubt"] or f"{_listed(matches)} may be meant"
-        return _ask(f'Which one is "{thing.said}"? {_sentence(why)}', matches)
+        return _ask(f'Which one is "{thing.wording}"? {_sentence(why)}', matches)
     if reply["absent"] and query == thing.query and not thing.unknown:
-        reason = f'"{thing.said}" is not in the picture: {reply["lacking"]}.'
+        reason = f'"{thing.wording}" is not in the picture: {reply["lacking"]}.'
         return Step("report_impossible", {"reason": reason})
     why = reply["lacking"] or reply["doubt"]
-    return _ask_all(f'Which one is "{thing.said}"? {_sentence(why)}', history)
+    return _ask_all(f'Which one is "{thing.wording}"? {_sentence(why)}', history)
 
 
 def _pair(thing: Reference, history: History) -> list[Found] | Step:
@@ -133,18 +133,18 @@ def _pair(thing: Reference, history: History) -> list[Found] | Step:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
     if len(matches) == 2 and thing.noun and not thing.refused:
-        return [Found(m["id"], thing.said, tuple(m.get("reasons", ()))) for m in matches]
-    return _ask_all(f'Which two are "{thing.said}"?', history)
+        return [Found(m["id"], thing.wording, tuple(m.get("reasons", ()))) for m in matches]
+    return _ask_all(f'Which two are "{thing.wording}"?', history)
 
 
 def _trouble(thing: Reference) -> str:
     """Why a description cannot be decided on measures at all, as a question."""
     if thing.plural:
-        return f'Which one of "{thing.said}"? Robots are placed about one thing at a time.'
+        return f'Which one of "{thing.wording}"? Robots are placed about one thing at a time.'
     if thing.refused or (not thing.noun and not thing.query):
-        words = thing.refused or thing.said
+        words = thing.refused or thing.wording
         return (
-            f'Which one is "{thing.said}"? The offline rules know things by colour, shape, size '
+            f'Which one is "{thing.wording}"? The offline rules know things by colour, shape, size '
             f'and place only, and do not know "{words}".'
         )
     return ""

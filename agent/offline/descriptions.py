@@ -24,7 +24,7 @@ class Reference:
         refused: words that change who is meant in a way not followed here, or "".
     """
 
-    said: str = ""
+    wording: str = ""
     query: dict[str, Any] = field(default_factory=dict[str, Any])
     noun: str = ""
     weak: bool = False

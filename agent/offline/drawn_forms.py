@@ -35,7 +35,7 @@ class Form:
     """
 
     shape: dict[str, Any]
-    said: str
+    wording: str
     robots: int | None = None
 
     def where(self, relations: tuple[str, ...], side: str | None, attempt: int) -> str | None:
@@ -95,13 +95,17 @@ def _letters(text: str) -> Found:
     found = re.search(rf"{lead}(?:{written})(?![\w'-]){tail}", text)
     if found is None:
         return None
-    said = found["quoted"] or found["plain"]
-    if "outline" in found[0].replace(said, "", 1).lower():
-        form = Form({"kind": "outlined_letters", "text": said}, f"the outlined letters {said}")
+    wording = found["quoted"] or found["plain"]
+    if "outline" in found[0].replace(wording, "", 1).lower():
+        form = Form(
+            {"kind": "outlined_letters", "text": wording}, f"the outlined letters {wording}"
+        )
         return form, found
-    if re.search("[^A-Za-z0-9 ]", said):
+    if re.search("[^A-Za-z0-9 ]", wording):
         return None
-    return Form({"kind": "letters", "text": said.upper()}, f"the letters {said.upper()}"), found
+    return Form(
+        {"kind": "letters", "text": wording.upper()}, f"the letters {wording.upper()}"
+    ), found
 
 
 def _grid(text: str) -> Found:
@@ -111,10 +115,10 @@ def _grid(text: str) -> Found:
     found = re.search(rf"(?i)(?:{MAKE}|{STAND}){grid}", text)
     if found is None:
         return None
-    said = [
+    wording = [
         found[f"{of}{n}"] for of in ("", "of_") for n in ("rows", "columns") if found[f"{of}{n}"]
     ]
-    counts = [whole_number(word.lower()) for word in said]
+    counts = [whole_number(word.lower()) for word in wording]
     if not counts:
         return Form({"kind": "grid"}, "a grid"), found
     rows, columns = counts

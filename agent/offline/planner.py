@@ -59,13 +59,13 @@ def _next_step(turn: History, before: History) -> Reply:
 def _begin(task: Task, history: History, before: History) -> Reply:
     """Propose a formation, or find and ask what is missing."""
     pointed = bool(_target_ids(task))
-    form, told = form_in(task.instruction)
-    spoken, faced = _spoken(told, pointed)
+    form, without_form = form_in(task.instruction)
+    spoken, faced = _spoken(without_form, pointed)
     answers = _spoken_answers(history)
     reading = understand(". ".join([spoken.rest, *answers]), task.metres_per_pixel)
     bare = [int(a) for a in answers if a.strip().isascii() and a.strip().isdecimal()]
-    said = reading.robots or (form.robots if form else None)
-    robots = task.robots or said or next(iter(bare), None)
+    wording = reading.robots or (form.robots if form else None)
+    robots = task.robots or wording or next(iter(bare), None)
     things = 2 if "between" in reading.relations or faced else 1
     question = _unfit(reading, form, faced, robots) or _open_question(task, reading, robots, things)
     if question or robots is None:
@@ -75,7 +75,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         found = find(spoken.things, things, history)
         if isinstance(found, Step):
             return _call(found.name, found.arguments)
-        prompts = _prompts([(f.candidate, _label(f.said)) for f in found], before)
+        prompts = _prompts([(f.candidate, _label(f.wording)) for f in found], before)
     ids = list(dict.fromkeys([*task.targets, *(p["id"] for p in prompts)]))[:things]
     contract: dict[str, Any] = {"groups": [_group_by_relation(reading, robots, ids)]}
     if faced:
@@ -106,11 +106,11 @@ def _prompts(found: list[tuple[str, str]], before: History) -> list[dict[str, An
     ]
 
 
-def _spoken(told: str, pointed: bool) -> tuple[Words, bool]:
+def _spoken(without_form: str, pointed: bool) -> tuple[Words, bool]:
     """The things an instruction speaks of, what is left of it, and whether a side faces one."""
-    main, faced = faced_in(told)
+    main, faced = faced_in(without_form)
     if faced is None:
-        return (Words((), told) if pointed else references(told)), False
+        return (Words((), without_form) if pointed else references(without_form)), False
     if pointed:
         return Words((), f"{main} {faced.partition(' ')[2]}"), True
     first, second = references(main), references(faced)
@@ -130,11 +130,13 @@ def _unfit(reading: Reading, form: Form | None, faced: bool, robots: int | None)
     if form is None:
         return None
     if form.robots is not None and robots not in (None, form.robots):
-        return f"{form.said} takes {form.robots} robots, {robots} were named. Which?".capitalize()
+        return (
+            f"{form.wording} takes {form.robots} robots, {robots} were named. Which?".capitalize()
+        )
     if form.where(reading.relations, reading.side, 0) is None:
         around = ", around" if form.shape["kind"] in ENCLOSING else ""
         return (
-            f"Where are the robots to draw {form.said}? Inside a thing{around}, or left, right, "
+            f"Where are the robots to draw {form.wording}? Inside a thing{around}, or left, right, "
             "above or below."
         )
     return None
@@ -163,8 +165,8 @@ def _refusals(history: History) -> int:
 def _left_off(result: Result, history: History) -> str:
     """What there is to say when a call was refused or took too long: what it was about, and why."""
     meant = next(c.arguments for c in calls_in(history) if c.id == result.call_id)
-    said = meant.get("question") or meant.get("reason") or "The thing meant was not looked for."
-    return f"{said} {result.text}"
+    wording = meant.get("question") or meant.get("reason") or "The thing meant was not looked for."
+    return f"{wording} {result.text}"
 
 
 def _spoken_answers(history: History) -> list[str]:
@@ -174,9 +176,9 @@ def _spoken_answers(history: History) -> list[str]:
     return [m.text for m in asked if m.call_id not in offered]
 
 
-def _label(said: str) -> str:
+def _label(wording: str) -> str:
     """What a thing is called: the words for it without their article."""
-    return said.split(" ", 1)[-1][:MAX_LABEL]
+    return wording.split(" ", 1)[-1][:MAX_LABEL]
 
 
 def _open_question(task: Task, reading: Reading, robots: int | None, used: int) -> str | None:
@@ -186,9 +188,9 @@ def _open_question(task: Task, reading: Reading, robots: int | None, used: int) 
 
 def _which_arrangement(reading: Reading) -> str | None:
     if reading.beyond:
-        said = " and ".join(reading.beyond)
+        wording = " and ".join(reading.beyond)
         return (
-            f"The offline rules do not carry out {said}. Say it another way: one arrangement of "
+            f"The offline rules do not carry out {wording}. Say it another way: one arrangement of "
             "all the robots, lengths in px." + (f" {UNSCALED}" if reading.unscaled else "")
         )
     if not reading.relations:
@@ -277,8 +279,8 @@ def _after_proposal(task: Task, result: Result, history: History, before: Histor
 
 def _may_move_on(task: Task, history: History) -> bool:
     """Whether a form beside a thing, with no room on one side of it, has another to be tried."""
-    form, told = form_in(task.instruction)
-    reading = understand(_spoken(told, bool(_target_ids(task)))[0].rest)
+    form, without_form = form_in(task.instruction)
+    reading = understand(_spoken(without_form, bool(_target_ids(task)))[0].rest)
     if form is None or reading.side is not None:
         return False
     return form.where(reading.relations, None, _refusals(history)) is not None
@@ -300,11 +302,11 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
     arrival = json.loads(result.text)
     worst = length_text(arrival["worst_residual_px"], task.metres_per_pixel)
     off = f"{worst} from its place"
-    said = f"All arrived; the furthest is {off}."
+    wording = f"All arrived; the furthest is {off}."
     if not arrival["arrived"]:
         corrected = f"after {arrival['corrections']} corrections"
-        said = f"Robot {arrival['worst_robot']} stopped {off} {corrected}."
-    return f"{planned} {said}"
+        wording = f"Robot {arrival['worst_robot']} stopped {off} {corrected}."
+    return f"{planned} {wording}"
 
 
 def _planned(plan: dict[str, Any], history: History) -> str:

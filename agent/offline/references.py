@@ -89,7 +89,7 @@ def _described(words: Words, at: int) -> tuple[Reference, int] | None:
         thing.refused = thing.refused or words[end - 1]  # the top left corner
     if thing.noun == "any" and not thing.whole_query and _from_another(words, end):
         thing.refused = thing.refused or " ".join(words[end : end + 3])
-    thing.said = " ".join(words[at : end + trailing])
+    thing.wording = " ".join(words[at : end + trailing])
     return thing, end + trailing
 
 
@@ -149,7 +149,7 @@ def _stranger(words: Words, at: int) -> tuple[Reference, int] | None:
     name = " ".join(words[at + 1 : end])
     if not name or _is_robots(words, at, end) or end - at > STRANGERS + 1:
         return None
-    thing = Reference(said=" ".join(words[at:end]), refused=name)
+    thing = Reference(wording=" ".join(words[at:end]), refused=name)
     relation = phrase(words, end)
     if relation is not None and relation.kind == "relations":
         after = end + relation.length

@@ -39,7 +39,7 @@ def _model(base_url: str, streams: bool) -> Model:
     return _models[base_url, streams]
 
 
-async def _run(model: Model) -> str:
+async def _converse_once(model: Model) -> str:
     first = (User(text=USER),)
     tools = (check_points,)
     outcome = await converse(model, tools, CONTEXT, first, system=SYSTEM, limits=UNLIMITED)
@@ -49,9 +49,9 @@ async def _run(model: Model) -> str:
 
 async def run(base_url: str) -> str:
     """A conversation."""
-    return await _run(_model(base_url, False))
+    return await _converse_once(_model(base_url, False))
 
 
 async def run_stream(base_url: str) -> str:
     """A conversation, streamed."""
-    return await _run(_model(base_url, True))
+    return await _converse_once(_model(base_url, True))

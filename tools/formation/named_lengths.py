@@ -83,7 +83,7 @@ class NamedLength:
     value: float
     unit: Unit
     of: Of
-    said: str
+    wording: str
     span: tuple[int, int]
 
     def px(self, metres_per_pixel: float | None) -> float:
@@ -114,18 +114,18 @@ def _of(text: str, start: int, end: int) -> tuple[Of, int, int]:
     far = max(start - REACH, 0)
     before, after = text[far:start], text[end : end + REACH]
     for pattern, of in BEFORE:
-        said = re.search(pattern, before)
-        if said:
-            own = "own" if "own" in said.groupdict() else 0
+        wording = re.search(pattern, before)
+        if wording:
+            own = "own" if "own" in wording.groupdict() else 0
             tail = re.match(TAIL, after) if of == "apart" else None
-            return of, far + said.start(own), end + (tail.end() if tail else 0)
+            return of, far + wording.start(own), end + (tail.end() if tail else 0)
     for pattern, of in AFTER:
-        said = re.search(pattern, after)
-        if said:
+        wording = re.search(pattern, after)
+        if wording:
             sized = re.search(rf"{SIZED}\s*\Z", before) or re.match(
-                rf"\s+{ROBOT}\b", after[said.end() :]
+                rf"\s+{ROBOT}\b", after[wording.end() :]
             )
             meant: Of = of if sized or of not in ("across", "radius") else "something"
             least = re.search(r"\bat least\s*\Z", before) if of == "apart" else None
-            return meant, far + least.start() if least else start, end + said.end()
+            return meant, far + least.start() if least else start, end + wording.end()
     return "distance", start, end

@@ -15,7 +15,7 @@ DEEP = {"recursion_limit": 5000}
 
 
 @cache
-def _agent(base_url: str, streams: bool) -> Any:
+def _langgraph_agent(base_url: str, streams: bool) -> Any:
     model = ChatOpenAI(
         model="bench-model",
         base_url=base_url,
@@ -33,14 +33,14 @@ def _asked() -> dict[str, Any]:
 
 async def run(base_url: str) -> str:
     """A conversation."""
-    result = await _agent(base_url, False).ainvoke(_asked(), DEEP)
+    result = await _langgraph_agent(base_url, False).ainvoke(_asked(), DEEP)
     return result["messages"][-1].content
 
 
 async def run_stream(base_url: str) -> str:
     """A conversation, streamed; the text is that of the last message's fragments."""
     texts: dict[str, str] = {}
-    stream = _agent(base_url, True).astream(_asked(), DEEP, stream_mode="messages")
+    stream = _langgraph_agent(base_url, True).astream(_asked(), DEEP, stream_mode="messages")
     async for message, _ in stream:
         texts[message.id] = texts.get(message.id, "") + message.text
     return list(texts.values())[-1]

@@ -17,7 +17,7 @@ set_tracing_disabled(True)
 
 
 @cache
-def _agent(base_url: str) -> Agent:
+def _openai_agent(base_url: str) -> Agent:
     client = AsyncOpenAI(base_url=base_url, api_key="k")
     model = OpenAIChatCompletionsModel(model="bench-model", openai_client=client)
     tools = [function_tool(check_points)]
@@ -26,12 +26,12 @@ def _agent(base_url: str) -> Agent:
 
 async def run(base_url: str) -> str:
     """A conversation."""
-    return (await Runner.run(_agent(base_url), USER, max_turns=1000)).final_output
+    return (await Runner.run(_openai_agent(base_url), USER, max_turns=1000)).final_output
 
 
 async def run_stream(base_url: str) -> str:
     """A conversation, streamed."""
-    result = Runner.run_streamed(_agent(base_url), USER, max_turns=1000)
+    result = Runner.run_streamed(_openai_agent(base_url), USER, max_turns=1000)
     async for _ in result.stream_events():
         pass
     return result.final_output

@@ -13,17 +13,17 @@ UNLIMITED = UsageLimits(request_limit=None)
 
 
 @cache
-def _agent(base_url: str) -> Agent:
+def _pydantic_agent(base_url: str) -> Agent:
     model = OpenAIChatModel("bench-model", provider=OpenAIProvider(base_url=base_url, api_key="k"))
     return Agent(model, instructions=SYSTEM, tools=[check_points])
 
 
 async def run(base_url: str) -> str:
     """A conversation."""
-    return (await _agent(base_url).run(USER, usage_limits=UNLIMITED)).output
+    return (await _pydantic_agent(base_url).run(USER, usage_limits=UNLIMITED)).output
 
 
 async def run_stream(base_url: str) -> str:
     """A conversation, streamed."""
-    async with _agent(base_url).run_stream(USER, usage_limits=UNLIMITED) as result:
+    async with _pydantic_agent(base_url).run_stream(USER, usage_limits=UNLIMITED) as result:
         return await result.get_output()

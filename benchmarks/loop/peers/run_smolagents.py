@@ -27,7 +27,7 @@ def _model(base_url: str) -> OpenAIModel:
     return OpenAIModel(model_id="bench-model", api_base=base_url, api_key="k")
 
 
-def _agent(base_url: str, streams: bool) -> ToolCallingAgent:
+def _smol_agent(base_url: str, streams: bool) -> ToolCallingAgent:
     """An agent holds the memory of its run, so that each run has one; the model is shared."""
     agent = ToolCallingAgent(
         tools=[check_points],
@@ -40,18 +40,18 @@ def _agent(base_url: str, streams: bool) -> ToolCallingAgent:
     return agent
 
 
-def _run(base_url: str) -> str:
-    return _agent(base_url, False).run(USER)
+def _smol_run(base_url: str) -> str:
+    return _smol_agent(base_url, False).run(USER)
 
 
 def _run_stream(base_url: str) -> str:
-    steps = _agent(base_url, True).run(USER, stream=True)
+    steps = _smol_agent(base_url, True).run(USER, stream=True)
     return next(step.output for step in steps if isinstance(step, FinalAnswerStep))
 
 
 async def run(base_url: str) -> str:
     """A conversation."""
-    return await asyncio.get_running_loop().run_in_executor(_pool, _run, base_url)
+    return await asyncio.get_running_loop().run_in_executor(_pool, _smol_run, base_url)
 
 
 async def run_stream(base_url: str) -> str:

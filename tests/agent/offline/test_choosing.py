@@ -59,11 +59,11 @@ def is_settled(history: History) -> bool:
     found = [json.loads(m.text) for m in results if m.name == "locate_object" and not m.error]
     sure = {f["candidates"][0]["id"] for f in found if f.get("settled")}
     pairs = [{c["id"] for c in f["candidates"]} for f in found if len(f["candidates"]) == 2]
-    said = " ".join(m.text for m in results if m.name == "ask_user")
+    wording = " ".join(m.text for m in results if m.name == "ask_user")
     for proposal in calls(history, "propose_formation"):
         for target in proposal.arguments["targets"]:
             name = target["candidate"]
-            if name not in sure.union(*pairs) and name[1:] not in said:
+            if name not in sure.union(*pairs) and name[1:] not in wording:
                 return False
     return True
 

@@ -153,7 +153,7 @@ def test_the_side_of_one_thing_that_faces_another() -> None:
         ("20 robots in a 3.5 by 4 grid inside it", "do not carry out"),
     ],
 )
-def test_what_is_not_understood_is_asked_about(words: str, said: str) -> None:
+def test_what_is_not_understood_is_asked_about(words: str, wording: str) -> None:
     report = run(words, pointed=[COIN], settings=Settings())
     assert report.status == "question"
-    assert said in report.message
+    assert wording in report.message

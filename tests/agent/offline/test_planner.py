@@ -294,7 +294,7 @@ def test_an_escape_proof_cage_is_one_that_is_certified() -> None:
 )
 def test_in_a_cage_says_what_to_make_and_not_which_thing(words: str, closure: bool) -> None:
     spoken = references(words)
-    assert [thing.said for thing in spoken.things] == ["the largest coin"]
+    assert [thing.wording for thing in spoken.things] == ["the largest coin"]
     reading = understand(spoken.rest)
     assert (reading.relations, reading.escape_proof) == (("cage",), closure)
     assert reading.robots in (4, 10)

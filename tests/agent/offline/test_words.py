@@ -245,7 +245,7 @@ SALAD = st.lists(st.sampled_from(WORDS.split()), max_size=40).map(" ".join)
 def test_any_words_are_read_without_a_crash(words: str) -> None:
     reading = references(words)
     assert isinstance(understand(reading.rest).relations, tuple)
-    assert all(thing.said for thing in reading.things)
+    assert all(thing.wording for thing in reading.things)
 
 
 @pytest.mark.parametrize("length", ["1.4 m", "0.64m", "1,500 mm", "12.5 px"])

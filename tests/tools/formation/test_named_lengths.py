@@ -44,13 +44,13 @@ THREE = [
         ("two meters", 2, "m"),
     ],
 )
-def test_what_a_length_is_of(template: str, of: str, said: str, value: float, unit: str) -> None:
-    text = template.format(said)
+def test_what_a_length_is_of(template: str, of: str, wording: str, value: float, unit: str) -> None:
+    text = template.format(wording)
     (found,) = named_lengths(text)
-    (apart,) = named_lengths(re.sub(r"([,:])", r" \1", template).format(said))  # words apart
+    (apart,) = named_lengths(re.sub(r"([,:])", r" \1", template).format(wording))  # words apart
     assert (apart.value, apart.of) == (value, of)
-    assert (found.value, found.unit, found.of, found.said) == (value, unit, of, said)
-    assert said in text[slice(*found.span)]
+    assert (found.value, found.unit, found.of, found.wording) == (value, unit, of, wording)
+    assert wording in text[slice(*found.span)]
     assert found.px(0.5) == (value if unit == "px" else value / 0.5)
 
 

@@ -52,8 +52,8 @@ def doubts(
 
 def _count_doubts(text: str, contract: Contract) -> Iterator[str]:
     counted = COUNT.findall(LENGTH.sub(",", text))  # "0.4 m robots" are not four
-    said = [NUMBERS.index(n) if n in NUMBERS else int(n) for n in counted]
-    found = [n for n in said if n > 1]  # "one robot at each corner" counts nothing
+    wording = [NUMBERS.index(n) if n in NUMBERS else int(n) for n in counted]
+    found = [n for n in wording if n > 1]  # "one robot at each corner" counts nothing
     if found and contract.robots not in {*found, sum(found)}:
         counts = " and ".join(map(str, found))
         yield f"the instruction speaks of {counts} robots, the contract has {contract.robots}"
@@ -84,9 +84,9 @@ def _length_doubts(text: str, contract: Contract, scale: float) -> Iterator[str]
             wanted = px / 2 if named.of == "across" else px
             if not _is_near(wanted, [contract.robot_radius]):
                 has = length_text(contract.robot_radius, scale)
-                yield f"the instruction says {named.said} {named.of}, but robot_radius is {has}"
+                yield f"the instruction says {named.wording} {named.of}, but robot_radius is {has}"
         elif named.of != "something" and not drawn and not _is_near(px, stated):
-            yield f"the instruction names {named.said}, which is no length of the contract"
+            yield f"the instruction names {named.wording}, which is no length of the contract"
 
 
 def _is_near(length: float, among: Sequence[float]) -> bool:
