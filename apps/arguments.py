@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_args
@@ -18,13 +18,11 @@ from ..tools.context import Descriptor
 from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_LENGTH, MAX_ROBOTS
 from ..tools.formation.named_lengths import named_lengths
-from ..tools.formation.units import COARSEST, FINEST, check_scale
+from ..tools.formation.units import COARSEST, FINEST
 from ..tools.geometry.outline import FARTHEST
 from ..tools.perception.target_prompt import Point, TargetPrompt
 from ..tools.store import read_text
 from ..tools.tool import violations
-
-"""Seeds in one run."""
 
 
 def robots(text: str | None) -> int | None:
@@ -59,19 +57,8 @@ def scale(text: str | None) -> float | None:
     Raises:
         InputError: not a number, or no scale that a picture has.
     """
-    if text is None:
-        return None
-    value = _number(text)
-    try:
-        if value is not None:
-            check_scale(value)
-            return value
-    except InputError:
-        pass
-    raise InputError(
-        f"--metres-per-pixel {text!r} cannot be used; give a number from {FINEST:f} to "
-        f"{COARSEST:g}, such as 0.05."
-    )
+    form = f"a number from {FINEST:f} to {COARSEST:g}, such as 0.05"
+    return _number_where(lambda v: FINEST <= v <= COARSEST, "--metres-per-pixel", text, form)
 
 
 def lengths(scale_text: str | None, radius: str | None, clearance: str | None) -> dict[str, Any]:
@@ -126,12 +113,7 @@ def share(name: str, text: str | None) -> float | None:
     Raises:
         InputError: not such a number.
     """
-    if text is None:
-        return None
-    value = _number(text)
-    if value is None or not 0 <= value <= 1:
-        raise InputError(f"{name} {text!r} cannot be used; give a number from 0 to 1.")
-    return value
+    return _number_where(lambda v: 0 <= v <= 1, name, text, "a number from 0 to 1")
 
 
 def rates(name: str, texts: list[str] | None, models: Sequence[str]) -> dict[str, float]:
@@ -163,12 +145,9 @@ def dollars(name: str, text: str | None) -> float | None:
     Raises:
         InputError: not a number above 0.
     """
-    if text is None:
-        return None
-    value = _number(text)
-    if value is None or not 0 < value <= 1_000_000:
-        raise InputError(f"{name} {text!r} cannot be used; give US dollars above 0, such as 2.50.")
-    return value
+    return _number_where(
+        lambda v: 0 < v <= 1_000_000, name, text, "US dollars above 0, such as 2.50"
+    )
 
 
 def descriptor(text: str) -> Descriptor:
@@ -336,6 +315,16 @@ def _candidate(text: str) -> str:
             f"--target {text!r} cannot be read; give a candidate's id such as c3, or its number."
         )
     return f"c{known[1]}"
+
+
+def _number_where(
+    allowed: Callable[[float], bool], name: str, text: str | None, form: str
+) -> float | None:
+    """A number that is allowed; `form` says what would be."""
+    value = None if text is None else _number(text)
+    if text is not None and (value is None or not allowed(value)):
+        raise InputError(f"{name} {text!r} cannot be used; give {form}.")
+    return value
 
 
 def _number(text: str) -> float | None:

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..agent.agent import Agent
-from ..agent.limits import Limits
 from ..agent.outcomes import Answered, Paused
-from ..agent.policy import Policy
 from ..agent.session import load_run, prompt_name
 from ..agent.store.folder import log_path, read_events
 from ..agent.wrappers.telemetry import environment_tracer
@@ -88,7 +86,9 @@ def run(
     )
     things = arguments.pointed(point or [], box or [], outline or [], target or [])
     chosen = (model, base_url, planner, prompt, PromptLibrary(prompts))
-    with _agent(*chosen, arguments.limits(limit), arguments.policy(policy)) as agent:
+    rules = {"limits": arguments.limits(limit), "policy": arguments.policy(policy)}
+    with _tracer() as tracer:
+        agent = _agent(*chosen, tracer=tracer, **rules)
         picture, keep = load_picture(image), arguments.recording(record)
         with Folder(out) as home:
             made = agent.run(picture, instruction, pointed=things, settings=fixed, trace=home.trace)
@@ -153,35 +153,26 @@ def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
             )
 
 
-@contextmanager
 def _agent(
     model: str,
     base_url: str | None,
     planner: str | None,
     prompt: str | None,
     library: PromptLibrary,
-    limits: Limits,
-    policy: Policy,
-) -> Generator[Agent, None, None]:
-    with _tracer() as tracer:
-        agent = Agent(
-            model,
-            base_url=base_url,
-            planner=planner,
-            prompt=prompt,
-            library=library,
-            limits=limits,
-            policy=policy,
-            tracer=tracer,
-        )
-        if model == "offline" and agent.prompt is not None:
-            print(  # noqa: T201
-                "formup: the offline planner is rules and reads no prompt; "
-                f"{agent.prompt.name} is not used.",
-                file=sys.stderr,
-            )
-            agent = Agent(model, limits=limits, policy=policy, tracer=tracer)
-        yield agent
+    **rules: Any,
+) -> Agent:
+    """The agent that was chosen; the offline planner goes without a prompt."""
+    agent = Agent(
+        model, base_url=base_url, planner=planner, prompt=prompt, library=library, **rules
+    )
+    if model != "offline" or agent.prompt is None:
+        return agent
+    print(  # noqa: T201
+        "formup: the offline planner is rules and reads no prompt; "
+        f"{agent.prompt.name} is not used.",
+        file=sys.stderr,
+    )
+    return Agent(model, **rules)
 
 
 @contextmanager

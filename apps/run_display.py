@@ -143,16 +143,12 @@ def _scale(report: Report) -> float | None:
 
 def _measures(measures: dict[str, Measure], scale: float | None) -> str:
     """Measures as words."""
-
-    def shown(name: str, value: Measure) -> str:
-        if isinstance(value, str):
-            return value
-        return length_text(value, scale, "g") if name.endswith("_px") else f"{value:g}"
-
-    return ", ".join(
-        f"{name.removesuffix('_px').replace('_', ' ')} {shown(name, value)}"
-        for name, value in measures.items()
-    )
+    words: list[str] = []
+    for name, value in measures.items():
+        if not isinstance(value, str):
+            value = length_text(value, scale, "g") if name.endswith("_px") else f"{value:g}"
+        words.append(f"{name.removesuffix('_px').replace('_', ' ')} {value}")
+    return ", ".join(words)
 
 
 def _certificate(console: Console, report: Report) -> None:
@@ -161,10 +157,8 @@ def _certificate(console: Console, report: Report) -> None:
     measures = _measures(verdict.measures, _scale(report))
     if report.partial is not None:
         _line(console, "partial", report.partial.sentence)
-    if verdict.certified:
-        _line(console, "certified", f"plan {report.plan_id}: {measures}")
-    else:
-        _line(console, "NOT CERTIFIED", f"plan {report.plan_id}: {measures}")
+    head = "certified" if verdict.certified else "NOT CERTIFIED"
+    _line(console, head, f"plan {report.plan_id}: {measures}")
     for finding in verdict.findings[:MAX_ROWS]:
         _line(console, "finding", finding.sentence)
     if len(verdict.findings) > MAX_ROWS:
