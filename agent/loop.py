@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import Generator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from ..tools.context import Context
 from ..tools.errors import ApprovalError, ArgumentsError, FleetError, ModelError
@@ -29,26 +28,14 @@ from .policy import Decision, Policy
 ANYTHING = Policy()
 
 
-class Recorder(Protocol):
-    """Is given what happens, as it happens."""
+class Recorder:
+    """Is given what happens, as it happens; this one records nothing."""
 
     def message(self, message: Message, world: World) -> None:
         """A new message, and the world after it."""
-        ...
 
     def moving(self, plan_id: str, world: World) -> None:
         """Robots are about to move to a plan; raising keeps them where they are."""
-        ...
-
-
-class NoRecorder:
-    """Records nothing."""
-
-    def message(self, message: Message, world: World) -> None:
-        """Nothing."""
-
-    def moving(self, plan_id: str, world: World) -> None:
-        """Nothing."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +147,7 @@ async def run(
         approved: what a person has said yes to.
         recorder: is given every new message.
     """
-    talk = Conversation(messages, context.world, recorder or NoRecorder())
+    talk = Conversation(messages, context.world, recorder or Recorder())
     shown = tools if offered is None else offered
     turn = Turn(model, tools, shown, context, system, limits, policy, approved)
     clock = asyncio.timeout(limits.seconds)

@@ -17,7 +17,7 @@ from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture, load_picture, picture_file, picture_from_file
 from ..tools.world import World
 from .calls import refused
-from .loop import Approval, NoRecorder
+from .loop import Approval, Recorder
 from .messages import HISTORY, History, Message, Reply, Result, unanswered
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .report import Report, make_report
@@ -150,7 +150,7 @@ def message_facts(message: Message) -> dict[str, Any]:
     return {"role": message.role, **facts} | {"images": hashes}
 
 
-class LogRecorder(NoRecorder):
+class LogRecorder(Recorder):
     """Writes down what happens, and shows it.
 
     Once robots have moved, a log that can no longer be written does not undo that: the turn goes

@@ -61,17 +61,25 @@ def scale(text: str | None) -> float | None:
     return _number_where(lambda v: FINEST <= v <= COARSEST, "--metres-per-pixel", text, form)
 
 
-def lengths(scale_text: str | None, radius: str | None, clearance: str | None) -> dict[str, Any]:
-    """The scale, the robots' radius and the clearance, as fields of Settings.
+def numbers(
+    scale_text: str | None,
+    radius: str | None,
+    clearance: str | None,
+    threshold: str | None,
+    seed: str,
+) -> dict[str, Any]:
+    """The scale, the robots' radius, the clearance, the threshold and the seed, as of Settings.
 
     Raises:
-        InputError: as `scale` and `length` do.
+        InputError: one of them is none, or not in its range.
     """
     metres_per_pixel = scale(scale_text)
     return {
         "metres_per_pixel": metres_per_pixel,
         "robot_radius": length("--robot-radius", radius, metres_per_pixel),
         "clearance": length("--clearance", clearance, metres_per_pixel),
+        "threshold": share("--threshold", threshold),
+        "seed": whole("--seed", seed, least=0),
     }
 
 
@@ -97,7 +105,7 @@ def length(name: str, text: str | None, metres_per_pixel: float | None) -> float
 def _metric(name: str, text: str, metres_per_pixel: float | None) -> float | None:
     """A length with its unit, px; None where it is none."""
     found = named_lengths(text.strip().lower())
-    if len(found) != 1 or found[0].said != text.strip().lower():
+    if len(found) != 1 or found[0].wording != text.strip().lower():
         return None
     if found[0].unit == "m" and metres_per_pixel is None:
         raise InputError(

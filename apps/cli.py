@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..agent.agent import Agent
+from ..agent.limits import Limits
 from ..agent.outcomes import Answered, Paused
+from ..agent.policy import Policy
 from ..agent.session import load_run, prompt_name
 from ..agent.store.folder import log_path, read_events
 from ..agent.wrappers.telemetry import environment_tracer
@@ -73,26 +75,21 @@ def run(
     """Carry out an instruction on a picture."""
     fixed = Settings(
         robots=arguments.robots(robots),
-        **arguments.lengths(metres_per_pixel, robot_radius, clearance),
+        **arguments.numbers(metres_per_pixel, robot_radius, clearance, threshold, seed),
         detector=detector,
         segmenter=segmenter,
-        threshold=arguments.share("--threshold", threshold),
         descriptor=arguments.descriptor(descriptor),
         fleet=fleet,
         starts=arguments.starts(starts),
-        seed=arguments.whole("--seed", seed, least=0),
         may_deploy=not plan_only,
         numbered=numbered,
     )
     things = arguments.pointed(point or [], box or [], outline or [], target or [])
-    chosen = (model, base_url, planner, prompt, PromptLibrary(prompts))
-    rules = {"limits": arguments.limits(limit), "policy": arguments.policy(policy)}
-    with _tracer() as tracer:
-        agent = _agent(*chosen, tracer=tracer, **rules)
-        picture, keep = load_picture(image), arguments.recording(record)
-        with Folder(out) as home:
-            made = agent.run(picture, instruction, pointed=things, settings=fixed, trace=home.trace)
-            raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
+    bounds = arguments.limits(limit), arguments.policy(policy)
+    picture, keep = load_picture(image), arguments.recording(record)
+    with _agent(model, base_url, planner, prompt, prompts, *bounds) as agent, Folder(out) as home:
+        made = agent.run(picture, instruction, pointed=things, settings=fixed, trace=home.trace)
+        raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
 
 
 @app.command()
@@ -153,26 +150,36 @@ def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
             )
 
 
+@contextmanager
 def _agent(
     model: str,
     base_url: str | None,
     planner: str | None,
     prompt: str | None,
-    library: PromptLibrary,
-    **rules: Any,
-) -> Agent:
+    prompts: Path | None,
+    limits: Limits,
+    policy: Policy,
+) -> Generator[Agent, None, None]:
     """The agent that was chosen; the offline planner goes without a prompt."""
-    agent = Agent(
-        model, base_url=base_url, planner=planner, prompt=prompt, library=library, **rules
-    )
-    if model != "offline" or agent.prompt is None:
-        return agent
-    print(  # noqa: T201
-        "formup: the offline planner is rules and reads no prompt; "
-        f"{agent.prompt.name} is not used.",
-        file=sys.stderr,
-    )
-    return Agent(model, **rules)
+    with _tracer() as tracer:
+        agent = Agent(
+            model,
+            base_url=base_url,
+            planner=planner,
+            prompt=prompt,
+            library=PromptLibrary(prompts),
+            limits=limits,
+            policy=policy,
+            tracer=tracer,
+        )
+        if model == "offline" and agent.prompt is not None:
+            print(  # noqa: T201
+                "formup: the offline planner is rules and reads no prompt; "
+                f"{agent.prompt.name} is not used.",
+                file=sys.stderr,
+            )
+            agent = Agent(model, limits=limits, policy=policy, tracer=tracer)
+        yield agent
 
 
 @contextmanager

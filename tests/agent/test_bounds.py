@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.limits import Limits
-from formup.agent.loop import NoRecorder, run
+from formup.agent.loop import Recorder, run
 from formup.agent.messages import Call, History, Reply, Result, Usage, User
 from formup.agent.model import Request
 from formup.agent.outcomes import Answered, Outcome, Stopped
@@ -59,7 +59,7 @@ class Waiting:
         raise AssertionError
 
 
-class Moves(NoRecorder):
+class Moves(Recorder):
     """Keeps which plans robots moved to."""
 
     def __init__(self) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.limits import Limits
-from formup.agent.loop import Approval, NoRecorder, run
+from formup.agent.loop import Approval, Recorder, run
 from formup.agent.messages import HISTORY, Call, History, Message, Reply, Result, User, unanswered
 from formup.agent.model import Request
 from formup.agent.outcomes import Answered, Cancelled, Outcome, Paused, Stopped
@@ -217,7 +217,7 @@ def test_cancelling_keeps_the_messages() -> None:
     assert len(outcome.messages) == 3
 
 
-class Recorded(NoRecorder):
+class Recorded(Recorder):
     """Keeps what a recorder is given, and what was known then."""
 
     def __init__(self) -> None:
