@@ -87,9 +87,14 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World]:
         before = world.arrivals.get(plan.id)
         if before is not None and _are_there(await fleet.observe(max_age=MAX_AGE), plan, before):
             return before, world
-        context.moving(plan.id)
-        site = world.site(plan.formation.contract)
-        made = await deploy(plan, site, fleet, plan.formation.robot_of_place, watch=watch)
+        made = await deploy(
+            plan,
+            world.site(plan.formation.contract),
+            fleet,
+            plan.formation.robot_of_place,
+            watch=watch,
+            starting=lambda: context.moving(plan.id),
+        )
     except FleetSizeError as error:
         raise ToolError(str(error), "too_many_robots") from None
     except PlaceTakenError as error:

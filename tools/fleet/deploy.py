@@ -135,6 +135,7 @@ async def deploy(
     robots: Sequence[str],
     *,
     watch: Watch = lambda poses: None,
+    starting: Callable[[], None] = lambda: None,
 ) -> Deployment:
     """Move robots onto a plan that is certified here and now, observe, correct, and report.
 
@@ -146,6 +147,7 @@ async def deploy(
         robots: ids; robot i takes place i.
         watch: is called with the poses of the whole fleet whenever they have been observed; last,
             also after a failure or before CancelledError goes on, with where they ended.
+        starting: is called right before the first motion; raising prevents it.
 
     Raises:
         ToolError: the plan does not certify. Here and below nothing was moved.
@@ -167,7 +169,8 @@ async def deploy(
         )
     _in_deployment.add(id(fleet))
     try:
-        return await _Drive(plan.formation.points, contract, site, fleet, robots, watch).run()
+        drive = _Drive(plan.formation.points, contract, site, fleet, robots, watch)
+        return await drive.run(starting)
     finally:
         _in_deployment.discard(id(fleet))
 
@@ -192,7 +195,7 @@ class _Drive:
         self._frames: list[FloatArray] = []
         self._stride, self._seen = 1, 0
 
-    async def run(self) -> Deployment:
+    async def run(self, starting: Callable[[], None]) -> Deployment:
         if len(set(self._robots)) != len(self._goals):
             raise FleetSizeError(
                 f"{len(set(self._robots))} robots are named; the plan has {len(self._goals)} "
@@ -205,6 +208,7 @@ class _Drive:
         await self._observe()
         self._check_idle()
         corrections, motion = 0, self._motion()
+        starting()
         try:
             await self._drive(motion)
             while not self._arrived() and not self._fleet.stopped and corrections < CORRECTIONS:
