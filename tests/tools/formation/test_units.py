@@ -74,8 +74,8 @@ def test_a_unit_is_asked_for_where_there_is_a_scale_and_metres_are_not_where_the
         contract_in_pixels(contract("m", 0, clearance=[1, 2]), None)
 
 
-def test_what_was_written_before_there_were_units_stays_as_it_was() -> None:
-    assert "unit" not in contract(None, 0).model_dump()
+def test_a_contract_is_written_with_its_unit() -> None:
+    assert contract(None, 0).model_dump()["unit"] is None
     assert contract("m", 0).model_dump()["unit"] == "m"
 
 
