@@ -81,6 +81,7 @@ def test_no_photograph_of_the_suite_is_doubted_when_read_rightly() -> None:
         where = str(rule["where"]).partition(":")[0]
         relation = RELATIONS.get(where, "around" if where == "boundary" else where)
         relation = "cage" if rule.get("closed") else relation
+        assert task.robots is not None
         assert doubts(task.instruction, contract(relation, task.robots)) == [], task.instruction
 
 
