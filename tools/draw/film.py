@@ -99,7 +99,7 @@ def draw_deployment(
     draw_idle_robots(canvas, idle_robots(world, plan), radius)
     draw_bars(canvas, lines)
     return [
-        _frame(canvas, frames[max(i - TRAIL, 0) : i + 1], goals, radius, (i, len(frames)))
+        _frame(canvas, frames[max(i - TRAIL, 0) : i + 1], plan, radius, (i, len(frames)))
         for i in range(len(frames))
     ]
 
@@ -150,7 +150,7 @@ def _numbered(count: int, radius: float) -> bool:
 def _frame(
     base: Canvas,
     recent: Sequence[FloatArray],
-    goals: FloatArray,
+    plan: Plan,
     radius: float,
     step: tuple[int, int],
 ) -> Image.Image:
@@ -159,12 +159,13 @@ def _frame(
     last = step[0] == step[1] - 1
     if not last and len(recent) > 1 and len(now) <= TRAILED:
         canvas.trails(np.stack(recent), ALLOWED, 0.5 * radius)
-    draw_robots(canvas, {str(i): point for i, point in enumerate(now)}, radius)
+    robots = plan.formation.robot_of_place
+    draw_robots(canvas, dict(zip(robots, now, strict=True)), radius)
     if _numbered(len(now), radius):
-        for robot, centre in enumerate(canvas.at(now), start=1):
-            canvas.text(centre, str(robot), 1.25 * radius, WHITE, ROBOT)
+        for robot, centre in zip(robots, canvas.at(now), strict=True):
+            canvas.text(centre, robot, 1.25 * radius, WHITE, ROBOT)
     if last:
-        _draw_end(canvas, now, goals)
+        _draw_end(canvas, now, plan.formation.points)
     else:
         _draw_progress(canvas, *step)
     return canvas.finish()

@@ -1,9 +1,11 @@
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from formup.tools.draw import draw_deployment, draw_look, draw_plan, save_gif
+from formup.tools.draw.canvas import Canvas
 from formup.tools.draw.rulers import RULER
 from formup.tools.draw.text import drawable
 from formup.tools.errors import InputError, ToolError
@@ -291,6 +293,23 @@ def test_robots_in_a_film_are_where_they_are() -> None:
     image = draw_deployment(*made, plan, [np.array([[200.0, 120.0]])] * 2, "")[0]
     wanted = on_page(image, made, np.array([[200.0, 120.0]]))[0]
     assert np.abs(centre_of(image, ROBOT) - wanted).max() < 1.2
+
+
+def test_pictures_and_films_number_robots_by_their_ids(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, written = scene(), list[str]()
+    write = Canvas.text
+
+    def text(canvas: Canvas, where: FloatArray, words: str, *more: Any) -> None:
+        written.append(words)
+        write(canvas, where, words, *more)
+
+    monkeypatch.setattr(Canvas, "text", text)
+    plan = plan_for(made, relation="around", robots=3).for_robots(("7", "9", "4"), ("4", "7", "9"))
+    draw_plan(*made, plan, "Ring")
+    assert {word for word in written if word.isdigit()} == {"4", "7", "9"}
+    written.clear()
+    draw_deployment(*made, plan, drive(plan, 3)[:2], "Ring")
+    assert {word for word in written if word.isdigit()} == {"4", "7", "9"}
 
 
 def durations(path: Path) -> tuple[list[int], tuple[int, int], int]:
