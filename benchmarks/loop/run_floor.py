@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import httpx
-from task import DESCRIPTION, SYSTEM, USER, compute
+from exchange import DESCRIPTION, SYSTEM, USER, compute
 
 NUMBER = {"type": "number"}
 POINT = {"label": {"type": "string"}, "x": NUMBER, "y": NUMBER}

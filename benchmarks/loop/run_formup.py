@@ -1,6 +1,7 @@
 """formup's own loop, model client and tool."""
 
 import numpy as np
+from exchange import SYSTEM, USER, compute
 from formup.agent.limits import Limits
 from formup.agent.loop import run as converse
 from formup.agent.messages import User
@@ -10,7 +11,6 @@ from formup.agent.providers.registry import model_named
 from formup.tools.context import Context
 from formup.tools.perception.image import picture_from_array
 from formup.tools.tool import ToolResult, tool
-from task import SYSTEM, USER, compute
 from typed import Point
 
 UNLIMITED = Limits(requests=None, tool_calls=None)

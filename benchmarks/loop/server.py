@@ -11,7 +11,7 @@ import re
 from functools import cache
 from typing import Any
 
-from task import FINAL
+from exchange import FINAL
 
 POINTS = [(round(0.17 * i - 0.6, 3), round(0.9 - 0.21 * i, 3)) for i in range(8)]
 USAGE = {"prompt_tokens": 321, "completion_tokens": 120, "total_tokens": 441}

@@ -1,7 +1,7 @@
 """The tool with typed arguments, for the frameworks that read them from a function."""
 
+from exchange import compute
 from pydantic import BaseModel
-from task import compute
 
 
 class Point(BaseModel):

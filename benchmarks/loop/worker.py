@@ -10,7 +10,7 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from task import FINAL
+from exchange import FINAL
 
 
 def cpu() -> float:

@@ -11,7 +11,7 @@ from numpy.random import Generator
 from . import ground as grounds
 from .layout import Point, Rows, rows, scatter
 from .palette import VISIBLE, difference, lit, shade
-from .references import HIDDEN, goes_by
+from .reference_words import HIDDEN, goes_by
 from .things import Family, Ground, Look, Scene, Sort, Thing, make
 
 Choice = tuple[Sort, str]

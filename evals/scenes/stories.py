@@ -17,7 +17,7 @@ from numpy.random import Generator
 from .compose import compose, stage
 from .families import FAMILIES
 from .layout import GAP, clearance, nearest_gap, room
-from .references import GENERAL, HIDDEN, KINDS, Slots, View, goes_by, reference_slots
+from .reference_words import GENERAL, HIDDEN, KINDS, Slots, View, goes_by, reference_slots
 from .success_rules import arrangements, robots_for, success
 from .things import Family, Scene, Thing
 

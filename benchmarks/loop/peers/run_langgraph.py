@@ -4,10 +4,10 @@ import os
 from functools import cache
 from typing import Any
 
+from exchange import SYSTEM, USER
 from langchain.agents import create_agent
 from langchain_core.tools import tool
 from langchain_openai import ChatOpenAI
-from task import SYSTEM, USER
 from typed import check_points
 
 os.environ["LANGSMITH_TRACING"] = "false"

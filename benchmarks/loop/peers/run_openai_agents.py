@@ -9,8 +9,8 @@ from agents import (
     function_tool,
     set_tracing_disabled,
 )
+from exchange import SYSTEM, USER
 from openai import AsyncOpenAI
-from task import SYSTEM, USER
 from typed import check_points
 
 set_tracing_disabled(True)

@@ -2,11 +2,11 @@
 
 from functools import cache
 
+from exchange import SYSTEM, USER
 from pydantic_ai import Agent
 from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers.openai import OpenAIProvider
 from pydantic_ai.usage import UsageLimits
-from task import SYSTEM, USER
 from typed import check_points
 
 UNLIMITED = UsageLimits(request_limit=None)

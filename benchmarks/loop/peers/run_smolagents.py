@@ -4,10 +4,10 @@ import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
+from exchange import USER, compute
 from smolagents import OpenAIModel, ToolCallingAgent, tool
 from smolagents.memory import FinalAnswerStep
 from smolagents.monitoring import LogLevel
-from task import USER, compute
 
 _pool = ThreadPoolExecutor(64)
 

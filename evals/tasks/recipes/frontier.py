@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from ...scenes.references import View, phrase
+from ...scenes.reference_words import View, phrase
 from ...scenes.stories import Story, entry_of, named, standable, story_of
 from ...scenes.things import Thing
 from .length_rules import distance, inner_cell, inner_rule, many, margin, ring_rule

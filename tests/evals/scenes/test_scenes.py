@@ -20,7 +20,7 @@ from formup.evals.experiments.trials import TrialRow
 from formup.evals.grading.attempts import grade_goals
 from formup.evals.scenes.families import FAMILIES
 from formup.evals.scenes.paint import draw
-from formup.evals.scenes.references import HIDDEN, KINDS
+from formup.evals.scenes.reference_words import HIDDEN, KINDS
 from formup.evals.scenes.stories import CELLS, Story, entry_of, story_of
 from formup.evals.scenes.things import Ground, Look
 from formup.evals.tasks.suites import load_suite

@@ -6,7 +6,7 @@ import numpy as np
 from formup.tools.perception.contours import outline_of_mask
 from formup.tools.perception.image import Picture
 from formup.tools.perception.referring.attributes import Candidate
-from formup.tools.perception.referring.measuring import candidate_of
+from formup.tools.perception.referring.measure_attributes import candidate_of
 from formup.tools.perception.segmenters.protocol import Pixels, PromptKind, Segmentation
 from formup.tools.perception.target_prompt import TargetPrompt
 

@@ -19,7 +19,7 @@ from ...geometry.outline import Outline, outline_of
 from ..contours import outline_of_mask
 from ..image import Picture
 from ..referring.attributes import Candidate
-from ..referring.measuring import SIDE, measure_attributes
+from ..referring.measure_attributes import SIDE, measure_attributes
 from ..segmenters.grabcut import Bytes, Floats, Mask, Window, open_window, pieces, resampled
 from ..segmenters.protocol import Segmentation
 from ..target_prompt import TargetPrompt

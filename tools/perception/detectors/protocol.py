@@ -17,7 +17,7 @@ class Detector(Protocol):
     def detect(self, picture: Picture, phrase: str | None) -> tuple[Candidate, ...]:
         """The things found, with ids c1, c2, ... from the most salient one; none is no error.
 
-        `referring.measuring.candidate_of` makes a candidate of an outline.
+        `referring.measure_attributes.candidate_of` makes a candidate of an outline.
 
         Args:
             picture: as the person sees it.
