@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 from ..prompts import PromptLibrary
 from ..tools.builtin import TOOLS
 from ..tools.context import Context, Settings
-from ..tools.errors import InputError, ToolError
-from ..tools.formation.contract import MAX_ROBOTS
+from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.tool import Tool
 from ..tools.world import Target, World, to_json_values
-from .first_message import first_message
+from .first_message import check_turn, first_message, numbered_anew
 from .limits import DEFAULT_LIMITS, Limits
 from .loop import ANYTHING, Approval
 from .loop import run as run_loop
@@ -33,7 +32,6 @@ from .session import (
     Run,
     Show,
     answered_by,
-    check_text,
     picture_facts,
 )
 from .store.folder import PICTURES, FolderArtefacts, FolderLog
@@ -153,7 +151,7 @@ class Agent:
             InputError: something given cannot be used.
         """
         context = Context.of(picture, settings, World.of(picture, targets=tuple(targets)))
-        _check_turn(context, instruction, pointed)
+        check_turn(context, instruction, pointed)
         log = None
         if trace is not None:
             context.services.artefacts = FolderArtefacts(trace.parent / PICTURES)
@@ -186,17 +184,19 @@ class Agent:
             words: what the person says.
             pointed: the things meant, if the person points.
             settings: what the person fixes from now on; as before if left out, but for the number
-                of robots and approvals, which hold for one turn.
+                of robots, their starts and approvals, which hold for one turn.
 
         Raises:
             InputError: something given cannot be used.
         """
-        fixed = settings or run.context.settings.model_copy(update={"robots": None})
+        once: dict[str, Any] = {"robots": None, "starts": None}
+        fixed = settings or run.context.settings.model_copy(update=once)
         fixed = fixed.model_copy(update={"approved": None})
         world = run.world.having(doubted=None)
         context = replace(run.context, world=world, settings=fixed).check()
-        _check_turn(context, words, pointed)
-        messages = closed(run.outcome.messages, "The person said something else instead.")
+        pointed = numbered_anew(pointed, world)
+        check_turn(context, words, pointed)
+        messages = closed(run.outcome.messages, "No result: the person interrupted it, or went on.")
         with closing(_reopened(run, show)) as recorder:
             for message in messages[len(run.outcome.messages) :]:
                 recorder.message(message, run.world)
@@ -305,7 +305,7 @@ class Agent:
                 text = f"{report.message} The log ends before this: {recorder.problem}"
                 report = report.model_copy(update={"message": text})
             describe(outcome, report)
-        return Run(report, outcome, context, left.began, left.trace)
+        return Run(report, outcome, context, left.began, left.trace, recorder.events)
 
     def _facts(self, picture: Picture, context: Context) -> dict[str, Any]:
         """What a log begins with, enough to go on in another process."""
@@ -338,7 +338,9 @@ class Agent:
 
         async def closing() -> Run:
             try:
-                return await run
+                made = await run
+                await made.context.services.close_fleets()
+                return made
             finally:
                 await self.aclose()
 
@@ -351,8 +353,16 @@ class Agent:
 
 
 def _reopened(run: Run, show: Show | None) -> LogRecorder:
-    """The recorder of a session that goes on."""
+    """The recorder of a session that goes on.
+
+    Raises:
+        StorageError: another process writes its log, or it has gone on since it was read.
+    """
     log = None if run.trace is None else FolderLog(run.trace)
+    if log is not None and log.last != run.events:
+        log.close()
+        lost = "could not be written to its end" if run.events is None else "has gone on since"
+        raise StorageError(f"The session in {run.trace} {lost}; open it again with load_run.")
     return LogRecorder(log, run.context.services.artefacts, run.world, show)
 
 
@@ -369,24 +379,3 @@ def _end(outcome: Outcome, report: Report) -> dict[str, Any]:
     if isinstance(outcome, Paused):
         facts |= {"call": outcome.call.id, "plan_id": outcome.plan_id}
     return facts
-
-
-def _check_turn(context: Context, words: str, pointed: Sequence[TargetPrompt]) -> None:
-    """Refuse what cannot be carried out before anything is written down.
-
-    Raises:
-        InputError: no words, a number of robots that cannot be, or a thing that is not there.
-    """
-    check_text("instruction", words, 'say what to do, such as "Surround the car at the corners"')
-    robots = context.settings.robots
-    if robots is not None and not 1 <= robots <= MAX_ROBOTS:
-        raise InputError(f"{robots} robots cannot be placed; 1 to {MAX_ROBOTS:,} can.")
-    problems = [p for q in pointed for p in q.problems(*context.world.picture.size)]
-    if problems:
-        raise InputError(" ".join(problems))
-    try:
-        for prompt in pointed:
-            if prompt.candidate is not None:
-                context.candidate(prompt.candidate)
-    except ToolError as error:
-        raise InputError(str(error)) from None

@@ -1,15 +1,25 @@
 """What the person asks for, as the first message of a turn: lines a model can read."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 from ..tools.context import Context
 from ..tools.draw import draw_view, view_scale
+from ..tools.errors import InputError, ToolError
+from ..tools.formation.contract import MAX_ROBOTS
+from ..tools.perception.target_prompt import TargetPrompt
+from ..tools.world import World
 from .messages import History, User
 
 MOST_NUMBERED = 40
 """Candidates in the first picture."""
+
+
+MAX_TEXT = 4_000
+"""Characters of what a person says; longer texts are no instruction, and cost their reader."""
 
 
 @dataclass(frozen=True)
@@ -88,3 +98,52 @@ def read_task(text: str) -> Task:
         deploy=facts["Deploy"],
         metres_per_pixel=facts.get("Metres per pixel"),
     )
+
+
+def numbered_anew(pointed: Sequence[TargetPrompt], world: World) -> list[TargetPrompt]:
+    """What is pointed at in a later turn: another thing than the targets there are."""
+    used, numbered = {target.id for target in world.targets}, list[TargetPrompt]()
+    for prompt in pointed:
+        name = prompt.id
+        if name in used:
+            name = next(f"t{i}" for i in count(1) if f"t{i}" not in used)
+        used.add(name)
+        numbered.append(prompt.model_copy(update={"id": name}))
+    return numbered
+
+
+def check_turn(context: Context, words: str, pointed: Sequence[TargetPrompt]) -> None:
+    """Refuse what cannot be carried out before anything is written down.
+
+    Raises:
+        InputError: no words, a number of robots that cannot be, or a thing that is not there.
+    """
+    check_text("instruction", words, 'say what to do, such as "Surround the car at the corners"')
+    robots = context.settings.robots
+    if robots is not None and not 1 <= robots <= MAX_ROBOTS:
+        raise InputError(f"{robots} robots cannot be placed; 1 to {MAX_ROBOTS:,} can.")
+    problems = [p for q in pointed for p in q.problems(*context.world.picture.size)]
+    if problems:
+        raise InputError(" ".join(problems))
+    try:
+        for prompt in pointed:
+            if prompt.candidate is not None:
+                context.candidate(prompt.candidate)
+    except ToolError as error:
+        raise InputError(str(error)) from None
+
+
+def check_text(name: str, text: str, advice: str) -> None:
+    """Refuse what a person says where nobody could read it.
+
+    Raises:
+        InputError: empty, no text, or far too long.
+    """
+    if not text.strip():
+        raise InputError(f"The {name} is empty; {advice}.")
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise InputError(f"The {name} holds bytes that are not text in UTF-8.") from None
+    if len(text) > MAX_TEXT:
+        raise InputError(f"The {name} has {len(text):,} characters; {MAX_TEXT:,} can be read.")

@@ -191,6 +191,7 @@ async def _settle(
     before = failed_before(talk.messages)
     decision = "skip" if before and turn.moves(call) else turn.permit(call, talk.world)
     if decision == "ask":
+        await _shown(turn, talk, call)
         return Paused(talk.messages, talk.world, call, turn.plan_of(call, talk.world))
     if decision == "skip":
         talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
@@ -206,6 +207,14 @@ async def _settle(
         return Paused(talk.messages, talk.world, call, needed.plan_id)
     talk.add(result)
     return _ended(talk)
+
+
+async def _shown(turn: Turn, talk: Conversation, call: Call) -> None:
+    """Keep what a question offers, so that its ids mean the same in the answer."""
+    tool = tool_named(turn.tools, call.name)
+    if tool is not None and tool.kind == "ask":
+        context = replace(turn.context, world=talk.world, observed=talk.keep)
+        await answer(turn.tools, context, call, turn.limits.tool_seconds)
 
 
 @contextmanager

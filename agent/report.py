@@ -160,7 +160,8 @@ def make_report(
     arrivals = {n: a for n, a in world.arrivals.items() if began.arrivals.get(n) is not a}
     plan = _plan(outcome, world, arrivals)
     arrival = arrivals.get(plan.id) if plan else None
-    status, message = _status(outcome, plan, arrival)
+    new = plan is not None and world.plans[plan.id] is not began.plans.get(plan.id)
+    status, message = _status(outcome, plan, arrival, new=new)
     return Report(
         status=status,
         message=message,
@@ -210,22 +211,27 @@ def _named(messages: History) -> str | None:
     return next(c.arguments.get("plan_id") for c in calls if c.id == last.call_id)
 
 
-def _status(outcome: Outcome, plan: Plan | None, arrival: Arrival | None) -> tuple[Status, str]:
+def _status(
+    outcome: Outcome, plan: Plan | None, arrival: Arrival | None, *, new: bool
+) -> tuple[Status, str]:
+    """Status and message of a turn; `new` is whether it made the plan."""
     text = _last_words(outcome)
-    if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
-        # Robots have moved, whatever happened after that.
-        return ("deployed" if arrival.arrived else "failed"), _with_arrival(outcome, arrival, text)
     if isinstance(outcome, Paused):
         asked = outcome.call.name == "ask_user"
         return ("question" if asked else "needs_approval"), text
+    if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
+        # Robots have moved, whatever happened after that.
+        return ("deployed" if arrival.arrived else "failed"), _with_arrival(outcome, arrival, text)
     if isinstance(outcome, Stopped):
         ours = outcome.kind in ("limit", "repeat")
         return ("stopped" if ours else "failed"), text
     if isinstance(outcome, Cancelled):
         return "stopped", text
-    given_up = isinstance(outcome.messages[-1], Result)
-    certified = plan is not None and plan.verdict.certified
-    return ("planned" if certified and not given_up else "impossible"), text
+    last = outcome.messages[-1]
+    given_up = isinstance(last, Result) and last.name == "report_impossible"
+    if plan is None or not plan.verdict.certified or given_up:
+        return "impossible", text
+    return ("planned" if new else "answered"), text
 
 
 def _with_arrival(outcome: Outcome, arrival: Arrival, text: str) -> str:
@@ -241,6 +247,9 @@ def _last_words(outcome: Outcome) -> str:
         if call.name == "ask_user":
             return str(call.arguments["question"])
         plan = f" It is for plan {outcome.plan_id}." if outcome.plan_id else ""
+        node = outcome.world.plans.get(outcome.plan_id or "")
+        if node is not None and node.plan.partial is not None:
+            plan += f" That plan is partial: {node.plan.partial.sentence}"
         return f"A person must approve {call.name} of {json.dumps(call.arguments)}.{plan}"
     if isinstance(outcome, Stopped):
         return outcome.reason

@@ -17,6 +17,7 @@ from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture, load_picture, picture_file, picture_from_file
 from ..tools.world import World
 from .calls import refused
+from .first_message import check_text
 from .loop import Approval, Recorder
 from .messages import HISTORY, History, Message, Reply, Result, unanswered
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
@@ -25,9 +26,8 @@ from .store.folder import PICTURES, FolderArtefacts, log_path, read_events
 from .store.protocol import Event, EventLog
 
 FORMAT = "formup-session-1"
-MAX_TEXT = 4_000
-"""Characters of what a person says; longer texts are no instruction, and cost their reader."""
-
+GOES_ON = ("turn", "resume", "message")
+"""Events after which a turn that had ended is under way again."""
 Show = Callable[[Message], None]
 
 
@@ -41,6 +41,8 @@ class Run:
         context: with the world, the settings and the services to go on with.
         began: the world when the turn began.
         trace: the log, if there is one.
+        events: that the log had then; a log that has gone on since is not written by this run.
+            None where the log could not be written any more.
     """
 
     report: Report
@@ -48,6 +50,7 @@ class Run:
     context: Context
     began: World
     trace: Path | None = None
+    events: int | None = 0
 
     @property
     def world(self) -> World:
@@ -104,7 +107,8 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
             world = world.with_changes(event.data["changes"])
         elif event.kind == "message":
             lines.append(event.data)
-        end = event.data if event.kind == "end" else None
+        end = event.data if event.kind == "end" else end
+        end = None if event.kind in GOES_ON else end
     if not words:
         raise InputError("It was broken off before anything began; run again.")
     if any(node.plan.id != name for name, node in world.plans.items()):
@@ -168,6 +172,11 @@ class LogRecorder(Recorder):
         self._moved = False
         self.problem: str | None = None
 
+    @property
+    def events(self) -> int | None:
+        """How many events the log has; None where it could not be written any more."""
+        return None if self.problem else 0 if self._log is None else self._log.last
+
     def event(self, kind: Any, data: Mapping[str, Any]) -> None:
         """Write an event that changes no world."""
         self._try(lambda log: log.append(kind, data))
@@ -226,7 +235,8 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
     path = log_path(Path(path))
     artefacts = FolderArtefacts(path.parent / PICTURES)
     try:
-        state = fold(read_events(path), artefacts)
+        events = read_events(path)
+        state = fold(events, artefacts)
         outcome = _outcome(state)
         prompt, prompts = state.facts["prompt"], tuple(state.facts["prompts"])
         for facts in (prompt, *prompts):
@@ -242,7 +252,7 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
     context = Context(state.world, services, state.settings, state.words).check()
     report = make_report(outcome, context, state.began, model_name(state.facts), state.seconds)
     report = report.model_copy(update={"prompt": prompt, "prompts": prompts})
-    return Run(report, outcome, context, state.began, path)
+    return Run(report, outcome, context, state.began, path, len(events))
 
 
 def prompt_name(facts: Mapping[str, Any] | None) -> str | None:
@@ -300,6 +310,8 @@ def answered_by(
         InputError: the turn is over, or waits for something else.
     """
     outcome = run.outcome
+    if answer is not None and answer.strip():
+        check_text("answer", answer, "say it in words")
     if not isinstance(outcome, Paused):
         if answer is not None or approve is not None:
             raise InputError(f"The run asked nothing: it is {run.report.status}.")
@@ -321,22 +333,6 @@ def answered_by(
         return None, Approval(call, outcome.plan_id)
     why = f": {answer.strip()}" if answer and answer.strip() else "."
     return refused(call, f"A person said no{why}"), None
-
-
-def check_text(name: str, text: str, advice: str) -> None:
-    """Refuse what a person says where nobody could read it.
-
-    Raises:
-        InputError: empty, no text, or far too long.
-    """
-    if not text.strip():
-        raise InputError(f"The {name} is empty; {advice}.")
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        raise InputError(f"The {name} holds bytes that are not text in UTF-8.") from None
-    if len(text) > MAX_TEXT:
-        raise InputError(f"The {name} has {len(text):,} characters; {MAX_TEXT:,} can be read.")
 
 
 def _outcome(state: State) -> Outcome:

@@ -2,13 +2,17 @@
 
 import asyncio
 import sys
+from collections.abc import Callable, Generator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import typer
 from rich.console import Console
 
 from ..agent.report import Report, metric_data, target_data
-from ..agent.store.folder import PICTURES, FolderArtefacts
+from ..agent.session import LogRecorder, load_run
+from ..agent.store.folder import NAME, PICTURES, FolderArtefacts, FolderLog
 from ..tools.builtin.robots import drive_to
 from ..tools.context import Context, Settings
 from ..tools.errors import FleetError, InputError, ToolError
@@ -39,8 +43,13 @@ def deploy(
     chosen = stored.world.plans[stored.plan_id].plan
     if chosen.partial is not None:
         print(f"formup: a partial plan: {chosen.partial.sentence}", file=sys.stderr)  # noqa: T201
-    context = context.at(_driven(context, chosen, plan))
-    write_whole(plan, plan_file(context.world, chosen.id, stored.instruction or "", picture))
+
+    def keep(world: World) -> None:
+        write_whole(plan, plan_file(world, chosen.id, stored.instruction or "", picture))
+
+    with _session(plan, context) as session:
+        context = context.at(session.start(context.world))
+        context = context.at(_driven(context, chosen, plan, session, keep))
     animation = plan.with_name("deploy.gif")
     drawn = animate(animation, context, chosen, stored.instruction or "")
     report = _report(chosen, context.world, stored, animation.name if drawn else None)
@@ -52,18 +61,65 @@ def deploy(
     raise typer.Exit(report.exit_code)
 
 
-def _driven(context: Context, plan: Plan, path: Path) -> World:
+@dataclass
+class Session:
+    """The session that a plan.json lies beside, which learns where robots are; or none."""
+
+    recorder: LogRecorder
+    world: World | None
+
+    def start(self, world: World) -> World:
+        """A plan's world, with robots where the session left them."""
+        return world if self.world is None else world.having(robots=self.world.robots)
+
+    def moving(self, plan_id: str) -> None:
+        """Write down that robots are about to move."""
+        if self.world is not None:
+            self.recorder.moving(plan_id, self.world)
+
+    def end(self, world: World) -> None:
+        """Write down where robots are, and what was observed of a plan of the session."""
+        if self.world is None:
+            return
+        known = {n: a for n, a in world.arrivals.items() if n in self.world.plans}
+        arrivals = {**self.world.arrivals, **known}
+        self.recorder.world(self.world.having(robots=world.robots, arrivals=arrivals))
+
+
+@contextmanager
+def _session(plan: Path, context: Context) -> Generator[Session, None, None]:
+    """The session beside a plan.json; no other process may write it meanwhile."""
+    artefacts, path = context.services.artefacts, plan.parent / NAME
+    if not path.exists():
+        yield Session(LogRecorder(None, artefacts, None, None), None)
+        return
+    with closing(FolderLog(path)) as log:
+        world = load_run(path, context.picture).world
+        yield Session(LogRecorder(log, artefacts, world, None), world)
+
+
+def _driven(
+    context: Context, plan: Plan, path: Path, session: Session, keep: Callable[[World], None]
+) -> World:
     """The world after the robots have driven; where they failed on the way, with what was seen."""
     observed: list[World] = []
-    watching = Context(context.world, context.services, context.settings, observed=observed.append)
+    watching = replace(context, observed=observed.append, moving=session.moving)
     try:
-        return asyncio.run(drive_to(watching, watching.world.plan(plan.id)))[1]
+        observed.append(asyncio.run(drive_to(watching, watching.world.plan(plan.id)))[1])
     except ToolError as error:
         raise InputError(f"{path}: {error}") from None
     except FleetError:
         if not observed or observed[-1].arrivals is context.world.arrivals:
             raise
-        return observed[-1]
+    except KeyboardInterrupt:
+        if observed:
+            print("formup: the robots were stopped on the way.", file=sys.stderr)  # noqa: T201
+        raise
+    finally:
+        if observed:
+            session.end(observed[-1])
+            keep(observed[-1])
+    return observed[-1]
 
 
 def _report(plan: Plan, world: World, stored: StoredWorld, animation: str | None) -> Report:

@@ -22,7 +22,7 @@ def main() -> None:
     try:
         code = _run()
     except KeyboardInterrupt:
-        print("formup: interrupted; nothing more was done.", file=sys.stderr)  # noqa: T201
+        print("formup: interrupted; nothing more is done.", file=sys.stderr)  # noqa: T201
         code = INTERRUPTED
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # too late: the work is done
     _leave(code)

@@ -63,12 +63,12 @@ def call_tool(
     try:
         called = tool.call(replace(context, observed=observed.append), arguments)
         result = asyncio.run(called)
-    except (ToolError, FleetError) as error:
+    except (ToolError, FleetError, KeyboardInterrupt) as error:
         if metres_per_pixel is None and observed:  # another scale is not kept if it was refused
             _save(observed[-1], context, state)  # such as a partial plan, or where robots stopped
-        if isinstance(error, FleetError):
-            raise
-        raise InputError(str(error)) from None
+        if isinstance(error, ToolError):
+            raise InputError(str(error)) from None
+        raise
     data = dict(result.data)
     folder = state.parent if state else Path()
     for number, png in enumerate(result.images, start=1):
@@ -80,9 +80,15 @@ def call_tool(
 
 
 def _save(world: World, context: Context, state: Path | None) -> None:
-    if state is not None:
-        lay = context.picture.path and str(context.picture.path)
-        write_whole(state, StoredWorld(picture=lay, world=world).to_bytes())
+    if state is None:
+        return
+    lay = context.picture.path and str(context.picture.path)
+    stored = StoredWorld(picture=lay, world=world)
+    if state.exists():  # a plan.json stays one
+        before = read_world(state)
+        kept = {"plan_id": before.plan_id, "instruction": before.instruction}
+        stored = stored.model_copy(update=kept)
+    write_whole(state, stored.to_bytes())
 
 
 def _arguments(text: str) -> dict[str, Any]:

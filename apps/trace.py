@@ -34,7 +34,8 @@ def show_trace(file: o.TraceFile) -> None:
     for first, after in zip(turns, [*turns[1:], len(events)], strict=True):
         console.print(Text(events[first].data["words"], style="bold"))
         console.print(_steps(events[first:after], pictures))
-        console.print(_end(events[after - 1], file))
+        last = [e for e in events[first:after] if e.kind in ("end", "resume")][-1:]
+        console.print(_end(last[0] if last else events[after - 1], file))
 
 
 def _steps(events: Sequence[Event], pictures: FolderArtefacts) -> Table:

@@ -113,6 +113,7 @@ class Services:
         fleets: the robots in use, by the name of their fleet.
         artefacts: files that events and the world name by their hash.
         found: what detectors found in pictures, by detector and picture.
+        stopped: fleets that were stopped when they were let go of.
     """
 
     pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
@@ -121,6 +122,16 @@ class Services:
     found: dict[tuple[str, str], tuple[Candidate, ...]] = field(
         default_factory=dict[tuple[str, str], tuple[Candidate, ...]]
     )
+
+    stopped: set[str] = field(default_factory=set[str])
+
+    async def close_fleets(self) -> None:
+        """Let go of all fleets; a stop stays in force when they are opened again."""
+        for name, fleet in self.fleets.items():
+            if fleet.stopped:
+                self.stopped.add(name)
+            await fleet.close()
+        self.fleets.clear()
 
     @classmethod
     def of(cls, picture: Picture) -> "Services":

@@ -54,6 +54,11 @@ class FolderLog:
             raise
         self._began = self._clock()
 
+    @property
+    def last(self) -> int:
+        """The number of the last event; 0 where there is none."""
+        return self._next - 1
+
     def _cut_to_whole_events(self) -> tuple[Event, ...]:
         """The events there are; a line that was broken off is cut away."""
         data = self._file.read()

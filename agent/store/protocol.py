@@ -34,6 +34,11 @@ class Event:
 class EventLog(Protocol):
     """The events of one session; whoever has it open for writing is the only one."""
 
+    @property
+    def last(self) -> int:
+        """The number of the last event; 0 where there is none."""
+        ...
+
     def append(self, kind: EventKind, data: Mapping[str, Any]) -> int:
         """Write one event, at once and whole, and return its number.
 

@@ -63,17 +63,21 @@ async def propose_formation(
     _check_doubts(context, stated)
     held = _held_to(stated, context.settings)
 
-    def work() -> tuple[World, PlanNode, Plan | None]:
+    def work() -> tuple[World, PlanNode | PlacementError, Plan | None]:
         world = measured_all(context, targets)
         places = positions if samples is None else _sampled(world, samples)
         return world, *_planned(context.at(world), held, places)
 
-    world, node, partial = await in_thread(work)
+    world, found, partial = await in_thread(work)
     offered: dict[str, Any] = {}
     if partial is not None:
-        world = await with_robots(context.at(world), PlanNode(plan=partial, unseen=node.unseen))
+        less = PlanNode(plan=partial, unseen=_unseen(world, held))
+        world = await with_robots(context.at(world), less)
         offered = {"partial": _offer(world.plan().plan), "next": SHOW_PARTIAL}
-    world = await with_robots(context.at(world), node)
+    if isinstance(found, PlacementError):
+        context.observed(world)
+        raise _refusal(found, offered["partial"])
+    world = await with_robots(context.at(world), found)
     node = world.plan()
     data = _proposal(world, node.plan) | offered
     if node.plan.verdict.certified and (advice := _to_see(world, node)):
@@ -96,8 +100,10 @@ def _check_doubts(context: Context, contract: Contract) -> None:
         )
 
 
-def _planned(context: Context, held: Contract, places: Any) -> tuple[PlanNode, Plan | None]:
-    """The plan of a contract and, where it is not certified, the best partial one."""
+def _planned(
+    context: Context, held: Contract, places: Any
+) -> tuple[PlanNode | PlacementError, Plan | None]:
+    """The plan of a contract or why there is none and, if it is not certified, the best partial."""
     world = context.world
     site = world.site(held)
     try:
@@ -106,15 +112,18 @@ def _planned(context: Context, held: Contract, places: Any) -> tuple[PlanNode, P
         partial = best_partial(held, site, world.version, error)
         if partial is None:
             raise
-        context.observed(world.with_plan(PlanNode(plan=partial)))
-        offer = _offer(partial)
-        plain = f"{error} {offer['sentence']}"
-        facts = error.facts | {"partial_plan": offer["plan_id"], "plain": plain}
-        raise ToolError(f"{plain} {SHOW_PARTIAL}", error.kind, **facts) from None
+        return error, partial
     partial = None
     if places is None and not plan.verdict.certified:
         partial = best_partial(held, site, world.version, None)
     return PlanNode(plan=plan, unseen=_unseen(world, held)), partial
+
+
+def _refusal(error: PlacementError, partial: dict[str, str]) -> ToolError:
+    """Why robots cannot all be placed, with the partial plan that there is instead."""
+    plain = f"{error} {partial['sentence']}"
+    facts = error.facts | {"partial_plan": partial["plan_id"], "plain": plain}
+    return ToolError(f"{plain} {SHOW_PARTIAL}", error.kind, **facts)
 
 
 def _unseen(world: World, held: Contract) -> tuple[str, ...]:
@@ -139,7 +148,7 @@ async def deploy(
     _check_may_move(context, node.plan)
     if plan_id is None and (advice := _to_see(context.world, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
-    arrival, world = await drive_to(context, node)
+    arrival, world, moved = await drive_to(context, node)
     worst = int(np.argmax(arrival.residual_px))
     data = {
         "plan_id": node.plan.id,
@@ -149,7 +158,7 @@ async def deploy(
         "worst_robot": arrival.robots[worst],
         "tolerance_px": arrival.tolerance_px,
     }
-    if world is context.world:
+    if not moved:
         data["already_there"] = True
     message = _with_observed(tell, arrival, world) if arrival.arrived else None
     data = with_metres(data, world.metres_per_pixel)

@@ -37,7 +37,8 @@ async def with_robots(context: Context, node: PlanNode) -> World:
         return world.with_plan(node)  # more than can be driven can still be planned
     poses, points = await fleet.observe(max_age=MAX_AGE), plan.formation.points
     try:
-        found = await in_thread(lambda: assign_robots(poses, points))
+        apart = plan.formation.contract.spacing_floor
+        found = await in_thread(lambda: assign_robots(poses, points, apart))
     except FleetSizeError as error:
         raise ToolError(str(error), "too_many_robots") from None
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
@@ -62,11 +63,14 @@ def _notes(found: Assigned, poses: tuple[Pose, ...]) -> list[str]:
     return notes
 
 
-async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World]:
+async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bool]:
     """Drive the robots of a plan to their places, and say what was observed.
 
-    Where they stand at its end is kept also if it fails or is cancelled. Robots that are there
-    already are not moved.
+    Where they stand at its end is kept also if it fails or is cancelled.
+
+    Returns:
+        What was observed, the world after it, and whether robots moved: those that are there
+        already are not moved.
 
     Raises:
         ApprovalError: real robots, and the person has not approved this plan.
@@ -86,7 +90,8 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World]:
             raise ApprovalError(plan.id)
         before = world.arrivals.get(plan.id)
         if before is not None and _are_there(await fleet.observe(max_age=MAX_AGE), plan, before):
-            return before, world
+            again = before.model_copy()
+            return again, world.with_arrival(plan.id, again), False
         made = await deploy(
             plan,
             world.site(plan.formation.contract),
@@ -110,7 +115,7 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World]:
     if arrival.reason is not None:
         context.observed(world)
         raise FleetError(arrival.reason)
-    return arrival, world
+    return arrival, world, True
 
 
 async def _team(context: Context, contract: Contract) -> Fleet:
@@ -134,10 +139,10 @@ async def _team(context: Context, contract: Contract) -> Fleet:
             seed=settings.seed,
         )
     )
-    if held is not None:
-        if held.stopped:
-            await fleet.stop()
-        await held.close()
+    await context.services.close_fleets()
+    if settings.fleet in context.services.stopped:
+        context.services.stopped.remove(settings.fleet)
+        await fleet.stop()
     fleets[settings.fleet] = fleet
     return fleet
 

@@ -141,7 +141,7 @@ def test_the_side_of_one_thing_that_faces_another() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "wording"),
     [
         ("form a star with 10 robots", "Where are the robots to draw a star?"),
         ("spell A around it with 9 robots", "Where are the robots to draw the letters A?"),

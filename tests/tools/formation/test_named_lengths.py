@@ -34,7 +34,7 @@ THREE = [
 
 @pytest.mark.parametrize(("template", "of"), THREE)
 @pytest.mark.parametrize(
-    ("said", "value", "unit"),
+    ("wording", "value", "unit"),
     [
         ("12 px", 12, "px"),
         ("1.5 m", 1.5, "m"),
