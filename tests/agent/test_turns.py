@@ -195,7 +195,7 @@ def test_a_question_is_dropped_by_what_is_said_instead(picture: Picture, tmp_pat
     assert isinstance(second.outcome, Answered)
     results = [m for m in second.outcome.messages if isinstance(m, Result)]
     assert [(m.call_id, m.error) for m in results] == [("q", "refused"), ("l", "refused")]
-    assert results[0].text == "The person said something else instead."
+    assert results[0].text == "No result: the person interrupted it, or went on."
     assert load_run(path).outcome == second.outcome
 
 

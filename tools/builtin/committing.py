@@ -52,15 +52,8 @@ async def propose_formation(
     """
     if positions is not None and samples is not None:
         raise ToolError("propose_formation: give positions or samples, not both.")
-    asked = context.settings.robots
-    if asked is not None and contract.robots != asked:
-        raise ToolError(
-            f"The person asked for {asked} robots; the contract's groups add up to "
-            f"{contract.robots}.",
-            "count",
-        )
     stated = contract_in_pixels(contract, context.world.metres_per_pixel)
-    _check_doubts(context, stated)
+    _check_against_words(context, stated)
     held = _held_to(stated, context.settings)
 
     def work() -> tuple[World, PlanNode | PlacementError, Plan | None]:
@@ -86,13 +79,18 @@ async def propose_formation(
     return ToolResult(data, shown, world=world)
 
 
-def _check_doubts(context: Context, contract: Contract) -> None:
-    """Hold the contract, in px, against the person's words."""
-    settings = context.settings
+def _check_against_words(context: Context, contract: Contract) -> None:
+    """Hold the contract, in px, against the number of robots and the words of the person."""
+    settings, asked = context.settings, context.settings.robots
+    if asked is not None and contract.robots != asked:
+        raise ToolError(
+            f"The person asked for {asked} robots; the contract's groups add up to "
+            f"{contract.robots}.",
+            "count",
+        )
     free = settings.clearance is settings.robot_radius is None
     scale = context.world.metres_per_pixel if free else None  # else lengths are fixed already
-    counted = settings.robots is not None
-    found = doubts(context.words, contract, counted=counted, scale=scale)
+    found = doubts(context.words, contract, counted=asked is not None, scale=scale)
     if found and not contract.reading:
         raise ToolError(
             f"A doubt: {'; '.join(found)}. Propose again with a contract that says what is meant; "

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..context import Context
 from ..errors import ApprovalError, FleetError, StorageError, ToolError
-from ..fleet.deploy import MAX_AGE, Arrival, Assigned, Track, assign_robots, deploy
+from ..fleet.deploy import MAX_AGE, Arrival, Assigned, Deployment, Track, assign_robots, deploy
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
 from ..fleet.registry import FLEETS
 from ..formation.contract import Contract
@@ -37,8 +37,7 @@ async def with_robots(context: Context, node: PlanNode) -> World:
         return world.with_plan(node)  # more than can be driven can still be planned
     poses, points = await fleet.observe(max_age=MAX_AGE), plan.formation.points
     try:
-        apart = plan.formation.contract.spacing_floor
-        found = await in_thread(lambda: assign_robots(poses, points, apart))
+        found = await in_thread(lambda: assign_robots(poses, points))
     except FleetSizeError as error:
         raise ToolError(str(error), "too_many_robots") from None
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
@@ -78,12 +77,6 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bo
         FleetError: robots failed or were stopped on the way.
     """
     plan, world = node.plan, context.world
-    last: tuple[Pose, ...] = ()
-
-    def watch(poses: tuple[Pose, ...]) -> None:
-        nonlocal last
-        last = poses
-
     try:
         fleet = await _team(context, plan.formation.contract)
         if fleet.real and context.settings.approved != plan.id:
@@ -92,21 +85,11 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bo
         if before is not None and _are_there(await fleet.observe(max_age=MAX_AGE), plan, before):
             again = before.model_copy()
             return again, world.with_arrival(plan.id, again), False
-        made = await deploy(
-            plan,
-            world.site(plan.formation.contract),
-            fleet,
-            plan.formation.robot_of_place,
-            watch=watch,
-            starting=lambda: context.moving(plan.id),
-        )
+        made = await _deployed(context, plan, fleet)
     except FleetSizeError as error:
         raise ToolError(str(error), "too_many_robots") from None
     except PlaceTakenError as error:
         raise ToolError(str(error)) from None
-    finally:
-        if last:
-            context.observed(world.having(robots=last))
     arrival = _in_robot_order(made.arrival, plan)
     with suppress(StorageError):  # a film is not worth failing for
         stored = context.services.artefacts.put(_track_file(made.track))
@@ -116,6 +99,25 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bo
         context.observed(world)
         raise FleetError(arrival.reason)
     return arrival, world, True
+
+
+async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
+    """What came of a deployment; where robots were seen last is kept however it ends."""
+    last: tuple[Pose, ...] = ()
+
+    def watch(poses: tuple[Pose, ...]) -> None:
+        nonlocal last
+        last = poses
+
+    site = context.world.site(plan.formation.contract)
+    robots = plan.formation.robot_of_place
+    try:
+        return await deploy(
+            plan, site, fleet, robots, watch=watch, starting=lambda: context.moving(plan.id)
+        )
+    finally:
+        if last:
+            context.observed(context.world.having(robots=last))
 
 
 async def _team(context: Context, contract: Contract) -> Fleet:

@@ -14,7 +14,7 @@ from ..formation.contract import MIN_SPACING, Contract, with_defaults
 from ..formation.placement.place import Site
 from ..formation.plan import Plan, Point
 from ..formation.value import Value
-from ..geometry.assignment import IntArray, assign
+from ..geometry.assignment import assign
 from ..geometry.outline import FloatArray
 from ..motion.motion import obstacles, routes
 from .protocol import (
@@ -107,10 +107,8 @@ class Assigned:
     gap: float | None
 
 
-def assign_robots(poses: Sequence[Pose], places: FloatArray, apart: float = 0.0) -> Assigned:
+def assign_robots(poses: Sequence[Pose], places: FloatArray) -> Assigned:
     """The robots for all places, (n, 2) px, with the least sum of squared ways; others stay idle.
-
-    One that would stand idle nearer than `apart`, px, to a place takes that place instead.
 
     Raises:
         FleetSizeError: the fleet has fewer robots than there are places.
@@ -126,24 +124,8 @@ def assign_robots(poses: Sequence[Pose], places: FloatArray, apart: float = 0.0)
         cost = cdist(places, points, "sqeuclidean")
         chosen = np.sort(linear_sum_assignment(cost)[1])
     found = assign(points[chosen], places)
-    taking = _with_blocking(points, chosen[found.robots], places, apart)
-    robots = tuple(poses[int(i)].id for i in taking)
+    robots = tuple(poses[int(i)].id for i in chosen[found.robots])
     return Assigned(robots, found.gap if found.method == "approximate" else None)
-
-
-def _with_blocking(
-    points: FloatArray, taking: IntArray, places: FloatArray, apart: float
-) -> IntArray:
-    """Indices of the robots that take the places, so that no idle one stands too near to one."""
-    taking = taking.copy()
-    for _ in range(len(points) - len(taking)):
-        idle = np.setdiff1d(np.arange(len(points)), taking)
-        away = np.linalg.norm(points[idle][:, None] - places[None], axis=2)
-        robot, place = np.unravel_index(int(np.argmin(away)), away.shape)
-        if away[robot, place] >= apart:
-            break
-        taking[place] = idle[robot]
-    return taking
 
 
 async def deploy(
@@ -280,9 +262,10 @@ class _Drive:
         for pose in self._idle():
             away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
             if away.min() < max(2 * self._radius, MIN_SPACING):
+                place = int(away.argmin()) + 1
                 raise PlaceTakenError(
                     f"Robot {pose.id}, which has no place in the plan, stands {away.min():.1f} px "
-                    f"from place {int(away.argmin()) + 1}; propose the formation again.",
+                    f"from place {place}: give it a place too, or send it away first.",
                     (pose.id,),
                 )
 

@@ -186,7 +186,7 @@ def test_robots_that_are_there_already_are_not_moved(
     again = work.call("deploy", tell="There.")
     assert again.data == first.data | {"already_there": True}
     assert again.message == first.message
-    assert work.world is before
+    assert work.world == before
     assert work.moved == []
     assert propose(work, ("around", 6)).id == plan.id, "robots keep the places they stand on"
     assert work.call("deploy").data["already_there"]
@@ -235,7 +235,7 @@ def test_a_plan_from_before_a_deployment_may_find_its_places_taken(work: "ToolCa
     many = propose(work, ("around", 8))
     work.call("deploy", plan_id=many.id)
     before = work.world
-    with pytest.raises(ToolError, match=r"has no place in the plan, .*propose the formation again"):
+    with pytest.raises(ToolError, match=r"has no place in the plan, .*give it a place too"):
         work.call("deploy", plan_id=few.id)
     assert standing(work.world) == standing(before)
     assert work.world.arrivals == before.arrivals
