@@ -1,0 +1,83 @@
+"""`formup deploy` and the session it lies beside: each knows where the other left the robots."""
+
+import json
+from collections.abc import AsyncGenerator
+from pathlib import Path
+
+import pytest
+import typer
+from formup.agent.session import load_run
+from formup.agent.store.folder import FolderLog, read_events
+from formup.apps.cli import app
+from formup.apps.main import INTERRUPTED
+from formup.tools.errors import StorageError
+from formup.tools.fleet.protocol import Motion, Pose
+from formup.tools.fleet.simulated import SimulatedFleet
+from formup.tools.store import read_world
+
+COINS = Path(__file__).parents[2] / "evals/photos/images/us_coins.jpg"
+CAGE = ("run", COINS, "Cage the largest coin", "-n", "6", "--plan-only", "--json")
+
+
+def formup(*arguments: object) -> int:
+    try:
+        return app([*map(str, arguments)], standalone_mode=False) or 0
+    except typer.Exit as end:
+        return end.exit_code
+
+
+@pytest.fixture
+def planned(tmp_path: Path) -> Path:
+    assert formup(*CAGE, "--out", tmp_path / "out") == 0
+    return tmp_path / "out"
+
+
+def test_a_session_goes_on_where_deploy_left_the_robots(
+    planned: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert formup("deploy", planned / "plan.json", "--json") == 0
+    (moving,) = [e for e in read_events(planned) if e.kind == "moving"]
+    left = load_run(planned)
+    assert left.report.status == "deployed"
+    assert moving.data["plan_id"] == left.report.plan_id
+    stand = {pose.id: (pose.x, pose.y) for pose in left.world.robots}
+    capsys.readouterr()
+    words = "now surround the largest coin with 4 robots"
+    assert formup("resume", planned, words, "--json") == 0
+    report = json.loads(capsys.readouterr().out)
+    assert set(report["robots"]) < set(stand)
+    now = {pose.id: (pose.x, pose.y) for pose in load_run(planned).world.robots}
+    assert now == stand
+
+
+def test_deploy_waits_for_whoever_writes_the_session(planned: Path) -> None:
+    log = FolderLog(planned / "trace.jsonl")
+    with pytest.raises(StorageError, match="being written by another process"):
+        formup("deploy", planned / "plan.json")
+    log.close()
+    assert formup("deploy", planned / "plan.json", "--json") == 0
+
+
+def test_an_interrupted_deploy_keeps_where_the_robots_stand(
+    planned: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = read_world(planned / "plan.json").world.robots
+    drive, steps = SimulatedFleet.drive, 3
+
+    async def interrupted(
+        self: SimulatedFleet, motion: Motion
+    ) -> AsyncGenerator[tuple[Pose, ...], None]:
+        left = steps
+        async for poses in drive(self, motion):
+            yield poses
+            left -= 1
+            if not left:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr(SimulatedFleet, "drive", interrupted)
+    assert formup("deploy", planned / "plan.json") == INTERRUPTED
+    assert "stopped on the way" in capsys.readouterr().err
+    stored, session = read_world(planned / "plan.json"), load_run(planned)
+    assert stored.world.robots == session.world.robots != before
+    assert all(pose.seen > 0 for pose in stored.world.robots)
+    assert stored.plan_id is not None
