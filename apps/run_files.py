@@ -15,6 +15,7 @@ from ..tools.draw import draw_deployment, draw_look, draw_plan, save_gif
 from ..tools.errors import InputError
 from ..tools.formation.plan import Plan
 from ..tools.store import plan_file, write_whole
+from ..tools.world import PlanNode
 
 PICTURES = ("plan.png", "question.png", "found.png")
 
@@ -83,6 +84,8 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
     picture, world, report = run.context.picture, run.world, run.report
     node = world.plans.get(report.plan_id or "")
     title = report.instruction
+    if node is not None and _is_standing(folder, run, node):
+        return files | {"plan": "plan.json", "picture": "plan.png"}
     if node is not None:
         data = plan_file(world, node.plan.id, title, picture)
         write_whole(folder.path / "plan.json", data)
@@ -98,6 +101,14 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
         files["picture"] = folder.draw("found.png", draw_look(picture, shown))
     folder.drop_pictures_but(files["picture"])
     return files
+
+
+def _is_standing(folder: Folder, run: Run, node: PlanNode) -> bool:
+    """Whether a plan is of an earlier turn, whose files are there already."""
+    names = ("plan.json", "plan.png")
+    earlier = node is run.began.plans.get(node.plan.id) and run.report.arrival is None
+    there = all((folder.path / name).exists() for name in names)
+    return earlier and there and not run.report.candidates
 
 
 def _choices(run: Run) -> Any:

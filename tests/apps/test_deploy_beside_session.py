@@ -50,6 +50,17 @@ def test_a_session_goes_on_where_deploy_left_the_robots(
     assert now == stand
 
 
+def test_a_later_turn_that_makes_no_plan_leaves_the_files_of_the_one_that_did(
+    planned: Path,
+) -> None:
+    files = {name: (planned / name).read_bytes() for name in ("plan.json", "plan.png")}
+    assert formup("resume", planned, "thanks", "--json") == 3  # asks which arrangement is meant
+    assert {name: (planned / name).read_bytes() for name in files} == files
+    (planned / "plan.png").unlink()
+    formup("resume", planned, "thank you", "--json")
+    assert (planned / "plan.png").exists()
+
+
 def test_deploy_waits_for_whoever_writes_the_session(planned: Path) -> None:
     log = FolderLog(planned / "trace.jsonl")
     with pytest.raises(StorageError, match="being written by another process"):
