@@ -51,9 +51,9 @@ class Folder:
         self._drawn.add(name)
         return name
 
-    def drop_pictures_but(self, name: str | None) -> None:
+    def drop_pictures_but(self, *names: str | None) -> None:
         """Remove the pictures drawn earlier in this run, before a question was answered."""
-        stale = {old for old in self._drawn if old != name}
+        stale = self._drawn - set(names)
         for old in stale:
             (self.path / old).unlink(missing_ok=True)
         self._drawn -= stale
@@ -84,31 +84,31 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
     picture, world, report = run.context.picture, run.world, run.report
     node = world.plans.get(report.plan_id or "")
     title = report.instruction
-    if node is not None and _is_standing(folder, run, node):
-        return files | {"plan": "plan.json", "picture": "plan.png"}
+    standing = node is not None and _is_standing(folder, run, node)
     if node is not None:
+        files["plan"] = "plan.json"
+    if node is not None and not standing:
         data = plan_file(world, node.plan.id, title, picture)
         write_whole(folder.path / "plan.json", data)
-        files["plan"] = "plan.json"
         if animate(folder.path / "deploy.gif", run.context, node.plan, title):
             files["animation"] = "deploy.gif"
     if report.candidates:
         files["picture"] = folder.draw("question.png", _choices(run))
+    elif standing:
+        files["picture"] = "plan.png"
     elif node is not None:
         files["picture"] = folder.draw("plan.png", draw_plan(picture, world, node.plan, title))
     elif world.targets or world.doubted:
         shown = world.with_target(world.doubted) if world.doubted else world
         files["picture"] = folder.draw("found.png", draw_look(picture, shown))
-    folder.drop_pictures_but(files["picture"])
+    folder.drop_pictures_but(files["picture"], "plan.png" if standing else None)
     return files
 
 
 def _is_standing(folder: Folder, run: Run, node: PlanNode) -> bool:
-    """Whether a plan is of an earlier turn, whose files are there already."""
-    names = ("plan.json", "plan.png")
-    earlier = node is run.began.plans.get(node.plan.id) and run.report.arrival is None
-    there = all((folder.path / name).exists() for name in names)
-    return earlier and there and not run.report.candidates
+    """Whether a plan is of an earlier turn, not driven to in this one, and its files are there."""
+    there = all((folder.path / name).exists() for name in ("plan.json", "plan.png"))
+    return there and node is run.began.plans.get(node.plan.id) and run.report.arrival is None
 
 
 def _choices(run: Run) -> Any:

@@ -99,6 +99,23 @@ def test_whatever_write_fails_first(
             assert load_run(folder).report.instruction == "Surround it"
 
 
+def test_a_log_that_broke_off_after_a_move_is_not_gone_on_with(
+    red_box: Picture, propose: Call, disk: Disk, tmp_path: Path
+) -> None:
+    whole = first(red_box, propose, tmp_path / "whole")
+    assert whole.events is not None
+    moving = [event.kind for event in read_events(tmp_path / "whole")].index("moving")
+    disk.room = moving + 1
+    moved = first(red_box, propose, tmp_path / "run")
+    disk.room = None
+    assert moved.report.status == "deployed"
+    before = (tmp_path / "run" / "trace.jsonl").read_bytes()
+    with pytest.raises(StorageError, match="could not be written to its end"):
+        Agent(ScriptedModel([Reply(text="No.")])).say(moved, "And now")
+    assert (tmp_path / "run" / "trace.jsonl").read_bytes() == before
+    load_run(tmp_path / "run")
+
+
 def test_a_later_turn_that_cannot_be_written_moves_nothing(
     red_box: Picture, propose: Call, drives: list[Any], disk: Disk, tmp_path: Path
 ) -> None:
