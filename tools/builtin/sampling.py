@@ -15,11 +15,11 @@ from ..formation.contract import (
     Group,
     SideName,
     Unit,
-    Where,
     default_clearance,
     with_defaults,
 )
 from ..formation.placement.place import place, reference_curve
+from ..formation.shape_spec import Where
 from ..formation.site import Site
 from ..formation.units import in_pixels
 from ..geometry.curves import Frame

@@ -64,7 +64,7 @@ def routes(
 
     Args:
         starts: (n, 2).
-        goals: (n, 2), off the obstacles.
+        goals: (n, 2); one on an obstacle's edge is driven to straight from just off it.
         solid: the obstacles' union.
         radius: of a robot, px.
         frame: the picture.
@@ -79,12 +79,15 @@ def routes(
     ground = _Ground(solid, radius, frame)
     ends = np.concatenate([starts, goals])
     exits = ground.exits(starts, goals, _bodies(idle, ends, radius))
-    bodies = _bodies(idle, np.concatenate([ends, exits]), radius)
-    paths = ground.paths(exits, goals, bodies)
+    entries = ground.exits(goals, goals, _bodies(idle, ends, radius))
+    bodies = _bodies(idle, np.concatenate([ends, exits, entries]), radius)
+    paths = ground.paths(exits, entries, bodies)
     leaving = np.flatnonzero((exits != starts).any(axis=1))
     ways_out = _Ground(Polygon(), radius, frame).paths(starts[leaving], exits[leaving], bodies)
     for i, way_out in zip(leaving, ways_out, strict=True):
         paths[i] = np.concatenate([way_out[:-1], paths[i]])
+    for i in np.flatnonzero((entries != goals).any(axis=1)):
+        paths[i] = np.concatenate([paths[i], goals[i : i + 1]])
     return paths
 
 

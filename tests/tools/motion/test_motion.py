@@ -184,3 +184,12 @@ def test_a_robot_shut_in_by_idle_ones_has_no_way_out() -> None:
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * 30 + (320, 240)
     with pytest.raises(NoRouteError, match="the robots that stay to place"):
         routes(np.array([[320.0, 240]]), np.array([[50.0, 50]]), Polygon(), 8.0, FRAME, idle=ring)
+
+
+def test_a_corner_of_the_obstacle_is_driven_to_without_crossing_it() -> None:
+    solid = shapely.box(100, 100, 200, 160)
+    goals = np.array([(100, 100), (200, 160)], dtype=float)
+    starts = np.array([(300, 260), (10, 10)], dtype=float)
+    for path, goal in zip(routes(starts, goals, solid, 0.0, Frame(400, 300)), goals, strict=True):
+        np.testing.assert_array_equal(path[-1], goal)
+        assert LineString(path).intersection(solid).length < 1e-6

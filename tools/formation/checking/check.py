@@ -20,7 +20,7 @@ from ..contract import CENTRE_SHARE, Contract
 from ..placement import spacing
 from ..placement.caging import escape_proof
 from ..placement.figure import figure_of
-from ..placement.place import Site, reference_curve, side_direction
+from ..placement.place import Site, curve_between, reference_curve, side_direction
 from .cage_verdict import judge
 from .figure_check import on_figure
 from .verdict import TOLERANCE, Audit, Part, Verdict, parts_of
@@ -31,7 +31,9 @@ smallest spacing, at most this multiple of its coverage radius."""
 SAMPLED = 7
 """Of the ground the ideal places cover every so-manieth cell is looked at first."""
 LINE_SHARE = 0.03
-"""How far off a straight line a robot may stand, as a share of the line's length."""
+"""How far off a straight line a robot may stand, as a share of its length in the picture."""
+WHOLE = 0.995
+"""A curve of which the picture leaves this share is not cut."""
 
 
 def certify(positions: ArrayLike, contract: Contract, site: Site) -> Verdict:
@@ -163,7 +165,7 @@ def _check_along(part: Part, audit: Audit) -> None:
     curve = reference_curve(part.group, part.site, part.radius)
     if _nowhere(curve, "that side", audit):
         return
-    if curve.length < 0.995 * curve.whole_length:
+    if curve.length < WHOLE * curve.whole_length:
         _note_cut(curve, "that side", audit)
     if part.group.edges is not None:
         spacing.on_edges(part, part.group.edges, audit)
@@ -204,17 +206,23 @@ def _check_line(part: Part, audit: Audit) -> None:
     if part.group.relation == "shape" and part.group.line is None:
         audit.notes.append("A free shape: bounds, spacing and named targets were checked.")
         return
-    curve = reference_curve(part.group, part.site, part.radius)
+    if part.group.relation == "between":
+        curve = curve_between(part.group, part.site, part.site.frame(part.radius), whole=True)
+    else:
+        curve = reference_curve(part.group, part.site, part.radius)
     if _nowhere(curve, "the line", audit):
         return
-    reach = max(LINE_SHARE * curve.whole_length, 2.0)
+    if curve.length < WHOLE * curve.whole_length:
+        _note_cut(curve, "the line", audit)
+    reach = max(LINE_SHARE * curve.length, 2.0)
     spacing.on_curve(part, curve.geometry(), reach, "the line", audit)
     if part.group.spacing == "even":
         spacing.evenness(part, curve, audit)
 
 
 def _check_corners(part: Part, audit: Audit) -> None:
-    _check_outside(part, audit)
+    if not part.group.on_corners:
+        _check_outside(part, audit)
     spacing.corner_matching(part, audit)
 
 

@@ -35,6 +35,8 @@ MOST_AVOIDED = 20
 REFLEX = 1.5
 """A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
 square root of 2 in a right-angled reflex one."""
+AT_CORNER = 0.5
+"""As near to a corner, px, a robot's centre is on it."""
 ROUNDING = 2e-6
 """A place this much nearer than a clearance, px, is at it: corners are found to half of this."""
 DRAWN_BY_NUMBER = frozenset({"between", "centre"})
@@ -94,7 +96,7 @@ def reference_curve(group: Group, site: Site, radius: float, offset: float | Non
         ends = np.asarray(group.line or (0, 0, 0, 0), dtype=float).reshape(2, 2)
         return segment(ends[0], ends[1], frame)
     if group.relation == "between":
-        return _curve_between(group, site, frame)
+        return curve_between(group, site, frame)
     outline = site.outlines[group.targets[0]]
     offset = nominal(group.offsets()) + radius if offset is None else offset
     if group.relation != "along":
@@ -153,6 +155,8 @@ def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
 
     A rounded outline falls short of its corners; a reflex one is reached along its bisector.
     """
+    if group.on_corners:
+        return np.full(len(corner_points(outline, group.robots)), AT_CORNER)
     short = distances(outline.filled, corner_points(outline, group.robots))
     return REFLEX * group.offsets(radius)[1] + short
 
@@ -291,14 +295,15 @@ def _corner_places(
 ) -> FloatArray:
     """Places at the corners, drawn in from the picture's border, less those without room."""
     outline, box = site.outlines[group.targets[0]], site.frame(radius).box
-    points = at_corners(outline, group.robots, nominal(group.offsets()) + radius)
+    corners = points = corner_points(outline, group.robots)
+    if not group.on_corners:
+        points = at_corners(outline, group.robots, nominal(group.offsets()) + radius)
     if box.is_empty:
         return points[:0]
     x0, y0, x1, y1 = box.bounds
     points = np.clip(points, (x0, y0), (x1, y1))
-    corners = corner_points(outline, group.robots)
     near = np.linalg.norm(points - corners, axis=1) <= corner_reach(group, outline, radius)
-    least = group.offsets(radius)[0] - ROUNDING
+    least = 0.0 if group.on_corners else group.offsets(radius)[0] - ROUNDING
     free = points[near & (distances(outline.filled, points) >= least)]
     free = free[clear(free, group, earlier)]
     if len(free) > group.robots:
@@ -321,8 +326,11 @@ def _fit(curve: Curve, n: int, spacing: float) -> FloatArray:
     return points
 
 
-def _curve_between(group: Group, site: Site, frame: Frame) -> Curve:
-    """The gap between two targets: joined along their centroids, or parted across the middle."""
+def curve_between(group: Group, site: Site, frame: Frame, *, whole: bool = False) -> Curve:
+    """The gap between two targets: joined along their centroids, or parted across the middle.
+
+    Robots that join keep a gap off either target, but where the `whole` way is asked for.
+    """
     first, second = (site.outlines[t] for t in group.targets)
     ends = [shapely.get_coordinates(o.filled.centroid)[0] for o in (first, second)]
     solid = shapely.union(first.filled, second.filled)
@@ -332,7 +340,7 @@ def _curve_between(group: Group, site: Site, frame: Frame) -> Curve:
         raise ToolError("The two targets touch or overlap: nothing lies between them.")
     a, b = shapely.get_coordinates(max(pieces, key=lambda g: g.length))
     if group.layout == "line":
-        inset = (b - a) / (group.robots + 1) * (group.robots > 1)
+        inset = (b - a) / (group.robots + 1) * (group.robots > 1 and not whole)
         return segment(a + inset, b - inset, frame, solid.buffer(frame.margin + TOUCH))
     across = np.array([-(b - a)[1], (b - a)[0]]) / np.linalg.norm(b - a)
     middle = (a + b) / 2

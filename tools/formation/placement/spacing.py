@@ -101,6 +101,12 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
         allowed = np.inf if escape_proof(part.group) else even
     audit.greatest("widest_opening_px", opening.max())
     audit.measures["min_width_px"] = round(part.outline.min_width, 2)
+    if opening.max() > part.outline.min_width:
+        wide, narrow = part.site.length(opening.max()), part.site.length(part.outline.min_width)
+        audit.notes.append(
+            f"The widest opening, {wide}, is wider than {part.group.targets[0]} at its narrowest, "
+            f"{narrow}."
+        )
     encloses = len(points) > 2 and shapely.make_valid(Polygon(points)).contains(
         shapely.Point(part.outline.centre)
     )

@@ -265,3 +265,37 @@ def test_certifying_never_fails_whatever_the_positions(relation: str) -> None:
                 continue
             assert not found.certified
             assert found.findings
+
+
+def test_a_line_is_judged_and_noted_by_its_part_in_the_picture() -> None:
+    site = Site({}, 200, 140)
+    contract = whole(site, relation="shape", robots=4, line=(-3000, 70, 3000, 70))
+    on = np.array([(0, 70), (66, 70), (133, 70), (199, 70)], dtype=float)
+    found = certify(on, contract, site)
+    assert found.certified
+    assert found.notes == (
+        "Only 3% of the line lies inside the picture; the robots spread over that.",
+    )
+    off = certify(on + np.array([0, 65]), contract, site)
+    assert [f.kind for f in off.findings] == ["off_curve"] * 4
+    assert off.findings[0].limit == pytest.approx(0.03 * 199)
+
+
+def test_between_takes_even_places_at_whole_and_at_half_steps() -> None:
+    site = Site({"t1": square(20, 60, 60, 100), "t2": square(260, 60, 300, 100)}, 320, 160)
+    contract = whole(site, relation="between", targets=("t1", "t2"), robots=4)
+    for shares, certified in (
+        ((0.2, 0.4, 0.6, 0.8), True),
+        ((0.125, 0.375, 0.625, 0.875), True),
+        ((0.02, 0.1, 0.18, 0.26), False),
+    ):
+        points = [(60 + 200 * share, 80.0) for share in shares]
+        assert certify(points, contract, site).certified is certified
+
+
+def test_a_ring_of_a_cage_that_lets_the_thing_through_sideways_says_so() -> None:
+    site = Site({"t1": square(100, 95, 300, 105)}, 400, 200)
+    for n, noted in ((8, True), (60, False)):
+        contract = Contract(groups=(Group(relation="cage", targets=("t1",), robots=n),))
+        notes = make_plan(contract, site, "s").verdict.notes
+        assert any("wider than t1" in note for note in notes) is noted

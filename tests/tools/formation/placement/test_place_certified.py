@@ -5,12 +5,14 @@ import math
 import numpy as np
 import pytest
 from formup.tools.errors import InputError, ToolError
+from formup.tools.formation.checking.check import certify
 from formup.tools.formation.contract import Contract, Group, with_defaults
 from formup.tools.formation.placement.place import CapacityError, Site, place
 from formup.tools.formation.plan import make_plan
 from formup.tools.geometry.outline import Outline, make_outline
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from shapely.geometry import MultiPoint
 
 MANY = settings(
@@ -259,3 +261,18 @@ def test_at_corners_an_exact_distance_takes_away_none(
         group = Group(relation="corners", targets=("t1",), robots=n, clearance=(15, 15))
         plan = make_plan(Contract(groups=(group,), robot_radius=radius), site, "s")
         assert plan.verdict.findings == ()
+
+
+@pytest.mark.parametrize("radius", [0.0, 4.0])
+def test_on_the_corners_exactly(radius: float) -> None:
+    outline = make_outline(np.array(BLOCKS["brick"]) * 90 + (320, 240))
+    site = Site({"t1": outline}, WIDTH, HEIGHT)
+    group = Group(relation="corners", targets=("t1",), robots=4, clearance=(0, 0))
+    plan = make_plan(Contract(groups=(group,), robot_radius=radius), site, "s")
+    assert plan.verdict.certified
+    points = plan.formation.points
+    np.testing.assert_allclose(np.sort(points, axis=0), np.sort(outline.corners, axis=0))
+    moved = certify(points + np.array([0.6, 0]), plan.formation.contract, site)
+    assert {f.kind for f in moved.findings} == {"off_corner"}
+    with pytest.raises(ValidationError):
+        Group(relation="around", targets=("t1",), robots=4, clearance=(0, 0))
