@@ -7,7 +7,7 @@ from pydantic import Field, WithJsonSchema, model_validator
 
 from ..errors import InputError
 from ..geometry.figures.letters import letter_strokes
-from ..geometry.figures.shapes import Kind
+from ..geometry.figures.shapes import Kind, Opens
 from ..geometry.figures.typeface import letter_outlines
 from .value import Value
 
@@ -24,7 +24,9 @@ def numbers(count: int) -> WithJsonSchema:
 Pair = Annotated[tuple[Coordinate, Coordinate], numbers(2)]
 Four = Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], numbers(4)]
 Where = Literal["around", "inside", "on", "left", "right", "above", "below"]
-ENCLOSING: frozenset[Kind] = frozenset({"arc", "circle", "polygon", "star"})
+ENCLOSING: frozenset[Kind] = frozenset({"arc", "v", "u", "circle", "polygon", "star"})
+TOWARDS: dict[str, Opens] = {"left": "right", "right": "left", "above": "down", "below": "up"}
+"""Which way is towards the target from beside it."""
 
 
 class ShapeSpec(Value):
@@ -42,13 +44,23 @@ class ShapeSpec(Value):
     angles: Pair | None = Field(
         default=None, description="arc: from, to in degrees, clockwise from the right."
     )
+    opens: Opens | None = Field(
+        default=None, description="v, u, arc (half circle): its mouth; else towards the target."
+    )
     box: Four | None = Field(default=None, description="x0, y0, x1, y1 to fit it into; or where.")
     where: Where | None = Field(default=None, description="By the target.")
 
     @property
     def name(self) -> str:
         """What people call it."""
-        return self.kind.replace("_", " ")
+        return self.kind.upper() if self.kind in ("v", "u") else self.kind.replace("_", " ")
+
+    @property
+    def mouth(self) -> Opens | None:
+        """The side on which a V, a U or a half circle is open; None for other shapes."""
+        if self.kind not in _FIELD_OF["opens"] or self.angles is not None:
+            return None
+        return self.opens or TOWARDS.get(self.where or "", "up")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -68,6 +80,8 @@ class ShapeSpec(Value):
                 yield str(error).rstrip(".")
         if self.kind == "polyline" and self.points is None:
             yield "a polyline takes points"
+        if self.angles is not None and self.opens is not None:
+            yield "an arc takes angles or opens, not both"
         if self.angles is not None and self.angles[0] == self.angles[1]:
             yield f"an arc takes two angles that differ, not {self.angles}"
         if self.points is not None and len(set(self.points)) < 2:
@@ -89,4 +103,5 @@ _FIELD_OF: dict[str, tuple[Kind, ...]] = {
     "rows": ("grid",),
     "corners": ("polygon", "star"),
     "angles": ("arc",),
+    "opens": ("arc", "v", "u"),
 }

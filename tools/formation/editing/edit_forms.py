@@ -50,7 +50,8 @@ def form_after(group: Group, figure: Sketch, there: Affine) -> tuple[Group, bool
     assert shape is not None
     targets = () if group.enters else group.targets
     kept = group.model_copy(update={"targets": targets, "clearance": None})
-    if shape.points is None and (there.upright or shape.kind == "circle"):
+    boxable = shape.points is None and shape.mouth is None
+    if boxable and (there.upright or shape.kind == "circle"):
         return _with_shape(kept, _boxed(shape, figure, there)), False
     if len(figure.lines) == 1 and figure.places is None and shape.kind not in WRITTEN:
         points = tuple((float(x), float(y)) for x, y in there(figure.lines[0]).round(DECIMALS))

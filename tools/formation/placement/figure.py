@@ -16,6 +16,7 @@ from ...geometry.figures.letters import letter_strokes
 from ...geometry.figures.shapes import (
     Sketch,
     arc_sketch,
+    cup_sketch,
     fitted,
     grid_sketch,
     line_sketch,
@@ -31,6 +32,7 @@ from ..contract import Group, ShapeSpec, nominal
 from ..site import CapacityError, Site, most_that_fit
 
 STAR_TIPS, POLYGON_CORNERS = 5, 6
+HALF_CIRCLE = {"up": (0, 180), "right": (90, 270), "down": (180, 360), "left": (-90, 90)}
 BESIDE = {"left": (-1, 0), "right": (1, 0), "above": (0, -1), "below": (0, 1)}
 ROOMY = 1.02
 """A shape too small for the spacing is enlarged by so much more than it takes."""
@@ -105,7 +107,9 @@ def _sketch(group: Group, shape: ShapeSpec) -> Sketch:
     rows = shape.rows or _rows(n, box)
     made: dict[str, Callable[[], Sketch]] = {
         "line": lambda: line_sketch(upright),
-        "arc": lambda: arc_sketch(*(shape.angles or (0.0, 180.0))),
+        "arc": lambda: arc_sketch(*(shape.angles or HALF_CIRCLE[shape.mouth or "up"])),
+        "v": lambda: cup_sketch("v", shape.mouth or "up"),
+        "u": lambda: cup_sketch("u", shape.mouth or "up"),
         "circle": arc_sketch,
         "grid": lambda: grid_sketch(n, min(rows, n)),
         "polygon": lambda: polygon_sketch(shape.corners or POLYGON_CORNERS),
@@ -113,6 +117,8 @@ def _sketch(group: Group, shape: ShapeSpec) -> Sketch:
         "letters": lambda: polyline_sketch(*letter_strokes(shape.text or "")),
         "outlined_letters": lambda: polyline_sketch(*letter_outlines(shape.text or "")),
     }
+    if shape.kind == "arc" and shape.mouth is not None and shape.where != "around":
+        return cup_sketch("arc", shape.mouth)  # placed by what is drawn, not by the whole circle
     return made[shape.kind]()
 
 
@@ -136,7 +142,7 @@ def _figure_placed(
         return _figure_inside(sketch, group, site, group.offsets(radius)[0])
     gap = nominal(group.offsets()) + radius
     if shape.where == "around":
-        return _figure_around(sketch, outline, gap)
+        return _figure_around(sketch, outline, gap, round_about=shape.kind == "arc")
     return _figure_beside(sketch, group, site, shape.where, gap, radius)
 
 
@@ -158,15 +164,15 @@ def _figure_inside(sketch: Sketch, group: Group, site: Site, margin: float) -> S
     raise ToolError(f"It has no room inside the target, {site.length(margin)} from its edge.")
 
 
-def _figure_around(sketch: Sketch, outline: Outline, gap: float) -> Sketch:
-    """As small as it holds the outline and keeps off it."""
+def _figure_around(sketch: Sketch, outline: Outline, gap: float, *, round_about: bool) -> Sketch:
+    """As small as it holds the outline and keeps off it; an arc as the whole circle holds it."""
     circle = shapely.minimum_bounding_circle(outline.filled)
     centre = (float(circle.centroid.x), float(circle.centroid.y))
 
     def holds(scale: float) -> bool:
         placed = sketch.at(centre, scale)
         line = LineString(placed.lines[0])
-        whole = Polygon(line) if line.is_closed else Point(centre).buffer(placed.size[0] / 2)
+        whole = Point(centre).buffer(placed.size[0] / 2) if round_about else Polygon(line)
         return whole.contains(outline.filled) and line.distance(outline.filled) >= gap
 
     low, high = 0.0, 1.0

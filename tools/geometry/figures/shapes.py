@@ -15,11 +15,24 @@ from ..outline import FloatArray
 from .letters import arc
 
 Kind = Literal[
-    "line", "arc", "circle", "grid", "polygon", "star", "letters", "outlined_letters", "polyline"
+    "line",
+    "arc",
+    "v",
+    "u",
+    "circle",
+    "grid",
+    "polygon",
+    "star",
+    "letters",
+    "outlined_letters",
+    "polyline",
 ]
+Opens = Literal["left", "right", "up", "down"]
 Box = tuple[float, float, float, float]
 WAIST = 0.5
 """Inner radius of a star by its outer: one of 5 points is a little fuller than a pentagram."""
+V_HALF_WIDTH, U_LEG = 0.75, 1.2
+"""Half the width of a V by its height; the legs of a U by its half width, above its half circle."""
 CIRCLE_STEP = 3.0
 """Degrees between the points of a circle."""
 
@@ -106,6 +119,19 @@ def arc_sketch(begin: float = 0.0, end: float = 360.0) -> Sketch:
     if round_about:
         line[-1] = line[0]
     return Sketch((line,), (-1.0, -1.0, 1.0, 1.0))
+
+
+def cup_sketch(kind: Literal["v", "u", "arc"], opens: Opens) -> Sketch:
+    """A V, a U or a half circle whose mouth is on a side."""
+    bow = arc((0.0, 0.0), (1.0, 1.0), 0.0, 180.0, CIRCLE_STEP)
+    upright = {
+        "v": np.array([(V_HALF_WIDTH, 0.0), (0.0, 1.0), (-V_HALF_WIDTH, 0.0)]),
+        "u": np.concatenate([[(1.0, -U_LEG)], bow, [(-1.0, -U_LEG)]]),
+        "arc": bow,
+    }[kind]
+    across = {"up": (1, 0), "right": (0, 1), "down": (-1, 0), "left": (0, -1)}[opens]
+    turn = np.array([across, (-across[1], across[0])], dtype=float)
+    return polyline_sketch(upright @ turn)
 
 
 def polygon_sketch(corners: int) -> Sketch:

@@ -42,6 +42,8 @@ FORMS: dict[str, dict[str, Any]] = {
     "wide grid": {"kind": "grid", "rows": 4, "box": BOX},
     "arc": {"kind": "arc", "angles": (180, 300), "box": BOX},
     "circle": {"kind": "circle", "where": "on"},
+    "v": {"kind": "v", "where": "around"},
+    "half circle": {"kind": "arc", "where": "left"},
     "line": {"kind": "line", "where": "below"},
     "polyline": {"kind": "polyline", "points": ((120, 150), (200, 90), (300, 260))},
     "hook": {"kind": "polyline", "points": ((0, 0), (1, 1), (2, 0)), "where": "above"},

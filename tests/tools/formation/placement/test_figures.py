@@ -34,6 +34,14 @@ FORMS: list[dict[str, Any]] = [
     {"kind": "circle", "box": BOX},
     {"kind": "arc", "box": BOX, "angles": (180, 360)},
     {"kind": "arc", "where": "around", "angles": (-60, 200)},
+    {"kind": "arc", "where": "around", "opens": "right"},
+    {"kind": "arc", "where": "below"},
+    {"kind": "v", "where": "around"},
+    {"kind": "v", "where": "left"},
+    {"kind": "v", "box": BOX, "opens": "down"},
+    {"kind": "u", "where": "around", "opens": "left"},
+    {"kind": "u", "where": "inside"},
+    {"kind": "u", "where": "above"},
     {"kind": "grid", "box": BOX},
     {"kind": "grid", "where": "right", "rows": 4},
     {"kind": "grid", "where": "inside"},
@@ -249,3 +257,39 @@ def test_an_exact_distance_holds_where_the_picture_cuts_the_ring(
     assert plan.verdict.certified
     off = shapely.distance(edge.filled, shapely.points(plan.formation.points)) - radius
     assert off == pytest.approx(clearance[0], abs=0.3)
+
+
+@pytest.mark.parametrize("kind", ["v", "u", "arc"])
+@pytest.mark.parametrize(
+    ("opens", "axis", "sign"), [("left", 0, -1), ("right", 0, 1), ("up", 1, -1), ("down", 1, 1)]
+)
+def test_a_mouth_is_on_the_side_named_and_the_thing_within(
+    kind: str, opens: str, axis: int, sign: int
+) -> None:
+    plan = drawn(9, {"kind": kind, "where": "around", "opens": opens})
+    assert plan.verdict.certified
+    points = plan.formation.points - (300, 230)
+    assert len(np.unique(np.sign(points[np.abs(points[:, 1 - axis]) > 1, 1 - axis]))) == 2
+    inner = points[np.abs(points[:, 1 - axis]) < 30, axis]
+    assert len(inner) and (inner * sign < -50).all()  # nobody stands before the mouth
+
+
+@pytest.mark.parametrize("kind", ["v", "u", "arc"])
+@pytest.mark.parametrize("where", ["left", "right", "above", "below"])
+def test_beside_a_target_a_mouth_is_towards_it(kind: str, where: str) -> None:
+    shape = ShapeSpec.model_validate({"kind": kind, "where": where})
+    explicit = {"left": "right", "right": "left", "above": "down", "below": "up"}[where]
+    first, second = (
+        drawn(7, {"kind": kind, "where": where} | more) for more in ({}, {"opens": explicit})
+    )
+    assert shape.mouth == explicit
+    assert first.verdict.certified
+    assert first.formation.positions == second.formation.positions
+
+
+@pytest.mark.parametrize(
+    "shape", [{"kind": "star", "opens": "up"}, {"kind": "arc", "opens": "up", "angles": (0, 90)}]
+)
+def test_what_has_no_mouth_of_its_own_is_refused(shape: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        ShapeSpec.model_validate(shape | {"where": "around"})
