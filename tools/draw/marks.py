@@ -13,8 +13,9 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import ToolError
 from ..formation.checking.verdict import Part, parts_of
-from ..formation.contract import CENTRE_SHARE, OUTSIDE, Contract
+from ..formation.contract import CENTRE_SHARE, MAX_LENGTH, OUTSIDE, Contract
 from ..formation.placement.place import Site, reference_curve
+from ..formation.placement.ring_parts import sides_of
 from ..geometry.curves import Curve
 from ..geometry.outline import FloatArray, Outline, distances
 from ..geometry.sampling import corner_points, nearest
@@ -217,13 +218,15 @@ def _allowed_area(part: Part) -> BaseGeometry | None:
         return Point(outline.centre).buffer(CENTRE_SHARE * outline.size)
     if group.relation == "inside":
         return part.outline.polygon.buffer(-(part.clearance[0] + radius))
-    if group.relation not in ("around", "cage", "along"):
+    if group.relation not in ("around", "cage", "along") or part.clearance[1] >= MAX_LENGTH:
         return None
     least, greatest = (limit + radius for limit in part.clearance)
     solid = part.outline.filled
     # What lies far outside the picture is never seen, and costs time to make.
     reach = min(greatest, part.site.width + part.site.height)
     ring = solid.buffer(reach).difference(solid.buffer(least))
+    if group.sides is not None:
+        return ring.intersection(sides_of(group, part.site))
     curve = _curve_of(part) if group.relation == "along" else None
     if curve is None:
         return ring
@@ -266,7 +269,7 @@ def _widest_opening(part: Part) -> Opening | None:
     stations = _feet_on_curve(part.points, curve)
     order = np.argsort(stations, kind="stable")
     points, after = part.points[order], np.roll(part.points[order], -1, axis=0)
-    if part.group.relation == "cage":
+    if part.group.relation == "cage" or part.group.opens:
         across = np.linalg.norm(after - points, axis=1)
         k = int(np.argmax(across))
         return Opening((points[k] + after[k]) / 2, max(float(across[k]) - 2 * part.radius, 0.0))

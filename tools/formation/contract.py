@@ -22,16 +22,25 @@ MIN_SPACING = 2.0
 CLEARANCE_SHARE, MIN_CLEARANCE = 0.16, 6.0
 """Default clearance: this share of the target's size (square root of its area), at least 6 px."""
 CORNER_SHARE, MIN_STANDOFF = 0.06, 3.0
+LEAST_SOLVED = 1.0
+"""Least clearance of a ring whose own follows from a radius or from how far apart robots stand."""
 INSIDE_SHARE = 0.05
 CENTRE_SHARE = 0.2
+PITCH_SHARE, PITCH_PX = 0.01, 0.5
+"""Neighbours an exact distance apart may differ from it by this share, at least half a pixel."""
 
 Relation = Literal["around", "cage", "corners", "along", "inside", "between", "centre", "shape"]
 Unit = Literal["px", "m"]
 SideName = Literal["left", "right", "top", "bottom", "long", "short"]
+RingPart = Literal[
+    "left", "right", "top", "bottom", "left half", "right half", "top half", "bottom half"
+]
 Fit = Literal["tight", "normal", "wide"]
 FIT_FACTOR = {"tight": 0.5, "normal": 1.0, "wide": 2.0}
 MAX_LENGTH = 100_000.0
+DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
 Length = Annotated[float, Field(ge=0, le=MAX_LENGTH, allow_inf_nan=False)]
+Angle = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
 OUTSIDE: frozenset[str] = frozenset({"around", "cage", "corners", "along"})
 
 
@@ -66,7 +75,26 @@ class Group(Value):
         default=None, description="Least distance of two robots' centres, px; if named."
     )
     max_gap: Length | None = Field(
-        default=None, description="cage: widest opening between neighbours' edges, px; if named."
+        default=None,
+        description="cage, around, along: widest gap between neighbours' edges, px; if named.",
+    )
+    pitch: Length | None = Field(
+        default=None,
+        gt=0,
+        description="around, along, shape: exact distance of neighbours' centres, px; if named.",
+    )
+    radius: Length | None = Field(
+        default=None, gt=0, description="around: of the circle robots stand on, px; if named."
+    )
+    sides: tuple[RingPart, ...] | None = Field(
+        default=None, min_length=1, description="around: only there, nobody elsewhere."
+    )
+    opening: Length | None = Field(
+        default=None, description="around: least width of a gap to leave, px; 0: none was named."
+    )
+    opening_towards: str | Angle | None = Field(
+        default=None,
+        description="around: left, right, top, bottom, a target id, or degrees as of an arc.",
     )
     side: SideName | None = Field(
         default=None,
@@ -118,6 +146,17 @@ class Group(Value):
         return within or self.relation in ("inside", "centre")
 
     @property
+    def opens(self) -> bool:
+        """Whether an opening is to be left in its ring."""
+        return self.opening is not None or self.opening_towards is not None
+
+    @property
+    def solves_clearance(self) -> bool:
+        """Whether the distance from the target follows from that of the robots on the ring."""
+        whole = self.radius is None and self.sides is None and not self.opens
+        return self.relation == "around" and self.pitch is not None and self.robots > 1 and whole
+
+    @property
     def on_corners(self) -> bool:
         """Whether its robots' centres are to be exactly at the corners."""
         return self.relation == "corners" and self.clearance == (0, 0)
@@ -143,6 +182,15 @@ class Group(Value):
             yield "along takes either a side or edges, or facing: one of them"
         if self.shape is not None and self.shape.where is not None and len(self.targets) != 1:
             yield f"a shape {self.shape.where} a target takes 1 target, got {len(self.targets)}"
+        if self.opens and self.robots < 2:
+            yield "an opening takes 2 or more robots"
+        if self.opens and self.sides is not None:
+            yield "a ring takes an opening or sides, not both"
+        free = self.spacing == "free" or (
+            self.relation == "shape" and not (self.shape or self.line)
+        )
+        if self.pitch is not None and free:
+            yield "what is freely spaced has no pitch"
         if self.relation == "cage" and self.robots < 3:
             yield f"a cage takes 3 or more robots, got {self.robots}"
         if (
@@ -164,19 +212,24 @@ class Group(Value):
         if self.walls and self.closure != "escape-proof":
             yield "walls belong to the closure escape-proof"
         for name, only in _ONLY_IN.items():
-            if getattr(self, name) is not None and self.relation != only:
-                yield f"{name} belongs to {only}, not to {self.relation}"
+            if getattr(self, name) is not None and self.relation not in only:
+                yield f"{name} belongs to {' or '.join(only)}, not to {self.relation}"
 
 
 _ONLY_IN = {
-    "side": "along",
-    "edges": "along",
-    "max_gap": "cage",
-    "closure": "cage",
-    "walls": "cage",
-    "line": "shape",
-    "facing": "along",
-    "shape": "shape",
+    "side": ("along",),
+    "edges": ("along",),
+    "max_gap": ("cage", "around", "along"),
+    "pitch": ("around", "along", "shape"),
+    "radius": ("around",),
+    "sides": ("around",),
+    "opening": ("around",),
+    "opening_towards": ("around",),
+    "closure": ("cage",),
+    "walls": ("cage",),
+    "line": ("shape",),
+    "facing": ("along",),
+    "shape": ("shape",),
 }
 
 
@@ -210,6 +263,8 @@ class Contract(Value):
         """Every target named, once, in order."""
         named = [t for group in self.groups for t in group.targets] + list(self.keep_out)
         faced = [group.facing for group in self.groups if group.facing is not None]
+        towards = [group.opening_towards for group in self.groups]
+        faced += [t for t in towards if isinstance(t, str) and t not in DIRECTIONS]
         return tuple(dict.fromkeys(named + faced))
 
     @property
@@ -261,13 +316,29 @@ def _defaults(
 ) -> dict[str, object]:
     update: dict[str, object] = {}
     if group.min_spacing is None or group.min_spacing < contract.spacing_floor:
-        update["min_spacing"] = contract.spacing_floor
+        update["min_spacing"] = max(contract.spacing_floor, _least_pitch(group))
     if group.relation == "cage" and group.closure is None:
         update["closure"] = "ring"
-    if group.clearance is None and group.targets:
+    if group.opens:
+        update["opening"] = group.opening or 0.0
+        update["opening_towards"] = (
+            "bottom" if group.opening_towards is None else group.opening_towards
+        )
+    if group.clearance is None and (group.radius is not None or group.solves_clearance):
+        update["clearance"] = (LEAST_SOLVED, MAX_LENGTH)
+    elif group.clearance is None and group.targets:
         outline = outlines[group.targets[0]]
         update["clearance"] = _default_range(group, outline, room, contract.robot_radius)
     return update
+
+
+def _least_pitch(group: Group) -> float:
+    return 0.0 if group.pitch is None else group.pitch - pitch_slack(group.pitch)
+
+
+def pitch_slack(pitch: float) -> float:
+    """By how much neighbours at an exact distance may be nearer or further, px."""
+    return max(PITCH_SHARE * pitch, PITCH_PX)
 
 
 def _default_range(

@@ -17,6 +17,8 @@ FINEST, COARSEST = 1e-6, 1e3
 NO_SCALE = "this picture has no scale (metres per pixel)"
 DECIMALS_PX, STATED_PX = 2, 6
 """Decimals of pixels: those that metres beside them tell apart, those kept of a contract's."""
+LENGTHS = ("min_spacing", "max_gap", "pitch", "radius", "opening")
+"""Fields of a group that are one length."""
 
 
 def check_scale(metres_per_pixel: float | None) -> None:
@@ -69,7 +71,7 @@ def contract_in_pixels(contract: Contract, metres_per_pixel: float | None) -> Co
         return in_pixels(length, contract.unit, metres_per_pixel) if length else length
 
     def group_in_px(group: Group) -> Group:
-        given = {name: getattr(group, name) for name in ("min_spacing", "max_gap")}
+        given = {name: getattr(group, name) for name in LENGTHS}
         update: dict[str, Any] = {k: px(v) for k, v in given.items() if v is not None}
         if group.clearance is not None:
             update["clearance"] = tuple(map(px, group.clearance))

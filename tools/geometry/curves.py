@@ -5,7 +5,7 @@ clearance asked for. Frame: image pixels, x right, y down.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -35,6 +35,7 @@ QUAD_SEGMENTS = 24
 ROUND_JOIN_DIP = round_join_dip(QUAD_SEGMENTS)
 FACING = math.radians(50)
 """How far a curve's outward normal may turn from a side's direction and still be that side."""
+CIRCLE_STEPS = 720
 SIDE_STEP = 400
 """Samples along a curve when a part of it is cut out by a condition."""
 LEAP = 0.02
@@ -49,11 +50,13 @@ class Curve:
         lines: each (n, 2), image pixels; a loop repeats its first point.
         closed: whether robots go all the way round.
         whole_length: length the curve would have had with nothing cut off by the picture, px.
+        parted: whether it is open on purpose, so that no cut of it counts as a gap.
     """
 
     lines: tuple[FloatArray, ...]
     closed: bool
     whole_length: float
+    parted: bool = False
 
     @property
     def length(self) -> float:
@@ -66,7 +69,7 @@ class Curve:
         None when the curve is no such loop, or the cut is wider than the gap n robots would
         leave: then they go to the ends instead.
         """
-        if self.closed or len(self.lines) != 1:
+        if self.closed or self.parted or len(self.lines) != 1:
             return None
         across = float(np.linalg.norm(self.lines[0][0] - self.lines[0][-1]))
         return across if across < (self.length + across) / n else None
@@ -131,6 +134,22 @@ def ring(
     lines = _polylines(shapely.union(inside.difference(border), run))
     is_loop = len(lines) == 1 and bool(np.allclose(lines[0][0], lines[0][-1]))
     return Curve(lines, is_loop, float(whole.length))
+
+
+def circle(centre: FloatArray, radius: float, frame: Frame | None = None) -> Curve:
+    """A circle about a centre, (2,), px; parts outside the frame are cut off."""
+    turn: FloatArray = np.linspace(0, 2 * math.pi, CIRCLE_STEPS + 1)
+    loop = centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    loop[-1] = loop[0]
+    return _clip([loop], frame)
+
+
+def part_of(curve: Curve, region: BaseGeometry, whole_length: float | None = None) -> Curve:
+    """The part of a curve in a region; its whole length is its own where none is given."""
+    lines = _polylines(curve.geometry().intersection(region))
+    closed = len(lines) == 1 and bool(np.allclose(lines[0][0], lines[0][-1]))
+    part = Curve(lines, closed, 0.0, parted=True)
+    return replace(part, whole_length=part.length if whole_length is None else whole_length)
 
 
 def side(

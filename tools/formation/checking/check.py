@@ -16,11 +16,12 @@ from ...geometry.interior import coverage_radius, yardstick
 from ...geometry.lloyd import cells_of
 from ...geometry.outline import FARTHEST, FloatArray, Outline, distances
 from ...geometry.sampling import min_spacing, nearest
-from ..contract import CENTRE_SHARE, Contract
+from ..contract import CENTRE_SHARE, PITCH_PX, Contract
 from ..placement import spacing
 from ..placement.caging import escape_proof
 from ..placement.figure import figure_of
 from ..placement.place import Site, curve_between, reference_curve, side_direction
+from . import gaps
 from .cage_verdict import judge
 from .figure_check import on_figure
 from .verdict import TOLERANCE, Audit, Part, Verdict, parts_of
@@ -134,13 +135,17 @@ def _check_around(part: Part, audit: Audit) -> None:
     curve = reference_curve(part.group, part.site, part.radius)
     if _nowhere(curve, "the ring", audit):
         return
-    if not curve.closed:
+    if not curve.closed and not (curve.parted and curve.length >= WHOLE * curve.whole_length):
         audit.least("ring_in_picture", _note_cut(curve, "the ring", audit))
     if part.group.relation == "cage":
         spacing.enclosure(part, curve, audit)
         judge(part, curve, audit)
-    if part.group.spacing == "even" and not escape_proof(part.group):
-        spacing.evenness(part, curve, audit)
+    if part.group.radius is not None:
+        name = f"the circle of radius {part.site.length(part.group.radius)}"
+        spacing.on_curve(part, curve.geometry(), PITCH_PX, name, audit)
+    if part.group.sides is not None:
+        gaps.on_sides(part, audit)
+    _check_gaps(part, curve, audit)
 
 
 def _nowhere(curve: Curve, name: str, audit: Audit) -> bool:
@@ -172,8 +177,20 @@ def _check_along(part: Part, audit: Audit) -> None:
     else:
         direction = side_direction(part.group, part.outline, part.site)
         spacing.on_side(part, curve, direction, audit)
-    if part.group.spacing == "even":
+    _check_gaps(part, curve, audit)
+
+
+def _check_gaps(part: Part, curve: Curve, audit: Audit) -> None:
+    """How far neighbours on a curve are from each other, as the contract has it."""
+    group = part.group
+    if group.opens:
+        gaps.opening_left(part, curve, audit)
+    elif group.pitch is None and group.spacing == "even" and not escape_proof(group):
         spacing.evenness(part, curve, audit)
+    if group.pitch is not None:
+        gaps.pitch_kept(part, curve, audit)
+    if group.max_gap is not None and group.relation != "cage":
+        gaps.no_wider(part, curve, audit)
 
 
 def _check_shape(part: Part, audit: Audit) -> None:
@@ -192,6 +209,8 @@ def _check_shape(part: Part, audit: Audit) -> None:
         for i in np.flatnonzero(clearance < least - TOLERANCE):
             audit.find("too_near", clearance[i], least, robot=part.first + i, about=name)
     on_figure(part, figure_of(part.group, shape, part.site, part.radius), audit)
+    if part.group.pitch is not None:
+        gaps.pitch_nearest(part, audit)
 
 
 def _check_off_targets(part: Part, audit: Audit) -> None:
@@ -216,8 +235,7 @@ def _check_line(part: Part, audit: Audit) -> None:
         _note_cut(curve, "the line", audit)
     reach = max(LINE_SHARE * curve.length, 2.0)
     spacing.on_curve(part, curve.geometry(), reach, "the line", audit)
-    if part.group.spacing == "even":
-        spacing.evenness(part, curve, audit)
+    _check_gaps(part, curve, audit)
 
 
 def _check_corners(part: Part, audit: Audit) -> None:

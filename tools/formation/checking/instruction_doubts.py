@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from ..contract import Contract, Relation
 from ..named_lengths import LENGTH, NUMBERS, named_lengths
-from ..units import length_text
+from ..units import LENGTHS, length_text
 
 NEGATION = re.compile(r"(?:\b(?:not|no|never|without|except|instead of)|n't)(?:\W+\w+){0,3}\W*\Z")
 PLAIN: tuple[tuple[str, str, frozenset[Relation]], ...] = (
@@ -74,7 +74,7 @@ def _length_doubts(text: str, contract: Contract, scale: float) -> Iterator[str]
     stated = [
         length
         for g in contract.groups
-        for length in (*(g.clearance or ()), g.min_spacing, g.max_gap)
+        for length in (*(g.clearance or ()), *(getattr(g, name) for name in LENGTHS))
         if length is not None
     ]
     stated += [sum(g.clearance) / 2 for g in contract.groups if g.clearance is not None]
@@ -82,7 +82,8 @@ def _length_doubts(text: str, contract: Contract, scale: float) -> Iterator[str]
         px = named.px(scale)
         if named.of in ("across", "radius"):
             wanted = px / 2 if named.of == "across" else px
-            if not _is_near(wanted, [contract.robot_radius]):
+            rings = [g.radius for g in contract.groups if g.radius is not None]
+            if not _is_near(wanted, [contract.robot_radius, *rings]):
                 has = length_text(contract.robot_radius, scale)
                 yield f"the instruction says {named.wording} {named.of}, but robot_radius is {has}"
         elif named.of != "something" and not drawn and not _is_near(px, stated):

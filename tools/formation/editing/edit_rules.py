@@ -96,8 +96,8 @@ def skipped(part: Part, stay: FloatArray) -> Part:
         ends = tuple(round(float(v), DECIMALS) for v in line)
         return part.to(stay, spacing=spacing, relation="shape", line=ends, layout="line")
     if part.group.shape is not None and part.group.shape.kind == "grid":
-        return part.to(stay, spacing=spacing, shape=None, clearance=None)
-    return part.to(stay, spacing=spacing)
+        return part.to(stay, spacing=spacing, shape=None, clearance=None, pitch=None)
+    return part.to(stay, spacing=spacing, pitch=None)
 
 
 def closed_up(part: Part, stay: FloatArray) -> Part:
@@ -111,7 +111,8 @@ def closed_up(part: Part, stay: FloatArray) -> Part:
 def _slots(part: Part, count: int) -> tuple[FloatArray, IntArray]:
     """Places for `count` robots, and which of them those that are there take."""
     drawn = part.group.shape is not None
-    if not drawn and part.group.relation not in ("corners", "inside", "centre"):
+    exact = part.group.pitch is not None
+    if not drawn and not exact and part.group.relation not in ("corners", "inside", "centre"):
         here = part.track(count)
         _check_room(part, here)
         return respaced(here, part.points, count)
@@ -160,7 +161,15 @@ def _offset(part: Part, edit: Offset) -> Part:
     least, greatest = (round(max(bound + by, 0.0), DECIMALS) for bound in group.clearance)
     if group.clearance[1] >= UNLIMITED:
         greatest = UNLIMITED
+    if group.radius is not None:
+        return _resized(part, (group.radius + by) / group.radius, (least, greatest))
     return part.to(_beyond(part, here, by, (least, greatest)), clearance=(least, greatest))
+
+
+def _resized(part: Part, factor: float, clearance: tuple[float, float]) -> Part:
+    """A circle of another radius about the same centre."""
+    points, radius = part.centre + (part.points - part.centre) * factor, part.group.radius or 0.0
+    return part.to(points, radius=round(radius * factor, DECIMALS), clearance=clearance)
 
 
 def _by(edit: Offset, clearance: float, inward: bool) -> float:
@@ -231,6 +240,8 @@ def _scaled(part: Part, edit: Scale) -> Part:
     old, new = (_edges_off(p) for p in (part, there))
     if min(old.min(), new.min()) <= 0:
         return there  # on the outline: the verdict says so
+    if group.radius is not None:
+        return there.to(there.points, radius=round(group.radius * edit.factor, DECIMALS))
     least, greatest = group.clearance
     least = round(least * float(new.min() / old.min()), DECIMALS)
     if greatest < UNLIMITED:
@@ -281,7 +292,8 @@ def _to_side(part: Part, edit: SideOnly) -> Part:
             f"Only robots outside a target can keep to one side of it; these are {group.relation}."
         )
     other = {"relation": "along", "side": edit.side, "edges": None, "facing": None}
-    along = group.model_copy(update={**other, "max_gap": None, "closure": None, "walls": None})
+    ring = ("closure", "walls", "radius", "sides", "opening", "opening_towards", "pitch")
+    along = group.model_copy(update={**other, "max_gap": None, **dict.fromkeys(ring)})
     outline = part.site.outlines[group.targets[0]]
     offset = float(distances(outline.filled, part.points).min())
     if offset <= 0:

@@ -155,7 +155,7 @@ def _figure_inside(sketch: Sketch, group: Group, site: Site, margin: float) -> S
     most = math.hypot(x1 - x0, y1 - y0) / (max(width, height) or 1.0)
     middle = outline.filled.centroid
     centres = (outline.centre, (middle.x, middle.y), ((x0 + x1) / 2, (y0 + y1) / 2))
-    for scale in most * SHRINKS:
+    for scale in most * SHRINKS if group.pitch is None else (_pitch_scale(sketch, group),):
         for centre in centres:
             placed = sketch.at(centre, float(scale))
             lines = [LineString(line) for line in placed.lines]
@@ -186,6 +186,12 @@ def _figure_around(sketch: Sketch, outline: Outline, gap: float, *, round_about:
     return sketch.at(centre, high)
 
 
+def _pitch_scale(sketch: Sketch, group: Group) -> float:
+    """The scale at which robots on a shape stand their pitch apart."""
+    apart = min_spacing(robots_on(sketch, group.robots))
+    return (group.pitch or 0.0) / apart if 0 < apart < math.inf else 1.0
+
+
 def _figure_beside(
     sketch: Sketch, group: Group, site: Site, where: str, gap: float, radius: float
 ) -> Sketch:
@@ -207,7 +213,9 @@ def _figure_beside(
     extent = (y1 - y0) / height if dx and height else (x1 - x0) / width if dy and width else most
     scale = min(extent, most) if width or height else 1.0
     apart = min_spacing(robots_on(sketch, group.robots)) * scale
-    if apart < (group.min_spacing or 0.0):
+    if group.pitch is not None:
+        scale = min(most, _pitch_scale(sketch, group))  # where it is less the checker finds it
+    elif apart < (group.min_spacing or 0.0):
         scale = min(most, ROOMY * scale * (group.min_spacing or 0.0) / max(apart, 1e-9))
     half_x, half_y = scale * width / 2, scale * height / 2
     x, y = (x0 + x1) / 2, (y0 + y1) / 2

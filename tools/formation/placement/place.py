@@ -11,7 +11,7 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, Polygon
 
 from ...errors import ToolError
-from ...geometry.curves import Curve, Frame, edge_curve, ring, segment, side
+from ...geometry.curves import Curve, Frame, edge_curve, segment, side
 from ...geometry.interior import inside
 from ...geometry.outline import FloatArray, Outline, distances
 from ...geometry.sampling import (
@@ -22,11 +22,13 @@ from ...geometry.sampling import (
     min_spacing,
     spread_subset,
 )
-from ..contract import CENTRE_SHARE, OUTSIDE, Contract, Group, nominal
+from ..contract import CENTRE_SHARE, DIRECTIONS, OUTSIDE, Contract, Group, nominal
 from ..site import CapacityError, Site, most_that_fit
 from .caging import caged_places, escape_proof
 from .figure import figure_of, place_figure
 from .group_conflicts import CrowdedError, Stand, clear, conflict, slid, without
+from .pitch import pitch_offset, pitch_places
+from .ring_parts import ring_of
 
 TOUCH = 1.0
 """Robots between two targets keep this far off them, px."""
@@ -41,7 +43,6 @@ ROUNDING = 2e-6
 """A place this much nearer than a clearance, px, is at it: corners are found to half of this."""
 DRAWN_BY_NUMBER = frozenset({"between", "centre"})
 """Where the places depend on how many there are, so that some of them are none for fewer."""
-DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
 
 
 Sound = Callable[[Group, FloatArray], bool]
@@ -98,10 +99,11 @@ def reference_curve(group: Group, site: Site, radius: float, offset: float | Non
     if group.relation == "between":
         return curve_between(group, site, frame)
     outline = site.outlines[group.targets[0]]
+    if offset is None and group.solves_clearance:
+        offset = pitch_offset(group, site, radius)
     offset = nominal(group.offsets()) + radius if offset is None else offset
     if group.relation != "along":
-        least, greatest = group.offsets(radius)
-        return ring(outline, offset, max(greatest, offset), frame, keep=min(least, offset))
+        return ring_of(group, site, radius, offset)
     if group.edges is not None:
         last = len(outline.edges) - 1
         if max(group.edges) > last:
@@ -212,7 +214,7 @@ def _otherwise(
 
 def _offsets(group: Group, radius: float) -> tuple[float | None, ...]:
     """Distances from the outline that a curve may have, the one aimed at first, px."""
-    if group.clearance is None or group.relation not in OUTSIDE:
+    if group.clearance is None or group.relation not in OUTSIDE or group.radius is not None:
         return (None,)
     least, greatest = group.clearance
     aim = nominal(group.clearance)
@@ -246,11 +248,13 @@ def _as_many_as_fit(group: Group, site: Site, radius: float) -> tuple[FloatArray
     curve = reference_curve(group, site, radius)
     if escape_proof(group):
         return caged_places(group, site, radius, curve), ""
-    spacing = group.min_spacing or 0.0
+    spacing = group.pitch or group.min_spacing or 0.0
     left, apart = site.length(curve.length, ".0f"), site.length(spacing, "g")
     why = f"the {left} that are left to stand on allow no more at {apart}"
     if group.relation == "cage" and not curve.closed:
         why += ", and the picture's border cuts the ring open"
+    if group.pitch is not None:
+        return pitch_places(group, curve, site), why
     return _fit(curve, group.robots, spacing), why
 
 

@@ -113,13 +113,13 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
     if not encloses and not escape_proof(part.group):
         about = part.group.targets[0]
         audit.find("not_enclosed", len(points), 3, about=about, unit="robots")
-    kind, needed = "opening" if curve.closed else "opening_at_border", _enough(part, curve)
+    kind, needed = "opening" if curve.closed else "opening_at_border", enough(part, curve)
     for k in np.flatnonzero(opening > allowed + TOLERANCE):
         robot, other = part.first + order[k], part.first + order[(k + 1) % len(order)]
         audit.find(kind, opening[k], allowed, robot=robot, others=(other,), needed=needed)
 
 
-def _enough(part: Part, curve: Curve) -> int | None:
+def enough(part: Part, curve: Curve) -> int | None:
     """How many robots make openings as narrow as a contract names, where more are what it takes."""
     widest = part.group.max_gap
     if not widest or not curve.closed:
