@@ -74,6 +74,7 @@ class Report(BaseModel):
     parent: str | None = None
     robots: tuple[str, ...] | None = None
     positions: tuple[tuple[float, float], ...] | None = None
+    headings_deg: tuple[float | None, ...] | None = None
     verdict: Verdict | None = None
     partial: Shortfall | None = None
     arrival: Arrival | None = None
@@ -173,6 +174,7 @@ def make_report(
         plan_id=plan.id if plan else None,
         parent=world.plans[plan.id].parent if plan else None,
         positions=plan.formation.positions if plan else None,
+        headings_deg=(plan.formation.headings_deg or None) if plan else None,
         robots=plan.formation.robots or None if plan else None,
         verdict=plan.verdict if plan else None,
         partial=plan.partial if plan else None,

@@ -7,7 +7,18 @@ import numpy as np
 
 from ..context import Context
 from ..errors import ApprovalError, FleetError, StorageError, ToolError
-from ..fleet.deploy import MAX_AGE, Arrival, Assigned, Deployment, Track, assign_robots, deploy
+from ..fleet.deploy import (
+    ARRIVED_DEG,
+    MAX_AGE,
+    Arrival,
+    Assigned,
+    Deployment,
+    Track,
+    assign_robots,
+    check_turns,
+    deploy,
+    heading_residuals,
+)
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
 from ..fleet.registry import FLEETS
 from ..formation.contract import Contract
@@ -35,6 +46,7 @@ async def with_robots(context: Context, node: PlanNode) -> World:
         fleet = await _team(context, plan.formation.contract)
     except FleetSizeError:
         return world.with_plan(node)  # more than can be driven can still be planned
+    check_turns(plan, fleet)
     poses, points = await fleet.observe(max_age=MAX_AGE), plan.formation.points
     try:
         found = await in_thread(lambda: assign_robots(poses, points))
@@ -153,6 +165,11 @@ def _are_there(poses: tuple[Pose, ...], plan: Plan, arrival: Arrival) -> bool:
     """Whether all robots of a plan stand where they had arrived."""
     seen = {pose.id: (pose.x, pose.y) for pose in poses}
     wanted = zip(arrival.robots, plan.formation.positions, strict=True)
+    by_id = {pose.id: pose for pose in poses}
+    mine = [by_id[robot] for robot in arrival.robots if robot in by_id]
+    turned = heading_residuals(mine, plan.formation.headings_deg)
+    if any((off or 0.0) > ARRIVED_DEG for off in turned):
+        return False
     return arrival.arrived and all(
         robot in seen and np.hypot(*np.subtract(seen[robot], place)) <= arrival.tolerance_px
         for robot, place in wanted
@@ -168,6 +185,9 @@ def _in_robot_order(arrival: Arrival, plan: Plan) -> Arrival:
             "robots": tuple(arrival.robots[i] for i in order),
             "observed": tuple(arrival.observed[i] for i in order),
             "residual_px": tuple(arrival.residual_px[i] for i in order),
+            "heading_residual_deg": tuple(
+                arrival.heading_residual_deg[i] for i in order if arrival.heading_residual_deg
+            ),
         }
     )
 

@@ -3,7 +3,7 @@
 Nothing is decided here: places come from the references the checker measures against.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +35,8 @@ from .canvas import (
 
 OUTLINE_DETAIL = 0.3
 """Units of the page by which a drawn outline may differ from the measured one."""
+NOSE = 2.2
+"""How far the nose of a robot with a heading reaches, as a multiple of its disc's radius."""
 LABEL = 17.0
 NUMBERED = 60
 """Up to so many robots bear their numbers."""
@@ -160,6 +162,18 @@ def draw_robots(
             canvas.cross(points[robot], 0.45 * radius, WHITE, max(0.2 * radius, 0.8))
         else:
             canvas.disc(points[robot], radius, ROBOT, rim)
+
+
+def draw_headings(
+    canvas: Canvas, points: FloatArray, headings: Sequence[float | None], radius: float
+) -> None:
+    """A nose on each robot that looks somewhere; to be drawn before its disc, of a radius."""
+    reach = NOSE * radius / canvas.page_length(1.0)
+    for point, angle in zip(points, headings, strict=False):
+        if angle is not None:
+            turn = np.radians(angle)
+            tip = point + reach * np.array([np.cos(turn), np.sin(turn)])
+            canvas.cased([np.stack([point, tip])], WHITE, max(0.35 * radius, 1.5))
 
 
 def number_robots(

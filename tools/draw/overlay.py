@@ -25,6 +25,7 @@ from .marks import (
     directions,
     draw_areas,
     draw_guides,
+    draw_headings,
     draw_idle_robots,
     draw_outline,
     draw_robots,
@@ -167,6 +168,8 @@ def _draw_robots(canvas: Canvas, world: World, plan: Plan, labels: Labels) -> No
     for point in shown.values() if contract.robot_radius > 0 else ():
         canvas.body(point, contract.robot_radius)
     draw_idle_robots(canvas, idle_robots(world, plan), radius)
+    if near.all():
+        draw_headings(canvas, points, plan.formation.place_headings, radius)
     draw_robots(canvas, shown, radius, flagged)
     away = dict(zip(names, directions(contract, site, points), strict=True))
     number_robots(canvas, shown, radius, labels, away, flagged)

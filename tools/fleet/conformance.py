@@ -24,6 +24,8 @@ from .protocol import (
 
 Poses = tuple[Pose, ...]
 Refusal = TypeVar("Refusal", bound=FleetError)
+HEADING, HEADING_OFF = 1.0, 0.1
+"""A heading that is driven to, and how far off it may be, radians."""
 SETTLE_S = 0.1
 """Robots that were stopped are looked at again after so long."""
 
@@ -41,7 +43,8 @@ async def check_fleet(
     Raises:
         AssertionError: saying what does not hold.
     """
-    for check in (check_drive, check_stop, check_interruption, check_refusals, check_close):
+    checks = (check_drive, check_stop, check_interruption, check_refusals, check_turn, check_close)
+    for check in checks:
         fleet = make()
         try:
             await check(fleet, way, tolerance)
@@ -73,6 +76,19 @@ async def check_drive(fleet: Fleet, way: float, tolerance: float) -> None:
     assert times[-1, 0] > times[0, 0], "the time of a robot that drives stands still"
     await _refused(fleet.observe(max_age=-1.0), StalePosesError, "observing poses that are too old")
     await _stands(fleet, points_of(frames[-1]), tolerance)
+
+
+async def check_turn(fleet: Fleet, way: float, tolerance: float) -> None:
+    """A robot of a fleet that turns is seen to look where it was sent to look."""
+    if not fleet.turns:
+        return
+    motion = await _motion(fleet, way)
+    (robot,) = motion.paths
+    await _run_out(fleet.drive(Motion(motion.paths, {robot: HEADING})))
+    seen = {pose.id: pose.heading for pose in await fleet.observe()}[robot]
+    assert seen is not None, "the robot has no heading"
+    off = abs(math.remainder(seen - HEADING, math.tau))
+    assert off <= HEADING_OFF, f"the robot looks {off:.2f} rad past its heading"
 
 
 async def check_stop(fleet: Fleet, way: float, tolerance: float) -> None:

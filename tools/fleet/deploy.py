@@ -1,6 +1,7 @@
 """Drives a fleet to a certified formation and says what was observed, not what was commanded."""
 
 import asyncio
+import math
 from collections.abc import Callable, Sequence
 from contextlib import aclosing, suppress
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import numpy as np
 from ..errors import FleetError, ToolError
 from ..formation.checking.check import certify
 from ..formation.contract import MIN_SPACING, Contract, with_defaults
+from ..formation.headings import off_heading
 from ..formation.placement.place import Site
 from ..formation.plan import Plan, Point
 from ..formation.value import Value
@@ -30,6 +32,8 @@ from .protocol import (
 )
 
 CORRECTIONS = 5
+ARRIVED_DEG = 2.0
+"""A robot that is to look somewhere has arrived within so many degrees of it."""
 ARRIVED_SHARE, ARRIVED_PX = 0.001, 0.5
 """A robot has arrived within this share of the picture's diagonal, at least half a pixel."""
 MAX_AGE = 1.0
@@ -55,6 +59,7 @@ class Arrival(Value):
         failed: ids of those that the fleet named as having failed.
         observed: where they were seen last, px.
         residual_px: distance of observed to requested.
+        heading_residual_deg: of observed to requested headings; empty where none were requested.
         corrections: how many times robots were sent again after the first drive.
         track: hash of the file that holds where they were on their way.
     """
@@ -66,6 +71,7 @@ class Arrival(Value):
     failed: tuple[str, ...] = ()
     observed: tuple[Point, ...]
     residual_px: tuple[float, ...]
+    heading_residual_deg: tuple[float | None, ...] = ()
     tolerance_px: float
     corrections: int
     track: str | None = None
@@ -159,20 +165,52 @@ async def deploy(
         FleetError: the fleet cannot be observed, or there is no way to a place.
     """
     contract = with_defaults(plan.formation.contract, site.outlines, site.room)
-    verdict = certify(plan.formation.points, contract, site)  # a plan's own word is not enough
+    formation = plan.formation
+    headings = formation.place_headings  # a plan's own word is not enough
+    verdict = certify(formation.points, contract, site, headings)
     if not verdict.certified:
         why = verdict.findings[0].sentence
         raise ToolError(f"Plan {plan.id} is not certified: {why} Nothing was moved.")
+    check_turns(plan, fleet)
     if id(fleet) in _in_deployment:
         raise FleetBusyError(
             f"The fleet {fleet.name} is being deployed already; wait for it to end, or stop it."
         )
     _in_deployment.add(id(fleet))
     try:
-        drive = _Drive(plan.formation.points, contract, site, fleet, robots, watch)
+        goals = formation.points, headings
+        drive = _Drive(goals, contract, site, fleet, robots, watch)
         return await drive.run(starting)
     finally:
         _in_deployment.discard(id(fleet))
+
+
+def check_turns(plan: Plan, fleet: Fleet) -> None:
+    """Refuse headings to a fleet that cannot turn.
+
+    Raises:
+        ToolError: saying so.
+    """
+    if plan.formation.headings_deg and not fleet.turns:
+        raise ToolError(
+            f"Robots of the fleet {fleet.name} cannot be turned to a heading: leave `heading` out, "
+            "or use a fleet that can."
+        )
+
+
+def heading_residuals(
+    poses: Sequence[Pose], headings: Sequence[float | None]
+) -> tuple[float | None, ...]:
+    """How far robots look past where they are to, degrees; 180 for what is not known."""
+    wanted = zip(poses, headings, strict=False)
+    return tuple(
+        None
+        if angle is None
+        else 180.0
+        if pose.heading is None
+        else round(off_heading(math.degrees(pose.heading), angle), 3)
+        for pose, angle in wanted
+    )
 
 
 class _Drive:
@@ -180,14 +218,15 @@ class _Drive:
 
     def __init__(
         self,
-        goals: FloatArray,
+        goals: tuple[FloatArray, tuple[float | None, ...]],
         contract: Contract,
         site: Site,
         fleet: Fleet,
         robots: Sequence[str],
         watch: Watch,
     ) -> None:
-        self._goals, self._contract, self._site = goals, contract, site
+        self._goals, self._headings = goals
+        self._contract, self._site = contract, site
         self._fleet, self._robots, self._watch = fleet, tuple(robots), watch
         self._radius = max(contract.robot_radius, fleet.radius or 0.0)
         self._tolerance = max(ARRIVED_PX, ARRIVED_SHARE * float(np.hypot(*site.room)))
@@ -278,13 +317,19 @@ class _Drive:
             self._site.frame(self._radius),
             idle=points_of(self._idle()),
         )
-        return Motion(dict(zip(self._robots, paths, strict=True)))
+        looks = zip(self._robots, self._headings, strict=False)
+        headings = {robot: math.radians(angle) for robot, angle in looks if angle is not None}
+        return Motion(dict(zip(self._robots, paths, strict=True)), headings)
 
     def _residual(self) -> FloatArray:
         return np.linalg.norm(self._points() - self._goals, axis=1)
 
     def _arrived(self) -> bool:
-        return bool(self._residual().max() <= self._tolerance)
+        turned = all((off or 0.0) <= ARRIVED_DEG for off in self._heading_residual())
+        return turned and bool(self._residual().max() <= self._tolerance)
+
+    def _heading_residual(self) -> tuple[float | None, ...]:
+        return heading_residuals([self._poses[robot] for robot in self._robots], self._headings)
 
     def _report(self, corrections: int, error: FleetError | None = None) -> Deployment:
         reason = str(error) if error else None
@@ -304,6 +349,7 @@ class _Drive:
             failed=error.ids if isinstance(error, RobotsFailedError) else (),
             observed=tuple((round(float(x), 3), round(float(y), 3)) for x, y in points),
             residual_px=tuple(round(float(r), 3) for r in self._residual()),
+            heading_residual_deg=self._heading_residual(),
             tolerance_px=round(self._tolerance, 3),
             corrections=corrections,
         )

@@ -78,9 +78,12 @@ class Motion:
     Attributes:
         paths: polyline, (k, 2) px with k >= 2, by robot id; it begins where the robot stands.
             Robots that are not in it stay where they are.
+        headings: which way robots look at the end, radians clockwise from the x axis, by id;
+            only for a fleet that turns.
     """
 
     paths: Mapping[str, FloatArray]
+    headings: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 class Fleet(Protocol):
@@ -99,6 +102,11 @@ class Fleet(Protocol):
     @property
     def radius(self) -> float | None:
         """Of a robot, px; None where the fleet does not say."""
+        ...
+
+    @property
+    def turns(self) -> bool:
+        """Whether its robots can be sent to a heading, which their poses then have."""
         ...
 
     @property

@@ -54,6 +54,7 @@ class SimulatedFleet:
 
     name = "simulated"
     real = False
+    turns = True
 
     def __init__(
         self, poses: Sequence[Pose], *, speed: float, radius: float | None = None, seed: int = 0
@@ -61,7 +62,7 @@ class SimulatedFleet:
         self.radius, self.stopped = radius, False
         self._ids = tuple(pose.id for pose in poses)
         self._points = points_of(poses)
-        self._headings = tuple(pose.heading for pose in poses)
+        self._headings = [pose.heading for pose in poses]
         self._now = max((pose.seen for pose in poses), default=0.0)
         self._step = speed * PERIOD
         self._random = np.random.default_rng(seed)
@@ -85,10 +86,16 @@ class SimulatedFleet:
         covered = 1 - SLIP * self._random.random(len(paths))
         longest = max(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in paths)
         steps = max(math.ceil(longest / self._step), 1)
+        begun = [self._headings[i] or 0.0 for i in moving]
+        ends = [motion.headings.get(self._ids[i]) for i in moving]
         self._driving, stops = True, self._stops
         try:
             for step in range(1, steps + 1):
                 self._points[moving] = along(paths, step / steps * covered)
+                for i, begin, end, share in zip(moving, begun, ends, covered, strict=True):
+                    if end is not None:
+                        turn = math.remainder(end - begin, math.tau)
+                        self._headings[i] = begin + turn * step / steps * float(share)
                 self._now += PERIOD
                 yield self._seen()
                 await asyncio.sleep(0)  # unpaced, but whoever wants to stop it gets a turn

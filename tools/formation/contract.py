@@ -38,6 +38,7 @@ RingPart = Literal[
 Fit = Literal["tight", "normal", "wide"]
 FIT_FACTOR = {"tight": 0.5, "normal": 1.0, "wide": 2.0}
 MAX_LENGTH = 100_000.0
+LOOKING = ("towards", "away")
 DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
 Length = Annotated[float, Field(ge=0, le=MAX_LENGTH, allow_inf_nan=False)]
 Angle = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
@@ -124,6 +125,11 @@ class Group(Value):
         default=None, description="along: the side that faces this target, instead of a side."
     )
     shape: ShapeSpec | None = Field(default=None, description="shape: a form drawn by the robots.")
+    heading: str | Angle | None = Field(
+        default=None,
+        description="Where robots look, if said: towards, away, a target id, or degrees as of an "
+        "arc.",
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -263,8 +269,8 @@ class Contract(Value):
         """Every target named, once, in order."""
         named = [t for group in self.groups for t in group.targets] + list(self.keep_out)
         faced = [group.facing for group in self.groups if group.facing is not None]
-        towards = [group.opening_towards for group in self.groups]
-        faced += [t for t in towards if isinstance(t, str) and t not in DIRECTIONS]
+        ways = [way for group in self.groups for way in (group.opening_towards, group.heading)]
+        faced += [w for w in ways if isinstance(w, str) and w not in (*DIRECTIONS, *LOOKING)]
         return tuple(dict.fromkeys(named + faced))
 
     @property

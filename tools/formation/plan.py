@@ -18,6 +18,7 @@ from ..geometry.outline import FloatArray
 from .checking.check import certify
 from .checking.verdict import Verdict
 from .contract import Contract, Group, with_defaults
+from .headings import headings_of
 from .placement.place import Site, place
 from .units import length_text
 from .value import Value
@@ -37,6 +38,8 @@ class Formation(Value):
             and positions are then in the order of the contract's groups.
         members: for each group of the contract the indices of its robots, in the order of its
             places; none as long as there are no robots.
+        headings_deg: for each position which way the robot looks, degrees clockwise from the
+            right, None where none was named; empty where the contract names none at all.
     """
 
     positions: tuple[Point, ...]
@@ -44,6 +47,7 @@ class Formation(Value):
     scene_version: str
     robots: tuple[str, ...] = ()
     members: tuple[tuple[int, ...], ...] = ()
+    headings_deg: tuple[float | None, ...] = ()
 
     @property
     def id(self) -> str:
@@ -56,6 +60,12 @@ class Formation(Value):
         points = np.asarray(self.positions, dtype=float).reshape(-1, 2)
         order = [i for group in self.members for i in group]
         return points[order] if order else points
+
+    @property
+    def place_headings(self) -> tuple[float | None, ...]:
+        """The headings in the order of `points`."""
+        order = [i for group in self.members for i in group]
+        return tuple(self.headings_deg[i] for i in order if self.headings_deg) or self.headings_deg
 
     @property
     def robot_of_place(self) -> tuple[str, ...]:
@@ -119,6 +129,7 @@ class Plan(Value):
         robots = tuple(name for name in fleet if name in set(taking))
         index = {name: i for i, name in enumerate(robots)}
         places = dict(zip(taking, self.formation.points.tolist(), strict=True))
+        headings = dict(zip(taking, self.formation.place_headings, strict=False))
         taken = map(index.__getitem__, taking)
         members = tuple(tuple(islice(taken, g.robots)) for g in self.formation.contract.groups)
         formation = self.formation.model_copy(
@@ -126,6 +137,7 @@ class Plan(Value):
                 "positions": tuple((x, y) for x, y in map(places.__getitem__, robots)),
                 "robots": robots,
                 "members": members,
+                "headings_deg": tuple(headings[name] for name in robots if headings),
             }
         )
         return self.model_copy(update={"formation": formation})
@@ -152,12 +164,15 @@ def make_plan(
     if points.ndim != 2 or points.shape[1] != 2:
         raise ToolError(f"Positions must be (x, y) pairs, shape (N, 2); got {points.shape}.")
     rounded = np.round(points, DECIMALS) + 0.0  # + 0.0: no negative zeros
+    fits = len(rounded) == full.robots and bool(np.isfinite(rounded).all())
+    headings = headings_of(full, rounded, site) if fits else ()
     formation = Formation(
         positions=tuple((float(x), float(y)) for x, y in rounded),
         contract=full,
         scene_version=scene_version,
+        headings_deg=headings,
     )
-    return Plan(formation=formation, verdict=certify(rounded, full, site))
+    return Plan(formation=formation, verdict=certify(rounded, full, site, headings))
 
 
 def _digest(content: Any) -> str:

@@ -357,3 +357,19 @@ def test_a_gif_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"film\.gif cannot be written"):
         save_gif([Image.new("RGB", (32, 32))], tmp_path / "film.gif")
     assert [p.name for p in tmp_path.iterdir()] == ["film.gif"]
+
+
+def test_a_robot_that_looks_somewhere_has_a_nose_there() -> None:
+    made = scene()
+    plain, looking = (
+        np.asarray(draw_plan(*made, plan_for(made, **more), "Look").convert("L"), dtype=int)
+        for more in ({}, {"heading": 0.0})
+    )
+    assert plain.shape == looking.shape
+    rows, columns = np.nonzero(plain != looking)
+    assert len(rows)
+    plan = plan_for(made)
+    x, y = plan.formation.points[0]
+    scale = 4.0  # 300 px are drawn 1200 wide
+    left, top, *_ = photo_box(draw_plan(*made, plan, "Look"))
+    assert (columns > left + scale * x).any() and (abs(rows - top - scale * y) < 20).any()

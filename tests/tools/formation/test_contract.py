@@ -46,7 +46,7 @@ def test_every_problem_of_a_group_is_named_at_once() -> None:
                 "clearance": [9, 2],
                 "side": "left",
                 "edges": [1],
-                "max_gap": 3,
+                "walls": True,
                 "closure": "ring",
                 "line": [0, 0, 1, 1],
             }
@@ -57,7 +57,7 @@ def test_every_problem_of_a_group_is_named_at_once() -> None:
         "clearance (9.0, 2.0)",
         "side belongs to along",
         "edges belongs to along",
-        "max_gap belongs to cage",
+        "walls belongs to cage",
         "closure belongs to cage",
         "line belongs to shape",
     ):

@@ -4,7 +4,7 @@ It measures with exact distances on float polygons and trusts nothing about wher
 positions came from. Frame: image pixels, x right, y down; robots count from 1 over all groups.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import shapely
@@ -17,6 +17,7 @@ from ...geometry.lloyd import cells_of
 from ...geometry.outline import FARTHEST, FloatArray, Outline, distances
 from ...geometry.sampling import min_spacing, nearest
 from ..contract import CENTRE_SHARE, PITCH_PX, Contract
+from ..headings import headings_of, off_heading
 from ..placement import spacing
 from ..placement.caging import escape_proof
 from ..placement.figure import figure_of
@@ -33,16 +34,24 @@ SAMPLED = 7
 """Of the ground the ideal places cover every so-manieth cell is looked at first."""
 LINE_SHARE = 0.03
 """How far off a straight line a robot may stand, as a share of its length in the picture."""
+HEADING_SLACK = 1.0
+"""How far a robot may look past what it is to look at, degrees."""
 WHOLE = 0.995
 """A curve of which the picture leaves this share is not cut."""
 
 
-def certify(positions: ArrayLike, contract: Contract, site: Site) -> Verdict:
+def certify(
+    positions: ArrayLike,
+    contract: Contract,
+    site: Site,
+    headings: Sequence[float | None] | None = None,
+) -> Verdict:
     """Check positions against a contract whose defaults are written out.
 
     Args:
         positions: (N, 2) image pixels, robots in order over all groups.
         site: with every target the contract names.
+        headings: degrees in the same order; None where they are not looked at.
 
     Raises:
         InputError: the positions are no (N, 2) array.
@@ -65,7 +74,19 @@ def certify(positions: ArrayLike, contract: Contract, site: Site) -> Verdict:
     _check_keep_out(points, contract, site, audit)
     for part in parts_of(contract, points, site):
         _RULES[part.group.relation](part, audit)
+    if headings is not None:
+        _check_headings(headings, headings_of(contract, points, site), audit)
     return audit.verdict()
+
+
+def _check_headings(
+    headings: Sequence[float | None], wanted: Sequence[float | None], audit: Audit
+) -> None:
+    for i, angle in enumerate(wanted):
+        has = headings[i] if i < len(headings) else None
+        off = 0.0 if angle is None else 180.0 if has is None else off_heading(has, angle)
+        if off > HEADING_SLACK:
+            audit.find("wrong_heading", off, HEADING_SLACK, robot=i, unit="degrees")
 
 
 def _check_bounds(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
