@@ -9,10 +9,12 @@ from ..errors import ToolError
 from ..fleet.deploy import Arrival
 from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
+from ..formation.placement.caging import CUT_SHORT
 from ..formation.placement.partial import best_partial
 from ..formation.plan import Plan, make_plan
 from ..formation.site import PlacementError
 from ..formation.units import contract_in_pixels, length_text, with_metres
+from ..geometry.cages.budget import cut_short, search_budget
 from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
 from ..tool import ToolResult, in_thread, tool
@@ -104,16 +106,19 @@ def _planned(
     """The plan of a contract or why there is none and, if it is not certified, the best partial."""
     world = context.world
     site = world.site(held)
-    try:
-        plan = make_plan(held, site, world.version, places)
-    except PlacementError as error:
-        partial = best_partial(held, site, world.version, error)
-        if partial is None:
-            raise
-        return error, partial
-    partial = None
-    if places is None and not plan.verdict.certified:
-        partial = best_partial(held, site, world.version, None)
+    with search_budget():
+        try:
+            plan = make_plan(held, site, world.version, places)
+        except PlacementError as error:
+            partial = best_partial(held, site, world.version, error)
+            if partial is None and cut_short() and CUT_SHORT not in str(error):
+                raise ToolError(f"{error}{CUT_SHORT}", error.kind, **error.facts) from None
+            if partial is None:
+                raise
+            return error, partial
+        partial = None
+        if places is None and not plan.verdict.certified:
+            partial = best_partial(held, site, world.version, None)
     return PlanNode(plan=plan, unseen=_unseen(world, held)), partial
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ToolError
+from ..geometry.cages.budget import search_budget
 from ..geometry.outline import FloatArray
 from .checking.check import certify
 from .checking.verdict import Verdict
@@ -160,7 +161,8 @@ def make_plan(
     def sound(group: Group, places: FloatArray) -> bool:
         return certify(places, full.model_copy(update={"groups": (group,)}), site).certified
 
-    points = place(full, site, sound) if positions is None else np.asarray(positions, dtype=float)
+    with search_budget():
+        points = place(full, site, sound) if positions is None else np.asarray(positions, float)
     if points.ndim != 2 or points.shape[1] != 2:
         raise ToolError(f"Positions must be (x, y) pairs, shape (N, 2); got {points.shape}.")
     rounded = np.round(points, DECIMALS) + 0.0  # + 0.0: no negative zeros

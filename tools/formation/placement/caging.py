@@ -6,11 +6,14 @@ Frame: image pixels, x right, y down; a target's holes do not matter to what sur
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from ...geometry.cages.budget import cut_short
 from ...geometry.cages.cage_places import Demand, caging_places, fewest_cage
 from ...geometry.curves import Curve
 from ...geometry.outline import FloatArray
 from ..contract import Group
 from ..site import PlacementError, Site
+
+CUT_SHORT = " The search was cut short; with fewer groups or robots it goes further."
 
 
 class CageError(PlacementError):
@@ -32,7 +35,7 @@ class CageError(PlacementError):
         )
         super().__init__(
             f"No places were found where {group.robots} robots, {site.length(group.offsets())} "
-            f"from {group.targets[0]}, certainly cage it; {way}.",
+            f"from {group.targets[0]}, certainly cage it; {way}.{CUT_SHORT if cut_short() else ''}",
             "cage",
             robots_needed=needed,
             robots_that_fit=fits,

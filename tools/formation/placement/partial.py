@@ -6,10 +6,11 @@ Whatever comes of it is certified by the same checker, and says of itself what i
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ...geometry.cages.budget import cut_short, search_budget
 from ..contract import Contract, Group, with_defaults
 from ..plan import Plan, Shortfall, make_plan
 from ..site import CapacityError, PlacementError, Site
-from .caging import CageError, escape_proof
+from .caging import CUT_SHORT, CageError, escape_proof
 from .group_conflicts import CrowdedError
 
 ROUNDS = 60
@@ -49,10 +50,17 @@ def best_partial(
     full = with_defaults(contract, site.outlines, site.room)
 
     def attempt(smaller: Contract) -> Plan:
+        if cut_short() and any(map(escape_proof, smaller.groups)):
+            raise PlacementError(CUT_SHORT.strip())
         return make_plan(smaller, site, scene_version)
 
-    fewer = None if refusal is None else _fewer(full, attempt)
-    return fewer or _nearer(contract, full, attempt, site)
+    with search_budget():
+        fewer = None if refusal is None else _fewer(full, attempt)
+        found = fewer or _nearer(contract, full, attempt, site)
+        if found is None or found.partial is None or not cut_short():
+            return found
+        short = found.partial.model_copy(update={"sentence": found.partial.sentence + CUT_SHORT})
+        return found.model_copy(update={"partial": short})
 
 
 def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
@@ -69,6 +77,8 @@ def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
                 fewer = alone
         except (CapacityError, CageError) as error:
             fewer = _with_counts(smaller, {smaller.groups.index(error.group): error.fits})
+        except PlacementError:  # cut short
+            return None
         else:
             short = plan.verdict.certified and smaller != full
             partial = {"partial": _shortfall(full, smaller, names)}

@@ -16,6 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from ..curves import Curve, Frame, interpolate, ring
 from ..outline import FloatArray, Outline
 from ..sampling import along_curve, arc_length, min_spacing
+from .budget import cut_short, spend
 from .cages import QUICK, THOROUGH, State, cage
 from .configuration import clearances
 from .configuration_grid import Grid, component, first_grid
@@ -27,6 +28,8 @@ DEPTHS = (0.1, 0.4)
 """Where in the range of clearances the rings lie: near the object, and nearer to the middle."""
 PHASES = 8
 """Starts tried for an even ring."""
+SLIDES_STEPS = 10
+"""Steps of the budget that working out the stations takes."""
 SLIDES = (8, -8, 4, -4, 2, -2, 1, -1)
 """Stations a robot slides by in search of a tighter cage, long slides first."""
 SWEEPS, STARTS = 6, 2
@@ -73,7 +76,8 @@ class Demand:
 
     def state(self, points: FloatArray, levels: int, escapes: bool = False) -> State:
         """What is known of robots there as a cage; too near to each other they are none."""
-        if len(points) > 1 and min_spacing(points) < self.spacing:
+        crowded = len(points) > 1 and min_spacing(points) < self.spacing
+        if crowded or (levels and cut_short()):
             return "not certified"
         region, radius, walls = self.outline.filled, self.radius, self.walls
         return cage(region, points, radius, walls=walls, levels=levels, escapes=escapes).state
@@ -108,7 +112,7 @@ def caging_places(demand: Demand, n: int, preferred: Sequence[Curve] = ()) -> Fl
         for points in rings:
             if demand.state(points, level) == "caged":
                 return points
-    if n > MOST_SLID:
+    if n > MOST_SLID or cut_short():
         return None
     return demand.slides.places(n)
 
@@ -144,6 +148,7 @@ class _Slides:
     """Sets of stations on rings, by how clear the widest way out of each is."""
 
     def __init__(self, demand: Demand) -> None:
+        spend(SLIDES_STEPS)
         self._demand = demand
         # What the frame cuts open and no wall closes is no ring to slide on.
         rings = [

@@ -19,6 +19,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..outline import FloatArray
+from .budget import spend
 from .configuration import flood
 from .rigid import Obstacles, body_of, overlaps
 
@@ -26,6 +27,8 @@ State = Literal["caged", "not certified", "escape"]
 Test = Literal["disc", "configuration space"]
 QUICK, THOROUGH = 2, 4
 """Levels of the flood: about 10 to 60 ms for ten robots, and up to a second."""
+THOROUGH_STEPS, MANY = 6, 50
+"""Steps of the budget for a flood of all levels, and robots that make it as many again."""
 MOST_FLOODED = 300
 """With more robots than this only the disc is tried: a flood costs time for every robot."""
 MARGIN = 1e-9
@@ -94,6 +97,7 @@ def cage(
     body, obstacles = body_of(filled), Obstacles(points, radius, walls)
     if len(points) > MOST_FLOODED or not levels or overlaps(body, obstacles):
         return Cage("not certified", None, *known)
+    spend((1 if levels <= QUICK else THOROUGH_STEPS) * (1 + len(points) // MANY))
     found = flood(body, obstacles, levels, escapes=escapes)
     if found.enclosed:
         return Cage("caged", "configuration space", *known)

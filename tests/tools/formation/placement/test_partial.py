@@ -1,7 +1,7 @@
 """What cannot be met in full: the number that would do, and a plan that says it is partial."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -9,11 +9,13 @@ from formup.tools.errors import ToolError
 from formup.tools.fleet.deploy import Arrival
 from formup.tools.formation.checking.check import certify
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.placement.caging import CageError
+from formup.tools.formation.placement.caging import CUT_SHORT, CageError
 from formup.tools.formation.placement.group_conflicts import CrowdedError
 from formup.tools.formation.placement.partial import best_partial
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.formation.site import CapacityError, Site
+from formup.tools.geometry.cages import cages
+from formup.tools.geometry.cages.budget import search_budget
 from formup.tools.geometry.outline import make_outline
 from formup.tools.perception.image import picture_from_array
 from formup.tools.world import Target, World
@@ -197,3 +199,35 @@ def test_a_ring_the_picture_cuts_open_is_offered_nearer(work: "ToolCalls") -> No
     partial_id, shown = list(work.world.plans)
     assert shown == data["plan_id"]
     assert data["partial"]["plan_id"] == partial_id
+
+
+def test_a_search_among_cages_in_each_others_way_is_cut_short_and_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made: list[int] = []
+    whole = cages.flood
+
+    def counted(*args: Any, **more: Any) -> Any:
+        made.append(1)
+        return whole(*args, **more)
+
+    monkeypatch.setattr(cages, "flood", counted)
+    cup = [(200, 150), (240, 150), (240, 270), (380, 270), (380, 150), (420, 150), (420, 330)]
+    site = Site({"t1": make_outline([*cup, (200, 330)])}, 640, 480)
+    ring: dict[str, object] = {"relation": "around", "robots": 40, "clearance": (10, 30)}
+    cage: dict[str, object] = {
+        "relation": "cage",
+        "closure": "escape-proof",
+        "robots": 10,
+        "clearance": (18, 22),
+    }
+    cage["min_spacing"] = 12
+    held = contract(ring, cage, radius=0)
+    with search_budget():
+        with pytest.raises(CrowdedError) as caught:
+            make_plan(held, site, "s")
+        plan = best_partial(held, site, "s", caught.value)
+    assert len(made) < 150
+    assert plan is not None
+    assert plan.partial is not None
+    assert plan.partial.sentence.endswith(CUT_SHORT)
