@@ -1,6 +1,5 @@
 """The command line: `formup run`, `resume`, `deploy`, `trace`, `tools`, `eval`, `prompts`."""
 
-import sys
 from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -22,6 +21,7 @@ from ..tools.perception.image import load_picture
 from . import arguments, deploy, evaluate, prompts, tools, trace
 from . import options as o
 from .run_files import Folder, write_files
+from .terminal import say
 from .terminal_session import TerminalSession
 
 if TYPE_CHECKING:
@@ -173,10 +173,10 @@ def _agent(
             tracer=tracer,
         )
         if model == "offline" and agent.prompt is not None:
-            print(  # noqa: T201
+            say(
                 "formup: the offline planner is rules and reads no prompt; "
                 f"{agent.prompt.name} is not used.",
-                file=sys.stderr,
+                error=True,
             )
             agent = Agent(model, limits=limits, policy=policy, tracer=tracer)
         yield agent
@@ -190,5 +190,5 @@ def _tracer() -> "Generator[Tracer | None, None, None]":
         try:
             tracer = stack.enter_context(environment_tracer())
         except InputError as error:
-            print(f"formup: no spans are sent: {error}", file=sys.stderr)  # noqa: T201
+            say(f"formup: no spans are sent: {error}", error=True)
         yield tracer

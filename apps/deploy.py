@@ -1,7 +1,6 @@
 """`formup deploy PLAN.json`: a person's approval of exactly that plan, and the move."""
 
 import asyncio
-import sys
 from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -24,6 +23,7 @@ from ..tools.world import World
 from . import options as o
 from .run_display import show_report
 from .run_files import animate
+from .terminal import say
 
 
 def deploy(
@@ -42,7 +42,7 @@ def deploy(
     context.services.artefacts = FolderArtefacts(plan.parent / PICTURES)
     chosen = stored.world.plans[stored.plan_id].plan
     if chosen.partial is not None:
-        print(f"formup: a partial plan: {chosen.partial.sentence}", file=sys.stderr)  # noqa: T201
+        say(f"formup: a partial plan: {chosen.partial.sentence}", error=True)
 
     def keep(world: World) -> None:
         write_whole(plan, plan_file(world, chosen.id, stored.instruction or "", picture))
@@ -54,8 +54,8 @@ def deploy(
     drawn = animate(animation, context, chosen, stored.instruction or "")
     report = _report(chosen, context.world, stored, animation.name if drawn else None)
     if as_json:
-        print(report.model_dump_json(indent=2))  # noqa: T201
-        print(f"formup: files in {plan.parent}", file=sys.stderr)  # noqa: T201
+        say(report.model_dump_json(indent=2))
+        say(f"formup: files in {plan.parent}", error=True)
     else:
         show_report(Console(highlight=False), report, str(plan.parent))
     raise typer.Exit(report.exit_code)
@@ -113,7 +113,7 @@ def _driven(
             raise
     except KeyboardInterrupt:
         if observed:
-            print("formup: the robots were stopped on the way.", file=sys.stderr)  # noqa: T201
+            say("formup: the robots were stopped on the way.", error=True)
         raise
     finally:
         if observed:

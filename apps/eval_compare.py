@@ -6,7 +6,6 @@ from pathlib import Path
 import typer
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from ..evals.experiments.compare import compare as compared
 from ..evals.experiments.comparison import Comparison, Difference, Metric, Range
@@ -19,6 +18,7 @@ from ..tools.errors import InputError
 from ..tools.store import write_whole
 from . import arguments as inputs
 from . import options as o
+from .terminal import say, styled
 
 EXIT = {"pass": 0, "block": 1, "inconclusive": 3}
 STYLE = {
@@ -46,7 +46,7 @@ def _command(concluded: Callable[[Console, Comparison], int]) -> Callable[..., N
         made = _made((a, arm_a), (b, arm_b), metric, margin, out)
         console = Console(highlight=False, soft_wrap=True, quiet=as_json)
         if as_json:
-            print(made.model_dump_json(indent=2))  # noqa: T201
+            say(made.model_dump_json(indent=2))
         _print_comparison(console, made)
         raise typer.Exit(concluded(console, made))
 
@@ -72,7 +72,7 @@ def merge_shards(shards: o.Shards, out: o.MergedFolder) -> None:
     """Put the trials of shards together in a new folder."""
     count = merge(shards, out)
     join_stored(shards, out)
-    print(f"{count:,} trials in {out}")  # noqa: T201
+    say(f"{count:,} trials in {out}")
 
 
 def _made(
@@ -120,7 +120,7 @@ def _says(name: str, arm: Arm, word: str) -> bool:
 
 def _print_comparison(console: Console, made: Comparison) -> None:
     for name, arm in (("A", made.a), ("B", made.b)):
-        console.print(Text.assemble((f"{name} ", "cyan"), arm.name))
+        console.print(styled((f"{name} ", "cyan"), arm.name))
     console.print()
     console.print(_scores(made))
     console.print()
@@ -154,14 +154,14 @@ def _differences(made: Comparison) -> Table:
     slices = ((n, d) for values in made.slices.values() for n, d in values.items())
     for name, found in (("all", made.overall), *slices):
         table.add_row(
-            Text(name),
+            styled(name),
             str(found.tasks),
             _in_points(found.estimate),
             _interval_points(found.interval),
             _p(found.p_holm),
             "-" if found.fixed_tasks is None else _interval_points(found.fixed_tasks),
             _p(found.fixed_p),
-            Text(found.outcome, style=STYLE[found.outcome]),
+            styled(found.outcome, style=STYLE[found.outcome]),
         )
     if made.slices:
         table.caption, table.caption_justify = "p of slices on new tasks: Holm's", "left"
@@ -183,7 +183,7 @@ def _conclude(
     settled: Needed | None,
     overall: Difference,
 ) -> None:
-    console.print(Text.assemble((word, STYLE[word]), f": {'; '.join(reasons)}" if reasons else ""))
+    console.print(styled((word, STYLE[word]), f": {'; '.join(reasons)}" if reasons else ""))
     if settled is not None:
         each = round(overall.pairs / overall.tasks)
         ways = [

@@ -10,6 +10,7 @@ from ..tools.store import write_whole
 from . import eval_options as e
 from . import options as o
 from .eval_compare import arm_rows
+from .terminal import say
 
 NAME = "report.html"
 
@@ -29,7 +30,7 @@ def report(
     path = out or run / NAME
     sides = _sides(run, against, arm_a, arm_b)
     write_whole(path, page(sides).encode())
-    print(path)  # noqa: T201
+    say(path)
 
 
 def _sides(run: Path, against: Path | None, arm_a: str | None, arm_b: str | None) -> list[Side]:

@@ -1,7 +1,6 @@
 """`formup eval run`: a suite by one or several methods, as counts with the chance level."""
 
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
@@ -36,6 +35,7 @@ from . import eval_options as e
 from . import options as o
 from .eval_progress import sweep
 from .eval_tables import print_misses, print_placed, print_scores, print_spent
+from .terminal import say
 
 RUNS = Path("formup-runs")
 SUMMARY = "summary.json"
@@ -83,7 +83,7 @@ def run_suite(
     how = {"executor": runs_on, "budget_usd": limit, "shard": shard}
     done = _run_trials(loaded, tasks, arms, count, split, folder, how)
     if done.stopped is not None:
-        print(f"formup: stopped: {done.stopped}", file=sys.stderr)  # noqa: T201
+        say(f"formup: stopped: {done.stopped}", error=True)
         raise typer.Exit(4)
 
 
@@ -170,7 +170,7 @@ def _note_look(folder: Path, suite: str, sha256: str, trials: Sequence[Trial]) -
     arms = sorted({trial.arm.name for trial in trials})
     count = look(folder, suite, sha256, arms)
     text = f"formup: look {count} at the test split of {suite}, written down in {folder / LEDGER}."
-    print(text, file=sys.stderr)  # noqa: T201
+    say(text, error=True)
 
 
 def _new_folder(suite: str) -> Path:

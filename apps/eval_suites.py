@@ -12,6 +12,7 @@ from ..evals.tasks.rendered_pictures import render
 from ..evals.tasks.suites import description, load_suite, shipped, write_suite
 from ..tools.errors import InputError
 from . import eval_options as e
+from .terminal import say, styled
 
 NAMED = 5
 """Problems that are named."""
@@ -23,7 +24,7 @@ def suites() -> None:
     for name in ("suite", "what it is"):
         table.add_column(name, no_wrap=name == "suite")
     for name in shipped():
-        table.add_row(name, description(name))
+        table.add_row(name, styled(description(name)))
     Console(highlight=False).print(table)
 
 
@@ -42,7 +43,7 @@ def add(folder: e.NewFolder, name: e.Name = None) -> None:
     except InputError:
         path.unlink()
         raise
-    print(f"{path}: {len(made.tasks)} tasks. Run them: formup eval run {folder}")  # noqa: T201
+    say(f"{path}: {len(made.tasks)} tasks. Run them: formup eval run {folder}")
 
 
 def descriptors(suite: e.DescribedSuite = "photos") -> None:

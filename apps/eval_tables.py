@@ -8,6 +8,7 @@ from rich.table import Table
 
 from ..evals.experiments.trials import TrialRow
 from ..evals.statistics.cells import Cell
+from .terminal import styled
 
 SCORES = ("success", "95 %", "GCR", "strict", "chance SR", "chance GCR")
 PLACED = (
@@ -26,7 +27,7 @@ def print_scores(title: str, found: Sequence[Cell]) -> None:
     for cell in found:
         low, high = cell.interval
         table.add_row(
-            cell.name,
+            styled(cell.name),
             f"{cell.passed}/{cell.scored}",
             f"{low:.2f}-{high:.2f}",
             f"{cell.gcr:.2f}",
@@ -44,7 +45,7 @@ def print_placed(found: Sequence[Cell]) -> None:
     for cell in (cell for cell in found if " " not in cell.name):
         right, known = cell.right_thing
         table.add_row(
-            cell.name,
+            styled(cell.name),
             str(cell.scored),
             _share(cell.placed, cell.scored),
             _share(cell.passed, cell.scored),
@@ -75,13 +76,13 @@ def print_misses(rows: Sequence[TrialRow]) -> None:
     misses = [row for row in rows if not row.strict and row.feedback]
     for row in misses[:MISSES]:
         kind = "not strict: " if row.sr else ""
-        console.print(f"{row.task} trial {row.trial}: {kind}{row.feedback[:LONGEST]}", markup=False)
+        console.print(styled(f"{row.task} trial {row.trial}: {kind}{row.feedback[:LONGEST]}"))
     if len(misses) > MISSES:
         console.print(f"and {len(misses) - MISSES} more")
 
 
 def _number_table(title: str | None, *names: str) -> Table:
-    table = Table(title=title, header_style="cyan", box=None)
+    table = Table(title=title and styled(title), header_style="cyan", box=None)
     for name in ("", *names):
         table.add_column(name, justify="right" if name else "left", no_wrap=True)
     return table

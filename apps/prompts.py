@@ -22,6 +22,7 @@ from ..prompts.release import new_draft, promote, release
 from ..tools.errors import InputError
 from . import arguments as inputs
 from . import options as o
+from .terminal import say, styled
 
 ADDED, REMOVED, PLACE = "green", "red", "cyan"
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
@@ -32,13 +33,13 @@ def list_prompts(prompts: o.PromptsFolder = None, as_json: o.Json = False) -> No
     """All prompts; an asterisk marks the version that an id alone stands for."""
     rows = _rows(PromptLibrary(prompts))
     if as_json:
-        print(json.dumps(rows, indent=2, ensure_ascii=False))  # noqa: T201
+        say(json.dumps(rows, indent=2, ensure_ascii=False))
         return
     table = Table(box=None, header_style="cyan", padding=(0, 2), pad_edge=False)
     for title in ("", "prompt", "text", "summary"):
         table.add_column(title, no_wrap=title != "summary")
     for row in rows:
-        said = Text(row["error"], "red") if row["error"] else Text(row["summary"])
+        said = styled(row["error"], style="red") if row["error"] else styled(row["summary"])
         mark = "*" if row["current"] else ""
         table.add_row(mark, row["name"], (row["sha256"] or "")[:12], said)
     _console().print(table)
@@ -48,8 +49,8 @@ def list_prompts(prompts: o.PromptsFolder = None, as_json: o.Json = False) -> No
 def show(name: o.PromptArgument, prompts: o.PromptsFolder = None) -> None:
     """A prompt's file, with its name and hashes above it."""
     prompt = PromptLibrary(prompts).load(name)
-    print(f"{prompt.name}\ntext {prompt.sha256}\nfile {prompt.file_sha256}\n")  # noqa: T201
-    print(prompt.source, end="")  # noqa: T201
+    say(f"{prompt.name}\ntext {prompt.sha256}\nfile {prompt.file_sha256}\n")
+    say(prompt.source, end="")
 
 
 @app.command()
@@ -58,13 +59,13 @@ def render(
 ) -> None:
     """The text as a model is told it, with values in the place of its inputs."""
     prompt = PromptLibrary(prompts).load(name)
-    print(prompt.render(inputs.variables(var, prompt.front.inputs)), end="")  # noqa: T201
+    say(prompt.render(inputs.variables(var, prompt.front.inputs)), end="")
 
 
 @app.command()
 def new(name: o.DraftName, parent: o.ParentName = None, prompts: o.PromptsFolder = None) -> None:
     """Begin a draft, from the current version or another."""
-    print(new_draft(PromptLibrary(prompts), name, parent))  # noqa: T201
+    say(new_draft(PromptLibrary(prompts), name, parent))
 
 
 @app.command("diff")
@@ -76,7 +77,7 @@ def show_diff(
     styles = {"+": ADDED, "-": REMOVED, "@": PLACE}
     for line in diff(library.load(old), library.load(new)):
         head = "bold" if line.startswith(("+++ ", "--- ")) else None
-        _console().print(Text(line, head or styles.get(line[:1], "")), soft_wrap=True)
+        _console().print(styled((line, head or styles.get(line[:1], ""))), soft_wrap=True)
 
 
 @app.command("lint")
@@ -86,15 +87,15 @@ def lint_prompts(
     """What is wrong with prompts, all of it; exit code 1 if any of it is an error."""
     found = _findings(PromptLibrary(prompts), names)
     if as_json:
-        print(json.dumps([asdict(f) for f in found], indent=2, ensure_ascii=False))  # noqa: T201
+        say(json.dumps([asdict(f) for f in found], indent=2, ensure_ascii=False))
     for finding in () if as_json else found:
         style = "red" if finding.severity == "error" else "yellow"
         where = f"{finding.prompt}: {finding.sentence}"
-        line = Text.assemble((f"{finding.severity:>7}  ", style), where)
+        line = styled((f"{finding.severity:>7}  ", style), where)
         _console().print(line, soft_wrap=True)
     errors = sum(f.severity == "error" for f in found)
     if not as_json:
-        print(f"{errors} errors, {len(found) - errors} warnings")  # noqa: T201
+        say(f"{errors} errors, {len(found) - errors} warnings")
     raise typer.Exit(1 if errors else 0)
 
 
@@ -102,7 +103,7 @@ def lint_prompts(
 def show_log(id: o.PromptId, prompts: o.PromptsFolder = None) -> None:
     """When and why versions were released and became current."""
     for entry in log(PromptLibrary(prompts), id):
-        line = Text.assemble((f"{entry.on}  {entry.name} ", "cyan"), f"{entry.what}: {entry.why}")
+        line = styled((f"{entry.on}  {entry.name} ", "cyan"), f"{entry.what}: {entry.why}")
         _console().print(line, soft_wrap=True)
 
 
@@ -131,7 +132,7 @@ def release_draft(name: o.DraftName, why: o.Why = "", prompts: o.PromptsFolder =
         found = " ".join(f.sentence for f in errors)
         raise InputError(f"{name} is not released, for lint finds: {found}")
     tools = tool_hashes(library.load(name))
-    print(release(library, name, why, _today(), tools))  # noqa: T201
+    say(release(library, name, why, _today(), tools))
 
 
 @app.command("promote")
@@ -157,7 +158,7 @@ def promote_version(
         current = library.load(prompt.id)
         because = "; ".join(filter(None, [passed(report, current, prompt), why]))
         promote(library, prompt.name, because, _today(), current.name)
-    print(f"{prompt.id} is now {prompt.name}")  # noqa: T201
+    say(f"{prompt.id} is now {prompt.name}")
 
 
 def _rows(library: PromptLibrary) -> list[dict[str, Any]]:
@@ -196,7 +197,7 @@ def _findings(library: PromptLibrary, names: Sequence[str] | None) -> list[Findi
 def _label(row: dict[str, Any], scores: dict[str, float]) -> Text:
     mark = " *" if row["current"] else ""
     known = "".join(f"  {suite} {score:.3f}" for suite, score in scores.items())
-    return Text.assemble(
+    return styled(
         (f"{row['name']}{mark}", "bold" if mark else ""), f"  {row['summary']}", (known, "cyan")
     )
 

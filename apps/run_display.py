@@ -7,17 +7,19 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from ..agent.report import Report
 from ..tools.formation.checking.verdict import Measure
 from ..tools.formation.contract import Group
 from ..tools.formation.units import length_text
+from .terminal import say, styled, under
 
 LONGEST = 600
 """Characters of an error message; a value given may be vast."""
 MAX_ROWS = 16
 """Robots shown in the arrival table; the rest are summed up."""
+COLUMN = 14
+"""Where texts begin; what precedes them is ours."""
 PLACES = {
     "around": "around",
     "cage": "caging",
@@ -48,7 +50,7 @@ STATUS_STYLE = {
 
 def show_report(console: Console, report: Report, folder: str) -> None:
     """Print a report for a person."""
-    console.print(Text(report.instruction, style="bold"))
+    console.print(styled(report.instruction, style="bold"))
     for target in report.targets:
         parts = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in target["parts"].items())
         box = ", ".join(f"{v:g}" for v in target["box"])
@@ -66,7 +68,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     if report.arrival is not None:
         _arrival(console, report)
     console.print(
-        Text.assemble((f"{report.status}: ", STATUS_STYLE[report.status]), report.message)
+        styled((f"{report.status}: ", STATUS_STYLE[report.status]), under(report.message, COLUMN))
     )
     if report.candidates:
         _choices(console, report.candidates)
@@ -84,10 +86,10 @@ def at_terminal() -> bool:
 
 def ask(what: str) -> str:
     """The person's answer to the question just shown; empty to leave it open."""
-    print(f"{what} (Enter leaves it open): ", end="", flush=True)  # noqa: T201
+    say(f"{what} (Enter leaves it open): ", end="")
     line = sys.stdin.buffer.readline()  # not input(): it chokes on bytes that are no text
     if not line.endswith(b"\n"):
-        print()  # noqa: T201
+        say("")
     return line.decode(errors="replace").strip()
 
 
@@ -96,14 +98,14 @@ def say_failed(message: str) -> None:
     message = " ".join(message.split())  # a path may hold a line break
     if len(message) > LONGEST:
         message = f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
-    print(f"formup: {message}", file=sys.stderr)  # noqa: T201
+    say(f"formup: {message}", error=True)
     if "--json" in sys.argv and sys.argv[1] in ("run", "resume", "deploy"):
         report = Report(status="failed", message=message, instruction="", model="offline")
-        print(report.model_dump_json(indent=2))  # noqa: T201
+        say(report.model_dump_json(indent=2))
 
 
 def _line(console: Console, name: str, text: str) -> None:
-    console.print(Text.assemble((f"{name:>12}  ", "cyan"), text))
+    console.print(styled((f"{name:>12}  ", "cyan"), under(text, COLUMN)))
 
 
 def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
@@ -113,7 +115,7 @@ def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
         table.add_column(title, justify="right" if title == "number" else "left")
     for choice in candidates:
         box = ", ".join(f"{v:.0f}" for v in choice["box"])
-        table.add_row(choice["id"].removeprefix("c"), Text(choice["label"]), box)
+        table.add_row(styled(choice["id"].removeprefix("c")), styled(choice["label"]), box)
     console.print(table)
 
 
@@ -176,7 +178,7 @@ def _arrival(console: Console, report: Report) -> None:
     rows = zip(arrival.robots, positions, arrival.observed, arrival.residual_px, strict=True)
     for robot, wanted, seen, off in islice(rows, MAX_ROWS):
         table.add_row(
-            robot,
+            styled(robot),
             f"{wanted[0]:.1f}, {wanted[1]:.1f}",
             f"{seen[0]:.1f}, {seen[1]:.1f}",
             f"{off:.2f} px",

@@ -1,6 +1,5 @@
 """A run at the command line: shown, its files written, the person's answers given to it."""
 
-import sys
 from pathlib import Path
 
 from rich.console import Console
@@ -14,6 +13,7 @@ from ..tools.store import write_whole
 from .main import INTERRUPTED
 from .run_display import ask, at_terminal, show_report
 from .run_files import Folder, write_files
+from .terminal import say
 
 MOST_ANSWERS = 5
 """Questions answered in one run at a terminal."""
@@ -71,8 +71,8 @@ class TerminalSession:
             text = f"{report.message} Files are missing: {error}"
             report = report.model_copy(update={"message": text})
         if self._as_json:
-            print(report.model_dump_json(indent=2))  # noqa: T201
-            print(f"formup: files in {self._folder.path}", file=sys.stderr)  # noqa: T201
+            say(report.model_dump_json(indent=2))
+            say(f"formup: files in {self._folder.path}", error=True)
         else:
             show_report(Console(highlight=False), report, str(self._folder.path))
         return report

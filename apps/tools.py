@@ -18,6 +18,7 @@ from ..tools.store import StoredWorld, picture_of, read_world, write_whole
 from ..tools.world import World
 from . import arguments as inputs
 from . import options as o
+from .terminal import say
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
@@ -30,10 +31,10 @@ def list_tools(as_json: o.Json = False) -> None:
             {"name": t.name, "description": t.description, "kind": t.kind, "parameters": t.schema}
             for t in TOOLS
         ]
-        print(json.dumps(listed, indent=2))  # noqa: T201
+        say(json.dumps(listed, indent=2))
         return
     for tool in TOOLS:
-        print(f"{tool.name:20} {tool.kind:8} {tool.description.split('. ')[0].rstrip('.')}")  # noqa: T201
+        say(f"{tool.name:20} {tool.kind:8} {tool.description.split('. ')[0].rstrip('.')}")
 
 
 @app.command("schema")
@@ -42,7 +43,7 @@ def print_schema(name: str) -> None:
     schemas = {"contract": compact_schema(Contract)} | {t.name: t.schema for t in TOOLS}
     if name not in schemas:
         raise InputError(f"There is no schema {name!r}. There are: {', '.join(schemas)}.")
-    print(json.dumps(schemas[name], indent=2))  # noqa: T201
+    say(json.dumps(schemas[name], indent=2))
 
 
 @app.command("call")
@@ -76,7 +77,7 @@ def call_tool(
         write_whole(written, png)
         data.setdefault("pictures", []).append(str(written))
     _save(result.world or context.world, context, state)
-    print(json.dumps(data, indent=2, ensure_ascii=False))  # noqa: T201
+    say(json.dumps(data, indent=2, ensure_ascii=False))
 
 
 def _save(world: World, context: Context, state: Path | None) -> None:

@@ -14,9 +14,12 @@ from ..agent.store.folder import PICTURES, FolderArtefacts, log_path, read_event
 from ..agent.store.protocol import Event
 from . import options as o
 from .run_display import STATUS_STYLE
+from .terminal import styled, under
 
 LONGEST = 300
 """Characters shown of one text; the trace has all of it."""
+COLUMN = 8
+"""Where they begin."""
 
 
 def show_trace(file: o.TraceFile) -> None:
@@ -28,11 +31,11 @@ def show_trace(file: o.TraceFile) -> None:
     picture = start.data["picture"]
     size = f"{picture['facts']['width']} x {picture['facts']['height']} px"
     where = picture["path"] or "a picture"
-    console.print(Text(f"{model_name(start.data)}{with_prompt}, on {where}, {size}"))
+    console.print(styled(f"{model_name(start.data)}{with_prompt}, on {where}, {size}"))
     pictures = FolderArtefacts(log_path(file).parent / PICTURES)
     turns = [i for i, event in enumerate(events) if event.kind == "turn"]
     for first, after in zip(turns, [*turns[1:], len(events)], strict=True):
-        console.print(Text(events[first].data["words"], style="bold"))
+        console.print(styled(events[first].data["words"], style="bold"))
         console.print(_steps(events[first:after], pictures))
         last = [e for e in events[first:after] if e.kind in ("end", "resume")][-1:]
         console.print(_end(last[0] if last else events[after - 1], file))
@@ -49,11 +52,11 @@ def _steps(events: Sequence[Event], pictures: FolderArtefacts) -> Table:
     for event in events:
         now = event.seconds
         if event.kind == "resume":
-            table.add_row(*[""] * (len(table.columns) - 1), Text("resumed", style="yellow"))
+            table.add_row(*[""] * (len(table.columns) - 1), styled("resumed", style="yellow"))
             before = 0.0
         if event.kind == "message":
             spent = _spent(event.data) if counts else ()
-            shown = Text("\n").join(_step(event.data, pictures))
+            shown = styled("\n").join(_step(event.data, pictures))
             table.add_row(f"{now:.2f} s", f"{now - before:.2f} s", *spent, shown)
             before = now
     return table
@@ -71,28 +74,28 @@ def _step(message: Mapping[str, Any], pictures: FolderArtefacts) -> list[Text]:
     lines: list[Text] = []
     text = _short(message.get("text", ""))
     if message["role"] == "user":
-        lines.append(Text.assemble(("person  ", "bold"), text))
+        lines.append(styled(("person  ", "bold"), text))
     elif message["role"] == "assistant":
         if text:
-            lines.append(Text.assemble(("model   ", "bold"), text))
+            lines.append(styled(("model   ", "bold"), text))
         for call in message.get("calls", ()):
             arguments = json.dumps(call["arguments"], ensure_ascii=False)
             named = (f"{call['name']} ", "cyan")
-            lines.append(Text.assemble(("call    ", "bold"), named, _short(arguments)))
+            lines.append(styled(("call    ", "bold"), named, _short(arguments)))
     else:
         error = (f"{message['error']}: ", "red") if message.get("error") else ""
         named = (f"{message['name']} ", "cyan")
-        lines.append(Text.assemble(("result  ", "bold"), named, error, text))
+        lines.append(styled(("result  ", "bold"), named, error, text))
     names = [pictures.name(image["sha256"]) or "missing" for image in message["images"]]
     root = pictures.folder.parent
-    lines += [Text.assemble(("picture ", "bold"), str(root / name)) for name in names]
+    lines += [styled(("picture ", "bold"), str(root / name)) for name in names]
     return lines
 
 
 def _end(last: Event, file: Path) -> Text:
     if last.kind != "end":
         text = f"broken off; formup resume {file} goes on"
-        return Text.assemble(("killed: ", "bold red"), text)
+        return styled(("killed: ", "bold red"), text)
     end = last.data
     usage, style = end["usage"], STATUS_STYLE.get(end["status"], "bold")
     counts = (
@@ -100,8 +103,8 @@ def _end(last: Event, file: Path) -> Text:
         f"{usage['input_tokens']:,}+{usage['output_tokens']:,} tokens, "
         f"{usage['cost_usd']:.4f} USD, {usage['seconds']:.2f} s"
     )
-    return Text.assemble((f"{end['status']}: ", style), _short(end["message"]), "\n", counts)
+    return styled((f"{end['status']}: ", style), _short(end["message"]), "\n", counts)
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
+    return under(text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ...", COLUMN)

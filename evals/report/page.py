@@ -6,7 +6,6 @@ still load nothing and run nothing.
 
 import base64
 import hashlib
-import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from ...tools.visible import visible
 from ..experiments.compare import compare
 from ..experiments.journal import read_manifest
 from .matrix import interval_points, matrix, signed_points
@@ -23,8 +23,6 @@ from .run_folder import Side
 from .task_cards import cards
 
 HERE = Path(__file__).parent
-CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff]")
-"""What no HTML file may hold: most control characters, halves of surrogate pairs."""
 TRIALS_OPEN = 4
 """Trials of a task that are shown at once; more are opened by hand."""
 
@@ -80,10 +78,10 @@ def _environment() -> Environment:
 
 
 def _clean(value: Any) -> Any:
-    """Text without what no file may hold; anything else, and HTML, as it is."""
+    """Text with its control characters visible; anything else, and HTML, as it is."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
-    return CONTROLS.sub("\ufffd", value.replace("\r\n", "\n"))
+    return visible(value.replace("\r\n", "\n"))
 
 
 def _tasks_and_trials(sides: Sequence[Side]) -> str:
