@@ -10,6 +10,7 @@ import traceback
 from ..tools.context import Context
 from ..tools.errors import ArgumentsError, FormupError, ToolError
 from ..tools.tool import Tool
+from ..tools.world import World
 from .messages import Call, ErrorKind, Result
 
 
@@ -60,11 +61,24 @@ async def answer(
             text = f"{tool.name} did not end within {seconds:g} s and was given up."
             return failed(call, "timeout", text)
         raise BrokenToolError(_where(tool, error)) from error
+    made = None
     if result.world is not None:
+        made = _plan_made(context.world, result.world)
         context.observed(result.world)
     return Result(
-        call_id=call.id, name=call.name, text=text, images=result.images, message=result.message
+        call_id=call.id,
+        name=call.name,
+        text=text,
+        facts={"plan_id": made} if made else None,
+        images=result.images,
+        message=result.message,
     )
+
+
+def _plan_made(before: World, after: World) -> str | None:
+    """The id of the plan that a call has made the current one."""
+    name = after.current or ""
+    return name if after.plans.get(name) is not before.plans.get(name) else None
 
 
 def failed(call: Call, kind: ErrorKind, text: str, error: ToolError | None = None) -> Result:

@@ -17,8 +17,10 @@ from .messages import (
     Message,
     Reply,
     Result,
+    doubts_told,
     failed_before,
     is_repeated,
+    plan_of_reply,
     unanswered,
 )
 from .model import Model, Request
@@ -81,14 +83,14 @@ class Turn:
     policy: Policy
     approved: Approval | None
 
-    def permit(self, call: Call, world: World) -> Decision:
+    def permit(self, call: Call, history: History) -> Decision:
         """What the policy says; a call that cannot be made does not trouble a person."""
         tool = tool_named(self.tools, call.name)
         if tool is None or (decision := self.policy.decide(tool)) == "allow":
             return "allow"
         if decision == "refuse":
             return "refuse"
-        if self.approved == Approval(call, self.plan_of(call, world)):
+        if self.approved == Approval(call, self.plan_of(call, history)):
             return "allow"
         try:
             tool.parse(call.arguments)
@@ -101,9 +103,9 @@ class Turn:
         tool = tool_named(self.tools, call.name)
         return tool is not None and tool.kind == "actuate"
 
-    def plan_of(self, call: Call, world: World) -> str | None:
+    def plan_of(self, call: Call, history: History) -> str | None:
         """The plan that a call which moves robots is for."""
-        named = call.arguments.get("plan_id") or world.current
+        named = call.arguments.get("plan_id") or plan_of_reply(history)
         return str(named) if self.moves(call) and named else None
 
     async def ask(self, messages: History) -> Reply:
@@ -189,17 +191,24 @@ async def _settle(
     if reason := calls_exhausted(talk.messages, turn.limits):
         return Stopped(talk.messages, talk.world, "limit", reason)
     before = failed_before(talk.messages)
-    decision = "skip" if before and turn.moves(call) else turn.permit(call, talk.world)
+    decision = "skip" if before and turn.moves(call) else turn.permit(call, talk.messages)
     if decision == "ask":
         await _shown(turn, talk, call)
-        return Paused(talk.messages, talk.world, call, turn.plan_of(call, talk.world))
+        return Paused(talk.messages, talk.world, call, turn.plan_of(call, talk.messages))
     if decision == "skip":
         talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
         return None
     if decision == "refuse":
         talk.add(refused(call, f"{call.name} may not be called here; do without it."))
         return _ended(talk)
-    context = replace(turn.context, world=talk.world, observed=talk.keep, moving=talk.moving)
+    context = replace(
+        turn.context,
+        world=talk.world,
+        doubted=doubts_told(talk.messages),
+        proposed=plan_of_reply(talk.messages),
+        observed=talk.keep,
+        moving=talk.moving,
+    )
     try:
         with _stopped(clock) if turn.moves(call) else nullcontext():
             result = await answer(turn.tools, context, call, turn.limits.tool_seconds)

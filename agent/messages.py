@@ -88,7 +88,7 @@ class Result(_Value):
     Attributes:
         error: what kind of mistake it reports, if any.
         cause: the kind of the tool's error, see `tools.errors.Kind`; what code reacts to.
-        facts: that error's numbers and ids.
+        facts: that error's numbers and ids; else `plan_id`, of the plan that was made.
         message: what the person is told, where the call has ended the turn.
     """
 
@@ -132,6 +132,24 @@ def failed_before(history: Sequence[Message]) -> str | None:
         if not isinstance(message, Result):
             break
     return None
+
+
+def plan_of_reply(history: Sequence[Message]) -> str | None:
+    """The id of the plan made last among the calls of the last reply answered so far."""
+    for message in reversed(history):
+        if not isinstance(message, Result):
+            break
+        if not message.error and message.facts:
+            return message.facts.get("plan_id")
+    return None
+
+
+def doubts_told(history: Sequence[Message]) -> frozenset[str]:
+    """The doubts that the model knew of when it gave its last reply, of this turn."""
+    turn = turn_of(history)
+    last = max((i for i, m in enumerate(turn) if isinstance(m, Reply)), default=0)
+    told = (m for m in turn[:last] if isinstance(m, Result) and m.cause == "doubt")
+    return frozenset(doubt for m in told for doubt in (m.facts or {}).get("doubts", ()))
 
 
 def turn_of(history: Sequence[Message]) -> Sequence[Message]:

@@ -15,7 +15,7 @@ from ..tools.formation.units import in_metres, with_metres
 from ..tools.perception.referring.attributes import Candidate
 from ..tools.perception.target_prompt import Box
 from ..tools.world import Target, World, rounded_rings
-from .messages import History, Message, Reply, Result, turn_of
+from .messages import History, Message, Reply, Result, failed_before, turn_of
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 
 Status = Literal[
@@ -230,10 +230,12 @@ def _status(
     if isinstance(outcome, Cancelled):
         return "stopped", text
     last = outcome.messages[-1]
-    given_up = isinstance(last, Result) and last.name == "report_impossible"
-    if plan is None or not plan.verdict.certified or given_up:
+    if isinstance(last, Result) and last.name == "report_impossible":
         return "impossible", text
-    return ("planned" if new else "answered"), text
+    if plan is not None and plan.verdict.certified:
+        return ("planned" if new else "answered"), text
+    gave_up = new or not text.strip() or failed_before(outcome.messages[:-1])
+    return ("answered" if isinstance(last, Reply) and not gave_up else "impossible"), text
 
 
 def _with_arrival(outcome: Outcome, arrival: Arrival, text: str) -> str:

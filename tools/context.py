@@ -149,6 +149,8 @@ class Context:
 
     Attributes:
         words: what the person said last; the contract is held against it.
+        doubted: doubts that the model was told of in this turn, which its `reading` may answer.
+        proposed: id of the plan that an earlier call of the same reply made.
         observed: puts a world in place at once, because what it says was observed and holds even
             if the call fails or is cut off: measured things, poses of robots.
         moving: is called with a plan's id before the first motion; raising prevents it.
@@ -158,6 +160,8 @@ class Context:
     services: Services
     settings: Settings = USUAL
     words: str = ""
+    doubted: frozenset[str] = frozenset()
+    proposed: str | None = None
     observed: Callable[[World], None] = _ignore
     moving: Callable[[str], None] = _ignore
 

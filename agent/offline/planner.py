@@ -81,10 +81,8 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if faced:
         contract["groups"] = [_group_facing(reading, robots, ids)]
     elif form:
-        contract = {
-            "groups": [_group_drawn(reading, form, robots, ids, history)],
-            "reading": READING,
-        }
+        contract["groups"] = [_group_drawn(reading, form, robots, ids, history)]
+        contract |= {"reading": READING} if _was_doubted(history) else {}
     if reading.robot_radius is not None:
         contract["robot_radius"] = reading.robot_radius
     if task.metres_per_pixel is not None:
@@ -159,7 +157,12 @@ def _group_facing(reading: Reading, robots: int, targets: list[str]) -> dict[str
 
 
 def _refusals(history: History) -> int:
-    return sum(isinstance(m, Result) and m.name == "propose_formation" for m in history)
+    """How many places beside a thing had no room."""
+    return sum(isinstance(m, Result) and m.cause == "no_room_beside" for m in history)
+
+
+def _was_doubted(history: History) -> bool:
+    return any(isinstance(m, Result) and m.cause == "doubt" for m in history)
 
 
 def _left_off(result: Result, history: History) -> str:
@@ -262,6 +265,8 @@ def _target_ids(task: Task) -> list[str]:
 def _after_proposal(task: Task, result: Result, history: History, before: History) -> Reply:
     if result.error:
         if result.cause == "no_room_beside" and _may_move_on(task, history):
+            return _begin(task, history, before)
+        if result.cause == "doubt" and form_in(task.instruction)[0]:
             return _begin(task, history, before)
         if result.cause == "low_confidence":
             return _call("ask_user", {"question": result.text})

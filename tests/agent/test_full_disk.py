@@ -48,8 +48,7 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
 def agent(propose: Call) -> Agent:
     replies = [
         Reply(calls=(Call(id="l", name="look", arguments={}),)),
-        Reply(calls=(propose,)),
-        Reply(calls=(Call(id="d", name="deploy", arguments={}),)),
+        Reply(calls=(propose, Call(id="d", name="deploy", arguments={}))),
         Reply(calls=(Call(id="k", name="look", arguments={}),)),
         Reply(text="They stand there."),
     ]

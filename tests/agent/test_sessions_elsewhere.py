@@ -107,7 +107,8 @@ def test_a_fleet_does_not_outlive_the_loop_it_was_opened_in(
         services = made.context.services
         await services.fleets["simulated"].stop()
         await services.close_fleets()
-        return await script(DEPLOY).asay(made, "Go")
+        go = DEPLOY.model_copy(update={"arguments": {"plan_id": made.world.current}})
+        return await script(go).asay(made, "Go")
 
     held = asyncio.run(stopped())
     assert (held.report.status, held.report.arrival) == ("failed", None)

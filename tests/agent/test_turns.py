@@ -1,5 +1,6 @@
 """Turns of a session: what a person says next, and a process that is killed anywhere in them."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -47,12 +48,11 @@ def deciding(request: Request) -> Reply:
     replies = sum(isinstance(m, Reply) for m in turn)
     number = sum(isinstance(m, User) for m in request.messages)
     arguments = proposal("t1", RED) if number == 1 else proposal("t2", BLUE)
-    calls = (
-        call(f"p{number}", "propose_formation", **arguments),
-        call(f"d{number}", "deploy"),
-    )
-    if replies < 2:
-        return Reply(calls=calls[replies : replies + 1])
+    if replies == 0:
+        return Reply(calls=(call(f"p{number}", "propose_formation", **arguments),))
+    if replies == 1:
+        plan_id = json.loads(turn[-1].text)["plan_id"]
+        return Reply(calls=(call(f"d{number}", "deploy", plan_id=plan_id),))
     return Reply(text=f"Turn {number} is done.")
 
 

@@ -8,13 +8,17 @@ from typing import Any
 import pytest
 from formup.tools.builtin import TOOLS
 from formup.tools.context import Context, Settings
+from formup.tools.errors import ToolError
 from formup.tools.perception.image import Picture
 from formup.tools.tool import ToolResult
 from formup.tools.world import World
 
 
 class ToolCalls:
-    """Calls tools one after another, and keeps the world and what was observed as the loop does."""
+    """Calls tools one after another, and keeps the world and what was observed as the loop does.
+
+    All count as of one reply, which knows of the doubts that calls before had.
+    """
 
     def __init__(
         self, picture: Picture, words: str = "", world: World | None = None, **settings: Any
@@ -41,9 +45,16 @@ class ToolCalls:
 
     async def acall(self, name: str, **arguments: Any) -> ToolResult:
         tool = next(t for t in TOOLS if t.name == name)
-        result = await tool.call(self.context, arguments)
+        try:
+            result = await tool.call(self.context, arguments)
+        except ToolError as error:
+            doubted = self.context.doubted.union(error.facts.get("doubts", ()))
+            self.context = replace(self.context, doubted=doubted)
+            raise
         if result.world is not None:
             self.keep(result.world)
+        if tool.kind == "commit":
+            self.context = replace(self.context, proposed=self.world.current)
         return result
 
     def call(self, name: str, **arguments: Any) -> ToolResult:

@@ -93,10 +93,14 @@ def _check_against_words(context: Context, contract: Contract) -> None:
     free = settings.clearance is settings.robot_radius is None
     scale = context.world.metres_per_pixel if free else None  # else lengths are fixed already
     found = doubts(context.words, contract, counted=asked is not None, scale=scale)
-    if found and not contract.reading:
+    if found and not (contract.reading and context.doubted.issuperset(found)):
+        doubt = f"A doubt: {'; '.join(found)}."
         raise ToolError(
-            f"A doubt: {'; '.join(found)}. Propose again with a contract that says what is meant; "
-            "if this one does, say why in its `reading`."
+            f"{doubt} Propose again with a contract that says what is meant; if this one does, "
+            "say why in its `reading`.",
+            "doubt",
+            doubts=found,
+            plain=doubt,
         )
 
 
@@ -147,7 +151,10 @@ async def deploy(
         tell: what to tell the person once all have arrived, which ends the run; left out where
             more is to be done.
     """
-    node = context.world.plan(plan_id)
+    if plan_id is None and context.proposed is None:
+        known = ", ".join(context.world.plans) or "none yet: propose a formation first"
+        raise ToolError(f"No plan was made in this reply; name plan_id. Plans: {known}.")
+    node = context.world.plan(plan_id or context.proposed)
     _check_may_move(context, node.plan)
     if plan_id is None and (advice := _to_see(context.world, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})

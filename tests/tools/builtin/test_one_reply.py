@@ -1,6 +1,7 @@
 """Propose and deploy in one reply, doubts about the contract, and masks that must be looked at."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,7 +85,9 @@ def test_without_words_for_the_person_the_run_goes_on(begin: Begin) -> None:
 
 def test_there_must_be_a_plan_and_it_must_be_certified(begin: Begin) -> None:
     work = begin()
-    with pytest.raises(ToolError, match=r"no plan\. Plans: none yet"):
+    with pytest.raises(
+        ToolError, match=r"No plan was made in this reply; name plan_id\. Plans: none yet"
+    ):
         work.call("deploy")
     crowded = propose(work, positions=[[10, 10]] * 6)
     assert not crowded.data["certified"]
@@ -149,8 +152,31 @@ def test_a_contract_against_the_plain_words_is_asked_about(begin: Begin) -> None
         propose(work, robots=4)
 
 
+def test_deploy_without_an_id_takes_no_plan_of_an_earlier_reply(begin: Begin) -> None:
+    work = begin()
+    plan = propose(work).data["plan_id"]
+    work.context = replace(work.context, proposed=None)
+    with pytest.raises(ToolError, match=rf"name plan_id\. Plans: {plan}\."):
+        work.call("deploy", tell="done")
+    assert work.moved == []
+
+
+def test_a_reading_given_before_any_doubt_settles_nothing(begin: Begin) -> None:
+    work = begin("Put 6 robots at the corners of the box")
+    group = {"relation": "around", "targets": ["t1"], "robots": 6}
+    contract: dict[str, Any] = {"groups": [group], "reading": "A ring is what is meant."}
+    for robots in (6, 4):  # the second has a doubt of its own beside the one that was answered
+        contract["groups"] = [group | {"robots": robots}]
+        with pytest.raises(ToolError, match="A doubt") as caught:
+            work.call("propose_formation", contract=contract, targets=[TARGET])
+        assert caught.value.kind == "doubt"
+    assert work.world.plans == {}
+
+
 def test_a_reading_settles_the_doubt_and_stays_in_the_contract(begin: Begin) -> None:
     work = begin("Put 6 robots at the corners of the box", robots=6)
+    with pytest.raises(ToolError, match="A doubt"):
+        propose(work)
     contract = {
         "groups": [{"relation": "around", "targets": ["t1"], "robots": 6}],
         "reading": "The box has four corners; the person said a ring will do.",
@@ -174,6 +200,7 @@ def test_where_a_distance_is_named_the_outline_is_seen_first(begin: Begin, tmp_p
     assert held.data["why"] == f"Look first: {made.data['look_first']}"
     assert work.world.arrivals == {}
     again = begin(world=stored(work.world, tmp_path))
+    again.context = replace(again.context, proposed=made.data["plan_id"])
     assert again.call("deploy", tell="They stand.").data == held.data
     assert work.call("deploy", plan_id=made.data["plan_id"], tell="They stand.").message
 
