@@ -14,7 +14,7 @@ from ..tools.errors import FleetError, InputError, ToolError
 from ..tools.formation.contract import Contract
 from ..tools.perception.image import load_picture
 from ..tools.schema import compact_schema
-from ..tools.store import StoredWorld, picture_of, read_world, write_whole
+from ..tools.store import StoredWorld, parse_json, picture_of, read_world, write_whole
 from ..tools.world import World
 from . import arguments as inputs
 from . import options as o
@@ -94,7 +94,7 @@ def _save(world: World, context: Context, state: Path | None) -> None:
 
 def _arguments(text: str) -> dict[str, Any]:
     try:
-        arguments: Any = json.loads(text)
+        arguments = parse_json(text, "--args")
     except (ValueError, RecursionError) as error:
         raise InputError(f"--args is not JSON: {error}.") from None
     if not isinstance(arguments, dict):

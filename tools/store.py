@@ -66,10 +66,10 @@ def read_world(path: Path) -> StoredWorld:
     """Read a state file or a plan.json.
 
     Raises:
-        StorageError: missing, no JSON, of another format, damaged or altered.
+        InputError: missing, no JSON, of another format, damaged or altered.
     """
     try:
-        data: Any = json.loads(read_text(path))
+        data = parse_json(read_text(path), path)
     except (ValueError, RecursionError):
         raise StorageError(f"{path} is not JSON; a file written by formup is needed.") from None
     if not isinstance(data, dict) or cast(Any, data).get("format") != FORMAT:
@@ -127,6 +127,28 @@ def picture_of(stored: StoredWorld, path: Path, given: Picture | None = None) ->
 def _digest(content: dict[str, Any]) -> str:
     """SHA-256 of a file's content as it is written, but for the digest in it."""
     return hashlib.sha256(to_json(content | {"digest": ""})).hexdigest()
+
+
+def parse_json(text: str, source: object) -> Any:
+    """The value of a JSON text that all readers take in the same way.
+
+    Args:
+        source: what an error names: a file, or an option.
+
+    Raises:
+        InputError: a name that an object has twice.
+        ValueError, RecursionError: it is no JSON.
+    """
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            names = [name for name, _ in pairs]
+            twice = next(name for name in names if names.count(name) > 1)
+            raise InputError(f"{source} has {twice!r} twice in one object; keep one of them.")
+        return found
+
+    return json.loads(text, object_pairs_hook=once)
 
 
 def read_text(path: Path) -> str:

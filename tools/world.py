@@ -50,6 +50,8 @@ def _read_outline(value: Any) -> Outline:
     if isinstance(value, Outline):
         return value
     try:
+        if unknown := set(value) - {"outline", "holes"}:
+            raise ValueError(f"it has {min(unknown)!r}, which no outline has")
         polygon = Polygon(value["outline"], value.get("holes", ()))
         if not polygon.is_valid:
             raise ValueError("its rings cross, or are not finite")

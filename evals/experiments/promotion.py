@@ -3,14 +3,13 @@
 A report of `formup eval compare` names the two texts it is about; it says nothing about others.
 """
 
-import json
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ...prompts import Prompt
 from ...tools.errors import InputError
-from ...tools.store import read_text
+from ...tools.store import parse_json, read_text
 from ...tools.tool import violations
 
 
@@ -68,7 +67,7 @@ def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
 
 def _read_comparison(path: Path) -> Comparison:
     try:
-        return Comparison.model_validate(json.loads(read_text(path)))
+        return Comparison.model_validate(parse_json(read_text(path), path))
     except ValidationError as error:
         what = f"{path} is no report of `formup eval compare`"
         raise InputError(f"{what}: {violations(error)}") from None

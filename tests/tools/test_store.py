@@ -2,10 +2,10 @@
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from shutil import copyfile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 from formup.evals.tasks.suites import load_suite
@@ -25,7 +25,9 @@ Begin = Callable[..., "ToolCalls"]
 
 @pytest.fixture(scope="module")
 def world() -> World:
-    outline = next(t for t in load_suite("photos").tasks if t.picture == PHOTO).things[0].outline
+    outline = (
+        next(t for t in load_suite("photos").tasks if t.picture.samefile(PHOTO)).things[0].outline
+    )
     assert len(outline.polygon.interiors) == 2
     target = Target(
         id="t1",
@@ -130,6 +132,41 @@ def test_any_alteration_shows(
     file.write_text(json.dumps(data))
     with pytest.raises(StorageError, match="altered"):
         read_world(file)
+
+
+def test_unknown_and_repeated_names_are_refused(world: World, tmp_path: Path) -> None:
+    file = written(tmp_path / "s.json", world)
+    text = file.read_text()
+    paths = [path for path in objects(json.loads(text)) if path[-1:] not in OPEN]
+    assert len(paths) > 10
+    for path in paths:
+        data = json.loads(text)
+        part = data
+        for key in path:
+            part = part[key]
+        part["king"] = 1
+        file.write_text(json.dumps(data))
+        with pytest.raises(StorageError, match=r"damaged: .*king"):
+            read_world(file)
+    for name in ("digest", "outline", "certified"):
+        file.write_text(text.replace(f'"{name}":', f'"{name}": 1, "{name}":', 1))
+        with pytest.raises(InputError, match=f"s\\.json has '{name}' twice in one object"):
+            read_world(file)
+
+
+OPEN = [("parts",), ("measures",)]
+"""Mappings whose names are anybody's."""
+
+
+def objects(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    """The places of all objects in a JSON value."""
+    if isinstance(value, dict):
+        yield path
+        for name, part in cast(dict[str, Any], value).items():
+            yield from objects(part, (*path, name))
+    elif isinstance(value, list):
+        for number, part in enumerate(cast(list[Any], value)):
+            yield from objects(part, (*path, number))
 
 
 def test_positions_altered_in_the_file_are_refused(world: World, tmp_path: Path) -> None:
