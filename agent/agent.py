@@ -26,14 +26,8 @@ from .outcomes import Cancelled, Outcome, Paused, Stopped
 from .policy import Policy
 from .providers.registry import model_named
 from .report import Report, make_report
-from .session import (
-    FORMAT,
-    LogRecorder,
-    Run,
-    Show,
-    answered_by,
-    picture_facts,
-)
+from .session import LogRecorder, Run, Show, answered_by, picture_facts
+from .session_start import FORMAT
 from .store.folder import PICTURES, FolderArtefacts, FolderLog
 from .wrappers.telemetry import traced_model, traced_run, traced_tool
 from .wrappers.two_stages import offered, prompt_named, staged

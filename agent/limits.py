@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, fields
 
+from pydantic import ConfigDict
+
 from ..tools.errors import InputError
 from .messages import History, Reply, Result, turn_of
 
@@ -25,6 +27,8 @@ class Limits:
     Raises:
         InputError: one that is not above 0.
     """
+
+    __pydantic_config__ = ConfigDict(extra="forbid")  # where they are read from a log
 
     requests: int | None = 20
     tool_calls: int | None = 60

@@ -22,10 +22,10 @@ from .loop import Approval, Recorder
 from .messages import HISTORY, History, Message, Reply, Result, unanswered
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .report import Report, make_report
-from .store.folder import PICTURES, FolderArtefacts, log_path, read_events
+from .session_start import read_session
+from .store.folder import PICTURES, FolderArtefacts, log_path
 from .store.protocol import Event, EventLog
 
-FORMAT = "formup-session-1"
 GOES_ON = ("turn", "resume", "message")
 """Events after which a turn that had ended is under way again."""
 Show = Callable[[Message], None]
@@ -84,12 +84,10 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     """The state after all events.
 
     Raises:
-        InputError: they are no session, or a picture of a message is missing.
+        InputError: nothing was said, or a picture of a message is missing.
         ValidationError, KeyError, TypeError, ValueError: they are damaged.
     """
     facts = events[0].data
-    if events[0].kind != "session" or facts["format"] != FORMAT:
-        raise ValueError
     world = began = World.model_validate({"picture": facts["picture"]["facts"]})
     settings, words, end = Settings(), "", None
     lines: list[Mapping[str, Any]] = []
@@ -235,12 +233,10 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
     path = log_path(Path(path))
     artefacts = FolderArtefacts(path.parent / PICTURES)
     try:
-        events = read_events(path)
+        events = read_session(path)
         state = fold(events, artefacts)
         outcome = _outcome(state)
         prompt, prompts = state.facts["prompt"], tuple(state.facts["prompts"])
-        for facts in (prompt, *prompts):
-            prompt_name(facts)  # that can be read
     except StorageError:
         raise
     except InputError as error:

@@ -10,8 +10,10 @@ from rich.table import Table
 from rich.text import Text
 
 from ..agent.session import model_name, prompt_name
-from ..agent.store.folder import PICTURES, FolderArtefacts, log_path, read_events
+from ..agent.session_start import read_session
+from ..agent.store.folder import PICTURES, FolderArtefacts, log_path
 from ..agent.store.protocol import Event
+from ..tools.errors import InputError
 from . import options as o
 from .run_display import STATUS_STYLE
 from .terminal import styled, under
@@ -24,7 +26,14 @@ COLUMN = 8
 
 def show_trace(file: o.TraceFile) -> None:
     """Show a session step by step: what was said and called, times, tokens, cost, pictures."""
-    start, *events = read_events(file)
+    events = read_session(file)
+    try:
+        _show(file, *events)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError):
+        raise InputError(f"{file} is damaged; it is no whole session that formup wrote.") from None
+
+
+def _show(file: Path, start: Event, *events: Event) -> None:
     console = Console(highlight=False)
     prompt = prompt_name(start.data["prompt"])
     with_prompt = f", prompt {prompt}" if prompt else ""

@@ -8,7 +8,7 @@ from ...tools.errors import ModelError
 from ..messages import Reply
 from ..model import Request
 from ..session import message_facts, model_name, prompt_name
-from ..store.folder import read_events
+from ..session_start import read_session
 
 LONGEST = 120
 """Characters of a message that an error repeats."""
@@ -27,7 +27,7 @@ class ReplayModel:
     """
 
     def __init__(self, path: Path) -> None:
-        start, *events = read_events(path)
+        start, *events = read_session(path)
         self._path = path
         self._lines = [event.data for event in events if event.kind == "message"]
         self.name = model_name(start.data)

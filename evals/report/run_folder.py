@@ -102,9 +102,9 @@ class Side:
             return None
         try:
             lines = [e.data for e in read_events(path) if e.kind == "message"]
-        except InputError:
+            return [utterance for line in lines for utterance in _utterances(line)]
+        except (InputError, AttributeError, KeyError, TypeError):
             return [Utterance("", "", "The trace cannot be read.")]
-        return [utterance for line in lines for utterance in _utterances(line)]
 
     def _file(self, row: TrialRow, suffix: str) -> Path:
         return self.folder / ATTEMPTS / f"{attempt_name(row)}.{suffix}"

@@ -18,8 +18,10 @@ from formup.agent.providers.registry import model_named
 from formup.agent.session import Run, fold, load_run, read_messages
 from formup.agent.store.folder import FolderArtefacts, read_events
 from formup.agent.wrappers.doubles import FunctionModel, ScriptedModel
+from formup.agent.wrappers.replay import ReplayModel
+from formup.apps.trace import show_trace
 from formup.tools.context import Settings
-from formup.tools.errors import InputError
+from formup.tools.errors import InputError, StorageError
 from formup.tools.perception.image import Picture, load_picture, picture_from_array
 from formup.tools.perception.target_prompt import TargetPrompt
 
@@ -242,6 +244,15 @@ ALTERED: list[tuple[str, dict[str, Any]]] = [
     ("session", {"format": "formup-trace-1"}),
     ("session", {"prompt": {"id": 3}}),
     ("session", {"prompts": 3}),
+    ("session", {"policy": [["*", "allow"], ["deploy", "whatever"]]}),
+    ("session", {"policy": "deploy=allow"}),
+    ("session", {"policy": [["deploy"]]}),
+    ("session", {"limits": {"requests": "20"}}),
+    ("session", {"limits": {"king": 1}}),
+    ("session", {"limits": {"requests": -1}}),
+    ("session", {"model": None}),
+    ("session", {"planner": 3}),
+    ("session", {"king": 1}),
     ("session", {"picture": {"facts": 3}}),
     ("turn", {"settings": {"robots": "x"}}),
     ("turn", {"settings": {"king": 1}}),
@@ -265,9 +276,29 @@ def test_an_altered_log_is_one_sentence(
     path = tmp_path / "trace.jsonl"
     run(path, coins, limits=Limits(requests=2))
     alter(path, kind, **changes)
-    with pytest.raises(InputError) as caught:
-        load_run(path)
-    assert str(caught.value).count("\n") == 0
+    for read in (load_run, show_trace) if kind == "session" else (load_run,):
+        with pytest.raises(InputError) as caught:
+            read(path)
+        assert str(caught.value).startswith(str(tmp_path))
+        assert str(caught.value).count("\n") == 0
+
+
+def test_a_log_without_its_beginning_is_refused(coins: Picture, tmp_path: Path) -> None:
+    path = tmp_path / "trace.jsonl"
+    run(path, coins, limits=Limits(requests=2))
+    lines = [json.loads(line) for line in path.read_text().splitlines()][1:]
+    path.write_text("".join(json.dumps(line | {"n": line["n"] - 1}) + "\n" for line in lines))
+    for read in (load_run, ReplayModel, show_trace):
+        with pytest.raises(StorageError, match="does not begin with a line that formup wrote"):
+            read(path)
+
+
+def test_what_a_trace_shows_may_be_damaged(coins: Picture, tmp_path: Path) -> None:
+    path = tmp_path / "trace.jsonl"
+    run(path, coins, limits=Limits(requests=2))
+    alter(path, "message", calls=[3], role="assistant")
+    with pytest.raises(InputError, match="is damaged"):
+        show_trace(path)
 
 
 def test_a_picture_of_a_message_that_was_changed_is_refused(coins: Picture, tmp_path: Path) -> None:
