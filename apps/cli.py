@@ -2,8 +2,9 @@
 
 from collections.abc import Generator, Mapping
 from contextlib import ExitStack, contextmanager
+from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="formup",
-    help="Say where a team of robots should stand; get a certified formation, watch it arrive.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -38,6 +38,22 @@ app = typer.Typer(
 app.add_typer(tools.app, name="tools", help="The tools the model sees.")
 app.add_typer(evaluate.app, name="eval", help="How good it is.")
 app.add_typer(prompts.app, name="prompts", help="What models are told, in versions.")
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        say(f"formup {version('formup')}")
+        raise typer.Exit
+
+
+@app.callback()
+def formup(
+    shown: Annotated[
+        bool,
+        typer.Option("--version", callback=_say_version, is_eager=True, help="Say which this is."),
+    ] = False,
+) -> None:
+    """Say where a team of robots should stand; get a certified formation, watch it arrive."""
 
 
 @app.command()

@@ -8,11 +8,10 @@ from rich.console import Console
 from rich.table import Table
 
 from ..evals.experiments.compare import compare as compared
-from ..evals.experiments.comparison import Comparison, Difference, Metric, Range
+from ..evals.experiments.comparison import Comparison, Metric, Range
 from ..evals.experiments.gate import MARGIN, Rise
 from ..evals.experiments.journal import merge, read_rows
 from ..evals.experiments.trials import Arm, TrialRow
-from ..evals.statistics.power import Needed
 from ..evals.tasks.stored_suite import join_stored
 from ..tools.errors import InputError
 from ..tools.store import write_whole
@@ -30,8 +29,8 @@ STYLE = {
 }
 
 
-def _command(concluded: Callable[[Console, Comparison], int]) -> Callable[..., None]:
-    """The command that compares two runs and ends as `concluded` says, with its exit code."""
+def _command(concluded: Callable[[Comparison], int]) -> Callable[..., None]:
+    """The command that compares two runs, and ends with the exit code that `concluded` gives."""
 
     def command(
         a: o.OldRun,
@@ -48,23 +47,22 @@ def _command(concluded: Callable[[Console, Comparison], int]) -> Callable[..., N
         if as_json:
             say(made.model_dump_json(indent=2))
         _print_comparison(console, made)
-        raise typer.Exit(concluded(console, made))
+        _print_conclusion(console, made)
+        raise typer.Exit(concluded(made))
 
     command.__doc__ = concluded.__doc__
     return command
 
 
 @_command
-def compare(console: Console, made: Comparison) -> int:
-    """Whether B is better or worse than A, or how many trials would settle it."""
-    _conclude(console, made.outcome, (), made.overall.settled_by, made.overall)
+def compare(made: Comparison) -> int:
+    """Whether B is better or worse than A, whether it may replace A, and what would settle that."""
     return 0
 
 
 @_command
-def gate(console: Console, made: Comparison) -> int:
-    """Whether B may replace A: exit code 0 pass, 1 block, 3 inconclusive."""
-    _conclude(console, made.verdict, made.reasons, made.settled_by, made.overall)
+def gate(made: Comparison) -> int:
+    """The same, and whether B may replace A by the exit code: 0 pass, 1 block, 3 inconclusive."""
     return EXIT[made.verdict]
 
 
@@ -176,15 +174,17 @@ def _plain_table(first: str, *titles: str) -> Table:
     return table
 
 
-def _conclude(
-    console: Console,
-    word: str,
-    reasons: tuple[str, ...],
-    settled: Needed | None,
-    overall: Difference,
-) -> None:
-    console.print(styled((word, STYLE[word]), f": {'; '.join(reasons)}" if reasons else ""))
-    if settled is not None:
+def _print_conclusion(console: Console, made: Comparison) -> None:
+    """Whether there is a difference, whether B may replace A, and what would settle either."""
+    outcome, verdict, reasons = made.outcome, made.verdict, "; ".join(made.reasons)
+    console.print(styled("difference: ", (outcome, STYLE[outcome])))
+    console.print(
+        styled("gate: ", (verdict, STYLE[verdict]), f": {reasons}" if made.reasons else "")
+    )
+    overall = made.overall
+    for what, settled in (("difference", overall.settled_by), ("gate", made.settled_by)):
+        if settled is None:
+            continue
         each = round(overall.pairs / overall.tasks)
         ways = [
             f"{settled.trials:,} trials of each of these {overall.tasks} tasks"
@@ -193,7 +193,8 @@ def _conclude(
             f"{settled.tasks:,} tasks with {each} trials of each" if settled.tasks else "",
         ]
         text = " or ".join(filter(None, ways)) or "more tasks and trials than can be run"
-        console.print(f"to tell {100 * settled.difference:.1f} points (power .8): {text}")
+        points = f"{100 * settled.difference:.1f} points (power .8)"
+        console.print(f"to settle the {what}, telling {points}: {text}")
 
 
 def _shares(found: Range | None) -> str:

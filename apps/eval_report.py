@@ -5,6 +5,7 @@ from pathlib import Path
 from ..evals.experiments.journal import read_rows
 from ..evals.report.page import page
 from ..evals.report.run_folder import Side, side
+from ..prompts import PromptLibrary
 from ..tools.errors import InputError
 from ..tools.store import write_whole
 from . import eval_options as e
@@ -21,15 +22,16 @@ def report(
     arm_a: o.OldArm = None,
     arm_b: o.NewArm = None,
     out: e.PageFile = None,
+    prompts: o.PromptsFolder = None,
 ) -> None:
     """A run as one HTML file: counts by slice, pictures with robots and misses, transcripts.
 
-    With --against, RUN is A and the other one B, side by side with their difference. Held-out
-    tasks show their scores alone.
+    With --against, RUN is A and the other one B, side by side with their difference and that of
+    their prompts. Held-out tasks show their scores alone.
     """
     path = out or run / NAME
     sides = _sides(run, against, arm_a, arm_b)
-    write_whole(path, page(sides).encode())
+    write_whole(path, page(sides, PromptLibrary(prompts)).encode())
     say(path)
 
 

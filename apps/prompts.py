@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from ..evals.experiments.promotion import passed
+from ..evals.experiments.promotion import passed, verdict_of
 from ..evals.experiments.tool_versions import retooled, tool_hashes
 from ..evals.tasks.prompt_leaks import leaks
 from ..prompts import Prompt, PromptError, PromptLibrary
@@ -124,15 +124,29 @@ def tree(prompts: o.PromptsFolder = None, baselines: o.Baselines = None) -> None
 
 
 @app.command("release")
-def release_draft(name: o.DraftName, why: o.Why = "", prompts: o.PromptsFolder = None) -> None:
-    """Freeze a draft as the next version; lint must find no error in it."""
+def release_draft(
+    name: o.DraftName,
+    why: o.Why = "",
+    report: o.ComparisonFile = None,
+    prompts: o.PromptsFolder = None,
+) -> None:
+    """Freeze a draft as the next version; lint must find no error in it.
+
+    What a comparison says of the draft goes into the changelog.
+    """
     library = PromptLibrary(prompts)
     errors = [f for f in _findings(library, [name]) if f.severity == "error"]
     if errors:
         found = " ".join(f.sentence for f in errors)
         raise InputError(f"{name} is not released, for lint finds: {found}")
-    tools = tool_hashes(library.load(name))
-    say(release(library, name, why, _today(), tools))
+    draft, verdict, sentence = library.load(name), "pass", ""
+    if report is not None:
+        verdict, sentence = verdict_of(report, draft)
+        why = f"{why} ({sentence})" if why.strip() else ""
+    released = release(library, name, why, _today(), tool_hashes(draft))
+    say(released)
+    if verdict != "pass":
+        say(f"formup: {released} is released, but not passed: {sentence}.", error=True)
 
 
 @app.command("promote")

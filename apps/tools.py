@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import typer
 
+from ..agent.store.folder import suffix_of
 from ..tools.builtin import TOOLS
 from ..tools.context import Context, Settings
 from ..tools.errors import FleetError, InputError, ToolError
@@ -72,9 +73,9 @@ def call_tool(
         raise
     data = dict(result.data)
     folder = state.parent if state else Path()
-    for number, png in enumerate(result.images, start=1):
-        written = folder / f"{name}-{number}.png"
-        write_whole(written, png)
+    for number, shown in enumerate(result.images, start=1):
+        written = folder / f"{name}-{number}.{suffix_of(shown)}"
+        write_whole(written, shown)
         data.setdefault("pictures", []).append(str(written))
     _save(result.world or context.world, context, state)
     say(json.dumps(data, indent=2, ensure_ascii=False))

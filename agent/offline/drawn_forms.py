@@ -125,7 +125,7 @@ def _grid(text: str) -> Found:
     if not rows or not columns:
         return None
     return Form(
-        {"kind": "grid", "rows": rows}, f"a {rows} by {columns} grid", rows * columns
+        {"kind": "grid", "rows": rows}, f"a grid of {rows} by {columns}", rows * columns
     ), found
 
 
@@ -140,6 +140,6 @@ def _figure(text: str) -> Found:
         return None
     if found["name"]:
         name = found["name"].lower()
-        return Form({"kind": "polygon", "corners": CORNERED[name]}, f"a {name}"), found
+        return Form({"kind": "polygon", "corners": CORNERED[name]}, f"the {name}"), found
     tips = None if found["tips"] is None else whole_number(found["tips"].lower())
     return Form({"kind": "star"} | ({"corners": tips} if tips else {}), "a star"), found

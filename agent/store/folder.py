@@ -107,7 +107,7 @@ class FolderArtefacts:
                 self.folder.mkdir(exist_ok=True)
             except OSError as error:
                 raise StorageError(f"{self.folder} cannot be made: {error.strerror}.") from None
-            write_whole(self.folder / f"{sha256[:16]}.{_suffix(data)}", data)
+            write_whole(self.folder / f"{sha256[:16]}.{suffix_of(data)}", data)
         return sha256
 
     def get(self, sha256: str) -> bytes:
@@ -170,7 +170,7 @@ def _event(line: dict[str, Any]) -> Event:
     return Event(line["n"], line["type"], float(line["seconds"]), data)
 
 
-def _suffix(data: bytes) -> str:
+def suffix_of(data: bytes) -> str:
     """What a file is called after its first bytes."""
     kinds = {b"\xff\xd8": "jpg", b"\x89PNG": "png", b"{": "json"}
     return next((kind for head, kind in kinds.items() if data.startswith(head)), "bin")

@@ -48,7 +48,7 @@ def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
     sides = (("a", report.a, current, "current"), ("b", report.b, promoted, "promoted"))
     wrong: list[str] = []
     for name, side, prompt, role in sides:
-        if side.prompt != prompt.name:
+        if not _is_named(side, prompt):
             wrong.append(f"its {name} is {side.prompt}, not {prompt.name}, the {role} version")
         elif side.sha256 != prompt.sha256:
             reported, current_sha = side.sha256[:12], prompt.sha256[:12]
@@ -63,6 +63,27 @@ def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
             f"{promoted.name}, or promote with --force --why."
         )
     return f"passed on {report.suite} against {current.name}"
+
+
+def verdict_of(path: Path, draft: Prompt) -> tuple[str, str]:
+    """The verdict of a comparison on a draft that is to be released, alone and in a sentence.
+
+    Raises:
+        InputError: it is no such report, or its `b` is another prompt or another text.
+    """
+    report = _read_comparison(path)
+    if (report.b.prompt, report.b.sha256) != (draft.name, draft.sha256):
+        raise InputError(
+            f"{path} judges {report.b.prompt} ({report.b.sha256[:12]}), not {draft.name} "
+            f"({draft.sha256[:12]}); compare that."
+        )
+    return report.verdict, f"{report.verdict} on {report.suite} against {report.a.prompt}"
+
+
+def _is_named(side: Side, prompt: Prompt) -> bool:
+    """Whether a side is that prompt by its name, or by that of the draft it was released from."""
+    drafted = side.prompt.startswith(f"{prompt.id}@draft-") and side.sha256 == prompt.sha256
+    return drafted or side.prompt == prompt.name
 
 
 def _read_comparison(path: Path) -> Comparison:

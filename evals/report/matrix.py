@@ -4,7 +4,7 @@ Intervals of counts are Wilson's, of these tasks; those of a difference are of t
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 
 from ...tools.errors import InputError
@@ -15,6 +15,8 @@ from ..statistics.cells import TOTAL, Cell, cell_names, cells
 from .run_folder import Side
 
 SPENT = ("tokens a trial", "USD", "median s")
+COLUMNS = 11
+"""Beside the heads of the rows; so many fit 1,280 px."""
 STEPS = 5
 """Shades of a cell, by the share of successes."""
 
@@ -45,6 +47,17 @@ class Matrix:
 
     titles: Sequence[str]
     rows: Sequence[MatrixRow]
+
+    @property
+    def parts(self) -> list["Matrix"]:
+        """Tables that fit a page side by side in width, each with the heads of the rows."""
+        return [
+            Matrix(
+                (self.titles[0], *self.titles[first + 1 : first + 1 + COLUMNS]),
+                [replace(row, cells=row.cells[first : first + COLUMNS]) for row in self.rows],
+            )
+            for first in range(0, len(self.titles) - 1, COLUMNS)
+        ]
 
 
 def matrix(sides: Sequence[Side], comparison: Comparison | None = None) -> Matrix:

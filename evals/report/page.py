@@ -14,11 +14,13 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from ...prompts import PromptLibrary
 from ...tools.visible import visible
 from ..experiments.compare import compare
 from ..experiments.journal import read_manifest
 from .matrix import interval_points, matrix, signed_points
 from .pictures import pictures
+from .prompt_diff import prompt_diff
 from .run_folder import Side
 from .task_cards import cards
 
@@ -27,11 +29,12 @@ TRIALS_OPEN = 4
 """Trials of a task that are shown at once; more are opened by hand."""
 
 
-def page(sides: Sequence[Side]) -> str:
+def page(sides: Sequence[Side], library: PromptLibrary) -> str:
     """The whole file.
 
     Args:
         sides: one run, or A and B of one arm each.
+        library: where the prompts of A and B are looked for.
 
     Raises:
         InputError: A and B cannot be compared.
@@ -53,6 +56,7 @@ def page(sides: Sequence[Side]) -> str:
         folders=[side.folder.resolve().name for side in sides],
         facts=f"Split {suite.split}, {version}; {_tasks_and_trials(sides)}.",
         comparison=comparison,
+        prompts=prompt_diff(comparison.a, comparison.b, library) if comparison else [],
         matrix=matrix(sides, comparison),
         categories=list(dict.fromkeys(task.category for task in suite.tasks)),
         cards=[] if suite.held_out else cards(sides, shown),

@@ -92,8 +92,21 @@ def test_compare_says_what_would_settle_it(runs: Path, capsys: pytest.CaptureFix
     )
     assert formup("eval", "compare", runs / "old", uneven) == 0
     text = capsys.readouterr().out
-    assert "\ninconclusive\nto tell 5.0 points (power .8): " in text
+    assert "\ndifference: inconclusive\ngate: inconclusive: success may fall" in text
+    assert "\nto settle the difference, telling 5.0 points (power .8): " in text
+    assert "\nto settle the gate, telling " in text
     assert " tasks with 10 trials of each\n" in text
+
+
+@pytest.mark.parametrize("new", ["better", "worse", "old"])
+def test_compare_and_gate_say_the_same(
+    new: str, runs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert formup("eval", "compare", runs / "old", runs / new) == 0
+    compared = capsys.readouterr().out
+    formup("eval", "gate", runs / "old", runs / new)
+    assert capsys.readouterr().out == compared
+    assert "\ngate: " in compared
 
 
 def test_the_report_is_one_object(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:

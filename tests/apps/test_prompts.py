@@ -169,6 +169,35 @@ def test_nothing_with_an_error_is_released(cli: Cli, tmp_path: Path) -> None:
     assert not (tmp_path / "mine/LOCK.json").exists()
 
 
+def test_a_report_of_a_draft_works_after_its_release(cli: Cli, tmp_path: Path) -> None:
+    done(cli("prompts", "new", "former@draft-x"))
+    edit(tmp_path / "mine/former/draft-x.prompt.md", "8 to 12 vertices", "6 to 9 vertices")
+    report = comparison(tmp_path / "comparison.json", "former@v002", "former@draft-x")
+    other = comparison(tmp_path / "other.json", "former@v002", "former@v001")
+    release = ("prompts", "release", "former@draft-x", *WHY, "--report")
+    refused(cli(*release, other), "judges former@v001", "not former@draft-x")
+    assert done(cli(*release, report)) == "former@v003\n"
+    assert "released: a reason (pass on dev against former@v002)" in done(
+        cli("prompts", "log", "former")
+    )
+    promoted = cli("prompts", "promote", "former@v003", "--report", report)
+    assert done(promoted) == "former is now former@v003\n"
+
+
+def test_a_draft_that_was_blocked_is_released_with_a_word_about_it(
+    cli: Cli, tmp_path: Path
+) -> None:
+    done(cli("prompts", "new", "former@draft-x"))
+    edit(tmp_path / "mine/former/draft-x.prompt.md", "8 to 12 vertices", "6 to 9 vertices")
+    names = "former@v002", "former@draft-x"
+    report = comparison(tmp_path / "comparison.json", *names, verdict="block")
+    code, out, err = cli("prompts", "release", "former@draft-x", *WHY, "--report", report)
+    assert (code, out) == (0, "former@v003\n")
+    assert "former@v003 is released, but not passed: block on dev against former@v002." in err
+    assert "(block on dev against former@v002)" in done(cli("prompts", "log", "former"))
+    refused(cli("prompts", "promote", "former@v003", "--report", report), "verdict is 'block'")
+
+
 COMPARED = ("former@v002", "former@v003")
 REPORTS: list[tuple[dict[str, Any], tuple[str, ...]]] = [
     ({"verdict": "block"}, ("verdict is 'block'",)),
@@ -298,7 +327,7 @@ def test_a_run_is_told_a_draft_and_says_so(
     monkeypatch.setenv("FORMUP_PROMPTS", "")  # the trace knows where the draft lies
     refused(cli("resume", "out", "--answer", "the red one"), "is not what this run was begun with")
     edit(draft, "5 to 9 vertices", "6 to 9 vertices")
-    assert cli("resume", "out", "--answer", "the red one")[0] == 3
+    assert cli("resume", "out", "--answer", "the red one")[0] == 0
     assert told == [made.text] * 2
 
 

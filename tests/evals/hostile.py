@@ -25,6 +25,7 @@ EVIL = (
 """Whatever of it a browser takes for HTML shows: it runs, loads, or hides the page."""
 SUITE = "5" * 64
 TASKS = 6
+KINDS, SETUPS = ("general", "caging"), ("single", "multi", "hidden")
 SECRET = "the magpie is held out"
 
 
@@ -43,7 +44,7 @@ def write_run(folder: Path, method: str, *, passing: int, split: str = "dev") ->
         split=split,
         sha256=SUITE,
         chance=dict.fromkeys(
-            ("total", "general", "caging", "single", "general single", "caging single"),
+            ("total", *KINDS, *SETUPS, *(f"{kind} {setup}" for kind in KINDS for setup in SETUPS)),
             Chance(0.1, 0.2),
         ),
         tasks=tuple(_task(i, folder) for i in range(TASKS)),
@@ -72,7 +73,7 @@ def _row(number: int, trial: int, method: str, passes: bool) -> TrialRow:
             model="a:b'\"><script>alert(7)</script>",
         ),
         category="caging" if number % 2 else "general",
-        setup="single",
+        setup=SETUPS[number // 2],
     )
     status: Status = "pass" if passes else "fail"
     return TrialRow.of(
@@ -98,7 +99,7 @@ def _task(number: int, folder: Path) -> Task:
         instruction=f"{SECRET} {EVIL}".replace("\ud800", ""),
         robots=4,
         category="caging" if number % 2 else "general",
-        setup="single",
+        setup=SETUPS[number // 2],
         family="",
         split="dev",
         style="plain",

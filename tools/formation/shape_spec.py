@@ -90,7 +90,7 @@ class ShapeSpec(Value):
     def _placeless(self) -> Iterator[str]:
         given = (self.box is not None) + (self.where is not None)
         if given > 1 or (not given and self.points is None):
-            yield f"a {self.kind} takes either a box, or where with a target"
+            yield f"{self.kind} takes either a box, or where with a target"
         if self.where == "around" and self.kind not in ENCLOSING:
             yield f"only {', '.join(sorted(ENCLOSING))} go around a target, not {self.kind}"
         if self.box is not None and not (self.box[0] <= self.box[2] and self.box[1] <= self.box[3]):

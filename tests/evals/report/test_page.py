@@ -60,7 +60,7 @@ def formup(*arguments: str | Path) -> int:
 def made(out: Path, *arguments: str | Path) -> Read:
     assert formup("eval", "report", *arguments, "--out", out) == 0
     page = out.read_text("utf-8")
-    assert not re.search(r"[\x00-\x08\x0b-\x1f]", page)
+    assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", page)
     return Read(page)
 
 
@@ -81,6 +81,7 @@ def test_nothing_of_what_others_wrote_becomes_html(runs: Path, tmp_path: Path) -
         assert page.tags["script"] == page.tags["style"] == page.tags["title"] - _drawn(page) == 1
         assert not [key for _, key, _ in page.attributes if key.startswith("on") or key == "style"]
         assert any("<script>alert(1)</script>" in text for text in page.texts)
+        assert any("x</a> \\u202e\\u0000" in text for text in page.texts)
 
 
 def _drawn(page: Read) -> int:
