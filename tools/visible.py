@@ -16,9 +16,9 @@ def visible(text: str) -> str:
 
     The escapes are those of JSON: JSON stays the same value.
     """
-    return text if text.isprintable() else "".join(map(_shown, text))
+    return text if text.isprintable() else "".join(map(_written_out, text))
 
 
-def _shown(character: str) -> str:
+def _written_out(character: str) -> str:
     plain = character.isprintable() or character in STAY or category(character) == "Zs"
     return character if plain else json.dumps(character)[1:-1]

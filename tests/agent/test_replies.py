@@ -2,13 +2,15 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.messages import Call, Reply, Result
 from formup.agent.policy import Policy
 from formup.agent.session import Run
 from formup.agent.wrappers.doubles import ScriptedModel
-from formup.tools.perception.image import Picture
+from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.target_prompt import TargetPrompt
 
 CORNERS = "Put 6 robots at the corners of the box"
 DEPLOY = Call(id="d", name="deploy", arguments={})
@@ -81,3 +83,15 @@ def test_words_after_a_plan_that_is_not_certified_are_no_answer(
     assert made.report.status == "impossible"
     later = Agent(ScriptedModel([Reply(text="You are welcome.")])).say(made, "Thank you")
     assert later.report.status == "answered"
+
+
+def test_the_rules_answer_a_doubt_about_a_form() -> None:
+    pixels = np.full((600, 800, 3), 90, np.uint8)
+    pixels[260:320, 360:440] = (200, 40, 40)
+    words = "Encircle it with 10 robots in a star around it"
+    pointed = [TargetPrompt(box=(355, 255, 445, 325))]
+    made = Agent().run(picture_from_array(pixels), words, pointed=pointed)
+    assert errors(made) == ["doubt", None, None]
+    assert made.report.status == "deployed"
+    assert made.report.contract is not None
+    assert made.report.contract.reading

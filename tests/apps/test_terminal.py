@@ -3,6 +3,7 @@
 import ast
 import json
 import re
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from formup.apps.cli import app
 from formup.apps.run_display import say_failed
 from formup.apps.run_files import Folder
 from formup.apps.terminal_session import TerminalSession
+from formup.tools.errors import InputError
 from formup.tools.perception.image import Picture, load_picture
 from PIL import Image
 
@@ -78,6 +80,30 @@ def test_an_error_shows_escape_sequences(capsys: pytest.CaptureFixture[str]) -> 
     say_failed("There is no file \x1b[31m red \u202e.")
     _, shown = capsys.readouterr()
     assert shown == "formup: There is no file \\u001b[31m red \\u202e.\n"
+
+
+def test_it_says_which_version_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    assert app(["--version"], standalone_mode=False) == 0
+    assert capsys.readouterr().out == f"formup {version('formup')}\n"
+
+
+def test_pictures_of_a_tool_are_called_what_they_are(
+    picture: Picture, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("--image", str(picture.path), "--state", str(tmp_path / "state.json"))
+    app(["tools", "call", "look", *options], standalone_mode=False)
+    (written,) = json.loads(capsys.readouterr().out)["pictures"]
+    with Image.open(written) as image:
+        assert image.format == {".jpg": "JPEG", ".png": "PNG"}[Path(written).suffix]
+
+
+def test_arguments_have_each_name_once(picture: Picture) -> None:
+    twice = '{"region": [0, 0, 9, 9], "region": [0, 0, 99, 99]}'
+    with pytest.raises(InputError, match="--args has 'region' twice in one object"):
+        app(
+            ["tools", "call", "look", "--image", str(picture.path), "--args", twice],
+            standalone_mode=False,
+        )
 
 
 @pytest.mark.parametrize("path", sorted(APPS.glob("*.py")), ids=lambda path: path.name)

@@ -8,6 +8,7 @@ from formup.tools.formation.contract import (
     FIT_FACTOR,
     Contract,
     Group,
+    ShapeSpec,
     default_clearance,
     nominal,
     with_defaults,
@@ -167,3 +168,11 @@ LENGTHS = st.one_of(st.just(0.0), st.floats(1e-6, 1e5))
 def test_nominal_lies_in_the_range_it_is_taken_from(a: float, b: float) -> None:
     least, greatest = sorted((a, b))
     assert least * (1 - 1e-9) <= nominal((least, greatest)) <= greatest * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("kind", ["arc", "star", "grid"])
+def test_a_form_has_one_place(kind: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        ShapeSpec.model_validate({"kind": kind, "box": [0, 0, 9, 9], "where": "inside"})
+    assert f"{kind} takes either a box, or where" in str(caught.value)
+    assert f"a {kind}" not in str(caught.value)
