@@ -15,7 +15,7 @@ from ..tools.formation.units import in_metres, with_metres
 from ..tools.perception.referring.attributes import Candidate
 from ..tools.perception.target_prompt import Box
 from ..tools.world import Target, World, rounded_rings
-from .messages import History, Message, Reply, Result, failed_before, turn_of
+from .messages import Call, History, Message, Reply, Result, failed_before, turn_of
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 
 Status = Literal[
@@ -163,14 +163,15 @@ def make_report(
     arrival = arrivals.get(plan.id) if plan else None
     new = plan is not None and world.plans[plan.id] is not began.plans.get(plan.id)
     status, message = _status(outcome, plan, arrival, new=new)
+    notes = context.picture.notes
     return Report(
         status=status,
         message=message,
         instruction=context.words,
-        image=world.picture.model_dump(),
+        image=world.picture.model_dump() | ({"notes": notes} if notes else {}),
         targets=tuple(target_data(t) for t in world.targets),
         candidates=_candidates(outcome, context),
-        contract=plan.formation.contract if plan else None,
+        contract=suggested(outcome) or (plan.formation.contract if plan else None),
         plan_id=plan.id if plan else None,
         parent=world.plans[plan.id].parent if plan else None,
         positions=plan.formation.positions if plan else None,
@@ -195,7 +196,8 @@ def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Pl
         return world.plans[outcome.plan_id].plan
     if arrivals:
         return world.plans[list(arrivals)[-1]].plan
-    version, named = world.version, _named(outcome.messages)
+    given_up = _given_up(outcome.messages)
+    version, named = world.version, given_up and given_up.arguments.get("plan_id")
     plans = [node.plan for node in world.plans.values()]
     valid = [p for p in plans if p.formation.scene_version == version]
     whole = [p for p in valid if p.partial is None]
@@ -204,13 +206,21 @@ def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Pl
     return meant[-1] if meant else None
 
 
-def _named(messages: History) -> str | None:
-    """The plan that the report which ended the turn names."""
+def suggested(outcome: Outcome) -> Contract | None:
+    """The contract that a question or a refusal says would do."""
+    call = outcome.call if isinstance(outcome, Paused) else _given_up(outcome.messages)
+    ends = call is not None and call.name in ("ask_user", "report_impossible")
+    stated = call.arguments.get("contract") if call and ends else None
+    return None if stated is None else Contract.model_validate(stated)
+
+
+def _given_up(messages: History) -> Call | None:
+    """The report that ended the turn."""
     last = messages[-1] if messages else None  # none where a run was killed before its first
     if not isinstance(last, Result) or last.name != "report_impossible" or last.error:
         return None
     calls = [c for m in turn_of(messages) if isinstance(m, Reply) for c in m.calls]
-    return next(c.arguments.get("plan_id") for c in calls if c.id == last.call_id)
+    return next(c for c in calls if c.id == last.call_id)
 
 
 def _status(

@@ -10,6 +10,7 @@ import typer
 
 from ..agent.agent import Agent
 from ..agent.limits import Limits
+from ..agent.model import Model
 from ..agent.outcomes import Answered, Paused
 from ..agent.policy import Policy
 from ..agent.session import load_run, prompt_name
@@ -22,6 +23,7 @@ from ..tools.perception.image import load_picture
 from . import arguments, deploy, evaluate, prompts, tools, trace
 from . import options as o
 from .run_files import Folder, write_files
+from .stated import decided
 from .terminal import say
 from .terminal_session import TerminalSession
 
@@ -65,6 +67,7 @@ def run(
     box: o.Boxes = None,
     outline: o.Outlines = None,
     target: o.Candidates = None,
+    contract: o.ContractFile = None,
     plan_only: o.PlanOnly = False,
     as_json: o.Json = False,
     out: o.Out = None,
@@ -101,9 +104,10 @@ def run(
         numbered=numbered,
     )
     things = arguments.pointed(point or [], box or [], outline or [], target or [])
+    who, things = decided(contract, things, fixed, model=model, planner=planner)
     bounds = arguments.limits(limit), arguments.policy(policy)
     picture, keep = load_picture(image), arguments.recording(record)
-    with _agent(model, base_url, planner, prompt, prompts, *bounds) as agent, Folder(out) as home:
+    with _agent(who, base_url, planner, prompt, prompts, *bounds) as agent, Folder(out) as home:
         made = agent.run(picture, instruction, pointed=things, settings=fixed, trace=home.trace)
         raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
 
@@ -168,7 +172,7 @@ def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
 
 @contextmanager
 def _agent(
-    model: str,
+    model: str | Model,
     base_url: str | None,
     planner: str | None,
     prompt: str | None,
@@ -188,7 +192,7 @@ def _agent(
             policy=policy,
             tracer=tracer,
         )
-        if model == "offline" and agent.prompt is not None:
+        if agent.model.name == "offline" and agent.prompt is not None:
             say(
                 "formup: the offline planner is rules and reads no prompt; "
                 f"{agent.prompt.name} is not used.",

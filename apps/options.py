@@ -23,6 +23,10 @@ Candidates = Annotated[
     list[str] | None,
     typer.Option("--target", help="A thing found in the picture, such as c3; repeatable."),
 ]
+ContractFile = Annotated[
+    Path | None,
+    typer.Option("--contract", help="A contract as JSON, used as it stands; no words are read."),
+]
 PlanOnly = Annotated[bool, typer.Option("--plan-only", help="Certify a plan but move nothing.")]
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; default: formup-runs/TIME.")

@@ -51,6 +51,8 @@ STATUS_STYLE = {
 def show_report(console: Console, report: Report, folder: str) -> None:
     """Print a report for a person."""
     console.print(styled(report.instruction, style="bold"))
+    for note in (report.image or {}).get("notes", ()):
+        _line(console, "picture", note)
     for target in report.targets:
         parts = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in target["parts"].items())
         box = ", ".join(f"{v:g}" for v in target["box"])
@@ -60,7 +62,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
             f"{target['id']}: {target['label']}, box ({box}), "
             f"confidence {target['confidence']:.2f} ({parts})",
         )
-    if report.contract is not None:
+    if report.contract is not None and not (report.files or {}).get("contract"):
         for group in report.contract.groups:
             _line(console, "contract", _group(group, _scale(report)))
     if report.verdict is not None:
@@ -72,10 +74,19 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     )
     if report.candidates:
         _choices(console, report.candidates)
-    written = [name for name in (report.files or {}).values() if name]
-    if written:
-        _line(console, "files", f"{folder}/ {', '.join(written)}")
-    if written and report.status in GOING_ON:
+    _files(console, report, folder)
+
+
+def _files(console: Console, report: Report, folder: str) -> None:
+    """What was written, and how to go on from there."""
+    files = {name: file for name, file in (report.files or {}).items() if file}
+    if report.contract is not None and "contract" in files:
+        written = report.contract.model_dump_json(exclude_defaults=True)
+        console.print(Text.assemble((f"{'would do':>12}  ", "cyan"), written), soft_wrap=True)
+        _line(console, "", f"to have that, run again with --contract {folder}/{files['contract']}")
+    if files:
+        _line(console, "files", f"{folder}/ {', '.join(files.values())}")
+    if files and report.status in GOING_ON:
         _line(console, "go on", f"formup resume {folder}{GOING_ON[report.status]}")
 
 

@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from ..agent.report import suggested
 from ..agent.session import Run
 from ..agent.store.folder import NAME
 from ..tools.builtin.robots import read_track
@@ -17,7 +18,9 @@ from ..tools.formation.plan import Plan
 from ..tools.store import plan_file, write_whole
 from ..tools.world import PlanNode
 
-PICTURES = ("plan.png", "question.png", "found.png")
+CONTRACT = "contract.json"
+PASSING = ("plan.png", "question.png", "found.png", CONTRACT)
+"""What a later turn, or the answer to a question, may leave without meaning."""
 
 
 class Folder:
@@ -25,7 +28,7 @@ class Folder:
 
     def __init__(self, path: Path | None, *, resumed: bool = False) -> None:
         self.path = path or _fresh(Path("formup-runs"))
-        self._drawn = {name for name in PICTURES if resumed and (self.path / name).exists()}
+        self._passing = {name for name in PASSING if resumed and (self.path / name).exists()}
         try:
             self._made = not self.path.exists()
             self.path.mkdir(parents=True, exist_ok=True)
@@ -47,16 +50,20 @@ class Folder:
         """Write a picture and return its name."""
         buffer = io.BytesIO()
         image.save(buffer, "PNG")
-        write_whole(self.path / name, buffer.getvalue())
-        self._drawn.add(name)
+        return self.write(name, buffer.getvalue())
+
+    def write(self, name: str, data: bytes) -> str:
+        """Write a file and return its name."""
+        write_whole(self.path / name, data)
+        self._passing.add(name)
         return name
 
-    def drop_pictures_but(self, *names: str | None) -> None:
-        """Remove the pictures drawn earlier in this run, before a question was answered."""
-        stale = self._drawn - set(names)
+    def drop_but(self, *names: str | None) -> None:
+        """Remove what was written earlier in this run, before a question was answered."""
+        stale = self._passing - set(names)
         for old in stale:
             (self.path / old).unlink(missing_ok=True)
-        self._drawn -= stale
+        self._passing -= stale
 
     def __enter__(self) -> "Folder":
         return self
@@ -80,6 +87,7 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
         "picture": None,
         "animation": None,
         "trace": NAME,
+        "contract": None,
     }
     picture, world, report = run.context.picture, run.world, run.report
     node = world.plans.get(report.plan_id or "")
@@ -101,7 +109,10 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
     elif world.targets or world.doubted:
         shown = world.with_target(world.doubted) if world.doubted else world
         files["picture"] = folder.draw("found.png", draw_look(picture, shown))
-    folder.drop_pictures_but(files["picture"], "plan.png" if standing else None)
+    if (contract := suggested(run.outcome)) is not None:
+        data = contract.model_dump_json(indent=1, exclude_defaults=True).encode()
+        files["contract"] = folder.write(CONTRACT, data)
+    folder.drop_but(files["picture"], files["contract"], "plan.png" if standing else None)
     return files
 
 

@@ -23,6 +23,7 @@ Kind = Literal[
     "no_room_beside",
     "low_confidence",
     "count",
+    "doubt",
     "unknown_target",
     "unknown_plan",
     "void_plan",

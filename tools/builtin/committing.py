@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from pydantic.json_schema import SkipJsonSchema
 
 from ..context import Context, Settings
 from ..errors import ToolError
@@ -194,12 +195,18 @@ def _check_may_move(context: Context, plan: Plan) -> None:
 
 
 @tool("ask")
-def ask_user(context: Context, question: str, candidates: tuple[str, ...] = ()) -> ToolResult:
+def ask_user(
+    context: Context,
+    question: str,
+    candidates: tuple[str, ...] = (),
+    contract: SkipJsonSchema[Contract | None] = None,
+) -> ToolResult:
     """Ask the person when the instruction does not settle what to do; this ends the turn.
 
     Args:
         question: one clear question.
         candidates: ids of numbered things (c3) or targets (t1) to choose from, if there are any.
+        contract: that would do, shown to the person; the offline planner's, in no schema.
     """
     found = {c: context.candidate(c) for c in candidates if c.startswith("c")}
     listed = [
@@ -215,7 +222,11 @@ def ask_user(context: Context, question: str, candidates: tuple[str, ...] = ()) 
 
 @tool("end")
 def report_impossible(
-    context: Context, reason: str, robots_needed: int | None = None, plan_id: str | None = None
+    context: Context,
+    reason: str,
+    robots_needed: int | None = None,
+    plan_id: str | None = None,
+    contract: SkipJsonSchema[Contract | None] = None,
 ) -> ToolResult:
     """Say that the instruction cannot be carried out, and why; this ends the run.
 
@@ -223,6 +234,7 @@ def report_impossible(
         reason: why, in one sentence, with the numbers.
         robots_needed: how many robots would do, where that is the trouble.
         plan_id: the best plan that was found, certified or not.
+        contract: that would do, as of ask_user.
     """
     if plan_id is not None and plan_id not in context.world.plans:
         raise ToolError(f"There is no plan {plan_id!r}.")
