@@ -1,6 +1,5 @@
 """Command-line words to values; each mistake is one sentence with the value and what is allowed."""
 
-import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -8,7 +7,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_args
 
-import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from ..agent.limits import Limits
@@ -19,8 +17,7 @@ from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_LENGTH, MAX_ROBOTS
 from ..tools.formation.named_lengths import named_lengths
 from ..tools.formation.units import COARSEST, FINEST
-from ..tools.geometry.outline import FARTHEST
-from ..tools.perception.target_prompt import Point, TargetPrompt
+from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.store import read_text
 from ..tools.tool import violations
 
@@ -206,32 +203,6 @@ def pointed(
         )
     except ValidationError as error:
         raise InputError(violations(error)) from None
-
-
-def starts(path: Path | None) -> tuple[Point, ...] | None:
-    """Starting positions (x, y), px, from a JSON file [[x, y], ...] or lines of x,y.
-
-    Raises:
-        InputError: it cannot be read, or holds anything but finite pairs.
-    """
-    if path is None:
-        return None
-    text = read_text(path)
-    try:
-        rows = (
-            json.loads(text)
-            if text.lstrip().startswith("[")
-            else [[float(v) for v in line.split(",")] for line in text.splitlines() if line.strip()]
-        )
-        values = np.asarray(rows, dtype=float)
-    except (ValueError, TypeError, OverflowError, RecursionError):
-        values = np.empty(0)
-    pairs = values.ndim == 2 and values.shape[1:] == (2,)
-    if not pairs or not (np.abs(values) <= FARTHEST).all():
-        raise InputError(
-            f"--starts {path} must hold one x,y a line, or JSON [[x, y], ...], in pixels."
-        )
-    return tuple(zip(values[:, 0].tolist(), values[:, 1].tolist(), strict=True))
 
 
 def limits(given: list[str] | None, before: Mapping[str, Any] | None = None) -> Limits:

@@ -23,6 +23,7 @@ from ..tools.perception.image import load_picture
 from . import arguments, deploy, evaluate, prompts, tools, trace
 from . import options as o
 from .run_files import Folder, write_files
+from .starts import starts as read_starts
 from .stated import decided
 from .terminal import say
 from .terminal_session import TerminalSession
@@ -99,7 +100,7 @@ def run(
         segmenter=segmenter,
         descriptor=arguments.descriptor(descriptor),
         fleet=fleet,
-        starts=arguments.starts(starts),
+        starts=read_starts(starts),
         may_deploy=not plan_only,
         numbered=numbered,
     )

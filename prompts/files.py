@@ -28,7 +28,7 @@ def read_text(path: Path) -> str:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise PromptError(f"{path} has more than {MAX_BYTES >> 20} MiB.")
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # some editors put a mark at the beginning
     except OSError as error:
         raise PromptError(f"{path} cannot be read: {error.strerror or error}.") from None
     except UnicodeDecodeError:

@@ -6,6 +6,7 @@ Pictures are not in it but named, with their hash; reading refuses one that has 
 import hashlib
 import json
 import secrets
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from pathlib import Path
 from typing import Any, cast
 
@@ -152,7 +153,7 @@ def parse_json(text: str, source: object) -> Any:
 
 
 def read_text(path: Path) -> str:
-    """The text of a file a person named.
+    """The text of a file a person named, without a byte order mark.
 
     Raises:
         StorageError: missing, no regular file, too large, not readable or not UTF-8.
@@ -162,10 +163,12 @@ def read_text(path: Path) -> str:
             raise StorageError(f"{path} is no file that can be read.")
         if path.stat().st_size > MAX_BYTES:
             raise StorageError(f"{path} has more than {MAX_BYTES >> 20} MiB.")
-        return path.read_text(encoding="utf-8")
+        with path.open("rb") as file:  # Excel and PowerShell write UTF-16, always with its mark
+            wide = file.read(2) in (BOM_UTF16_LE, BOM_UTF16_BE)
+        return path.read_text(encoding="utf-16" if wide else "utf-8-sig")
     except OSError as error:
         raise StorageError(f"{path}: {error.strerror or error}.") from None
-    except UnicodeDecodeError:
+    except UnicodeError:
         raise StorageError(f"{path} is not JSON or text in UTF-8.") from None
 
 

@@ -29,7 +29,9 @@ class StatedContract(OfflinePlanner):
             assert isinstance(first, User)
             contract = self._contract | ({"reading": READING} if doubts else {})
             arguments = {"contract": contract, "targets": read_task(first.text).pointed}
-            call = Call(id=f"call-{len(results) + 1}", name="propose_formation", arguments=arguments)
+            call = Call(
+                id=f"call-{len(results) + 1}", name="propose_formation", arguments=arguments
+            )
             return Reply(calls=(call,))
         last = results[-1].model_copy(update={"cause": None})  # for which it would change its plan
         reply = await super().reply(replace(request, messages=(*request.messages[:-1], last)))

@@ -7,6 +7,7 @@ from itertools import count, islice
 
 import numpy as np
 import shapely
+from scipy.spatial.distance import cdist
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import InputError
@@ -232,7 +233,8 @@ def checked_starts(
     """A user's starting positions, refused where a robot could not stand.
 
     Raises:
-        InputError: another number than n, not finite, outside the picture, or on a target.
+        InputError: another number than n, not finite, outside the picture, on each other or on a
+            target.
     """
     if len(starts) != n:
         raise InputError(f"The starts give {len(starts)} positions for {n} robots.")
@@ -242,9 +244,19 @@ def checked_starts(
     if away.max() > 0:
         i = int(np.argmax(away))
         x, y = starts[i]
+        turned = distances(frame.box, starts[:, ::-1]).max() == 0
+        swapped = "; with y before x all would lie in it" if turned else ""
         raise InputError(
             f"Robot {i + 1} starts at ({x:g}, {y:g}), outside the picture of "
-            f"{frame.width:g} x {frame.height:g} px."
+            f"{frame.width:g} x {frame.height:g} px{swapped}."
+        )
+    apart = cdist(starts, starts) + np.diag(np.full(len(starts), np.inf))
+    if apart.min() < max(2 * radius, MIN_SPACING):
+        i, j = map(int, np.argwhere(apart == apart.min())[0])
+        x, y = starts[i]
+        raise InputError(
+            f"Robots {i + 1} and {j + 1} start on the same spot: {apart[i, j]:g} px apart at "
+            f"({x:g}, {y:g}), where {max(2 * radius, MIN_SPACING):g} px are needed."
         )
     off = distances(solid, starts)
     if not solid.is_empty and off.min() <= radius:
