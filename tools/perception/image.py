@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from PIL import ExifTags, Image, TiffImagePlugin, UnidentifiedImageError, features
 
 from ..errors import ImageError
+from .deep_values import as_8_bits
 
 MAX_FILE_BYTES = 64 * 2**20
 MAX_PIXELS = 50_000_000
@@ -107,10 +108,8 @@ def picture_from_bytes(data: bytes, name: str) -> Picture:
     """Decode a picture file's bytes; `name` is the file name for messages.
 
     EXIF orientation is applied, transparent parts are shown on white, of several frames the
-    first is used. Grey of more than 8 bits: values that all lie in 0..255 stay as they are,
-    floats that all lie in 0..1 are multiplied by 255, else the smallest value becomes black
-    and the largest white; of floats, NaN and -inf become black, +inf white. Colour profiles
-    are not applied.
+    first is used; more than 8 bits are made 8 as `as_8_bits` says. Colour profiles are not
+    applied.
 
     Raises ImageError if the bytes are none or too many, of a format not allowed, damaged,
     under 16 pixels on a side, over 20,000 on a side or over 50 megapixels.
@@ -234,17 +233,19 @@ def _decode(data: bytes, name: str) -> tuple[NDArray[np.uint8], tuple[str, ...]]
             _check_size(name, *opened.size)
             _check_tiles(name, opened)
             frames = _frames_note(opened)
+            colours = data if ";16" in str(opened.tile) else None  # there until it is loaded
             opened.load()
             # Some decoders learn the true size only now.
             _check_size(name, *opened.size)
-            pixels, note = _to_rgb(_upright(opened))
+            shallow, deep = as_8_bits(opened, colours)
+            pixels, note = _to_rgb(_upright(shallow, opened))
     except ImageError:
         raise
     # Over the years Pillow's readers have let out nearly every built-in exception.
     except Exception as error:
         raise _undecodable(name, data, error) from None
     pixels.setflags(write=False)
-    return pixels, tuple(text for text in (frames, note) if text)
+    return pixels, tuple(text for text in (frames, deep, note) if text)
 
 
 @contextmanager
@@ -295,9 +296,9 @@ def _frames_note(opened: Image.Image) -> str:
     return "first of several frames" if several else ""
 
 
-def _upright(image: Image.Image) -> Image.Image:
+def _upright(image: Image.Image, opened: Image.Image) -> Image.Image:
     try:
-        turn = _TURNS.get(image.getexif().get(ExifTags.Base.Orientation, 1))
+        turn = _TURNS.get(opened.getexif().get(ExifTags.Base.Orientation, 1))
     # Broken EXIF says nothing about the pixels, which are already decoded.
     except Exception:
         return image
@@ -306,8 +307,6 @@ def _upright(image: Image.Image) -> Image.Image:
 
 def _to_rgb(image: Image.Image) -> tuple[NDArray[np.uint8], str]:
     """(H, W, 3) pixels and a note, which may be empty."""
-    if image.mode == "F" or image.mode.startswith("I"):
-        return _from_deep(np.array(image, dtype=np.float64), whole=image.mode != "F")
     note = ""
     if image.has_transparency_data:
         image = image.convert("RGBA")
@@ -317,24 +316,3 @@ def _to_rgb(image: Image.Image) -> tuple[NDArray[np.uint8], str]:
         canvas.paste(image, mask=image)
         image = canvas
     return np.asarray(image.convert("RGB")), note
-
-
-def _from_deep(values: NDArray[np.float64], *, whole: bool) -> tuple[NDArray[np.uint8], str]:
-    finite = np.isfinite(values)
-    low = float(values.min(where=finite, initial=np.inf))
-    high = float(values.max(where=finite, initial=-np.inf))
-    note = ""
-    if not whole and low >= 0 and high <= 1:
-        low, high = 0.0, 1.0
-    elif low >= 0 and high <= 255:
-        low, high = 0.0, 255.0
-    else:
-        note = f"grey values {low:g} to {high:g} stretched from black to white"
-    # In place: at 50 megapixels every copy of float64 costs 400 MB.
-    values -= low
-    values *= 255 / (high - low or 1.0)
-    values += 0.5
-    np.clip(values, 0, 255, out=values)
-    np.nan_to_num(values, copy=False, nan=0.0)
-    grey = values.astype(np.uint8)
-    return np.repeat(grey[:, :, None], 3, axis=2), note
