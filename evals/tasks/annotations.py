@@ -30,7 +30,7 @@ def read_entries(path: Path, entries: Any = None) -> list[Entry]:
         InputError: no such file, not JSON, against the schema, or a picture missing.
     """
     try:
-        entries = json.loads(path.read_text(encoding="utf-8")) if entries is None else entries
+        entries = json.loads(path.read_text(encoding="utf-8-sig")) if entries is None else entries
     except OSError as error:
         raise InputError(
             f"{path}: {error.strerror or error}; give a folder with an {ANNOTATIONS}."

@@ -16,6 +16,7 @@ from ...tools.errors import InputError
 from ...tools.store import write_whole
 from ..scenes.stories import entry_of, family_of, story_of
 from .annotations import ANNOTATIONS, PHOTOS, SCALE, Entry, check_format, read_entries, task_of
+from .frames import check_frame
 from .recipes.caged import caged
 from .recipes.frontier import frontier
 from .recipes.inscribed import inscribed
@@ -85,10 +86,12 @@ def write_suite(folder: Path, name: str) -> Path:
     """Make a suite of a folder in the photos' format; the path of its YAML file.
 
     Raises:
-        InputError: it has one already, or there is no annotations.json that can be read.
+        InputError: it has one already, or there is no annotations.json that can be read, or
+            none of these pictures.
     """
     path = folder / FILE
-    read_entries(folder / ANNOTATIONS)
+    for entry in read_entries(folder / ANNOTATIONS):
+        check_frame(entry, folder)
     if path.exists():
         raise InputError(f"{path} is there already; remove it to make it anew.")
     content = annotated(folder / ANNOTATIONS, name)
