@@ -147,6 +147,9 @@ Clearance = Annotated[
 Seed = Annotated[str, typer.Option("--seed", help="Of the simulator.")]
 Arguments = Annotated[str, typer.Option("--args", help="The tool's arguments as JSON.")]
 StateFile = Annotated[Path | None, typer.Option("--state", help="Keeps the scene between calls.")]
+DrawnFile = Annotated[
+    Path | None, typer.Option("--picture", help="Draws the plan, or what was measured, as PNG.")
+]
 PlanFile = Annotated[Path, typer.Argument(help="A plan.json that formup wrote.")]
 PictureFile = Annotated[Path | None, typer.Option("--image", help="The picture to work on.")]
 OldRun = Annotated[Path, typer.Argument(metavar="A", help="Folder of trials: the baseline.")]

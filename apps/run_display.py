@@ -82,7 +82,7 @@ def _files(console: Console, report: Report, folder: str) -> None:
     files = {name: file for name, file in (report.files or {}).items() if file}
     if report.contract is not None and "contract" in files:
         written = report.contract.model_dump_json(exclude_defaults=True)
-        console.print(Text.assemble((f"{'would do':>12}  ", "cyan"), written), soft_wrap=True)
+        console.print(styled((f"{'would do':>12}  ", "cyan"), written), soft_wrap=True)
         _line(console, "", f"to have that, run again with --contract {folder}/{files['contract']}")
     if files:
         _line(console, "files", f"{folder}/ {', '.join(files.values())}")

@@ -1,6 +1,7 @@
 """`formup tools list` and `formup tools call`: any one tool by hand."""
 
 import asyncio
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import typer
 from ..agent.store.folder import suffix_of
 from ..tools.builtin import TOOLS
 from ..tools.context import Context, Settings
+from ..tools.draw import draw_look, draw_plan
 from ..tools.errors import FleetError, InputError, ToolError
 from ..tools.formation.contract import Contract
 from ..tools.perception.image import load_picture
@@ -53,9 +55,10 @@ def call_tool(
     image: o.PictureFile = None,
     args: o.Arguments = "{}",
     state: o.StateFile = None,
+    picture: o.DrawnFile = None,
     metres_per_pixel: o.MetresPerPixel = None,
 ) -> None:
-    """Call one tool and print its answer; pictures go beside the state file or here."""
+    """Call one tool and print its answer; what it shows goes beside the state file or here."""
     tool = next((t for t in TOOLS if t.name == name), None)
     if tool is None:
         raise InputError(f"Unknown tool {name!r}. There are: {', '.join(t.name for t in TOOLS)}.")
@@ -77,8 +80,22 @@ def call_tool(
         written = folder / f"{name}-{number}.{suffix_of(shown)}"
         write_whole(written, shown)
         data.setdefault("pictures", []).append(str(written))
-    _save(result.world or context.world, context, state)
+    world = result.world or context.world
+    if picture is not None:
+        data.setdefault("pictures", []).append(str(_draw(picture, context, world)))
+    _save(world, context, state)
     say(json.dumps(data, indent=2, ensure_ascii=False))
+
+
+def _draw(path: Path, context: Context, world: World) -> Path:
+    """The current plan on the picture as a PNG file, or what has been measured."""
+    node, file = world.plans.get(world.current or ""), io.BytesIO()
+    drawn = draw_look(context.picture, world)
+    if node is not None:
+        drawn = draw_plan(context.picture, world, node.plan, f"plan {node.plan.id}")
+    drawn.save(file, "PNG")
+    write_whole(path, file.getvalue())
+    return path
 
 
 def _save(world: World, context: Context, state: Path | None) -> None:
