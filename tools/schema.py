@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 BOUNDS = frozenset(
     f"{which}{what}" for which in ("min", "max") for what in ("imum", "Items", "Length")
-) | {"additionalProperties", "pattern"}
+) | {"exclusiveMinimum", "additionalProperties", "pattern"}
 """What a schema says of values that descriptions say as well, or an answer does in good time."""
 
 
@@ -42,9 +42,9 @@ def _compact(node: Any, once: Mapping[str, Any]) -> Any:
     for key, value in fields.items():
         if key == "properties":  # here keys are names of their own
             made[key] = {name: _compact(kind, once) for name, kind in value.items()}
-        elif key == "anyOf" and {"type": "null"} in value and len(value) == 2:
-            (given,) = (choice for choice in value if choice != {"type": "null"})
-            made = _compact(given, once) | made
+        elif key == "anyOf" and {"type": "null"} in value:
+            given = [_compact(choice, once) for choice in value if choice != {"type": "null"}]
+            made = given[0] | made if len(given) == 1 else made | {"anyOf": given}
         elif not (key == "title" or (key == "default" and value in (None, [], ""))):
             made[key] = _compact(value, once)
     return made

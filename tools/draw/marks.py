@@ -135,7 +135,8 @@ def target_room(contract: Contract, site: Site, points: FloatArray) -> float:
     """
     away: list[FloatArray] = []
     for part in parts_of(contract, points, site):
-        if part.group.relation not in OUTSIDE or not len(part.points):
+        outside = part.group.relation in OUTSIDE and not part.group.on_corners
+        if not outside or not len(part.points):
             continue
         away.append(distances(part.outline.polygon.boundary, part.points))
         if part.group.relation == "corners":

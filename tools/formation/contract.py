@@ -77,25 +77,22 @@ class Group(Value):
     )
     max_gap: Length | None = Field(
         default=None,
-        description="cage, around, along: widest gap between neighbours' edges, px; if named.",
+        description="around, cage, along: widest gap between neighbours' edges, px; if named.",
     )
     pitch: Length | None = Field(
-        default=None,
-        gt=0,
-        description="around, along, shape: exact distance of neighbours' centres, px; if named.",
+        default=None, gt=0, description="Exact distance of neighbours' centres, px; if named."
     )
     radius: Length | None = Field(
-        default=None, gt=0, description="around: of the circle robots stand on, px; if named."
+        default=None, gt=0, description="around: of the circle to stand on, px; if named."
     )
     sides: tuple[RingPart, ...] | None = Field(
-        default=None, min_length=1, description="around: only there, nobody elsewhere."
+        default=None, min_length=1, description="around: only there."
     )
     opening: Length | None = Field(
-        default=None, description="around: least width of a gap to leave, px; 0: none was named."
+        default=None, description="around: least width of a gap to leave, px; 0: not named."
     )
     opening_towards: str | Angle | None = Field(
-        default=None,
-        description="around: left, right, top, bottom, a target id, or degrees as of an arc.",
+        default=None, description="left, right, top, bottom, a target id, or degrees."
     )
     side: SideName | None = Field(
         default=None,
@@ -126,9 +123,7 @@ class Group(Value):
     )
     shape: ShapeSpec | None = Field(default=None, description="shape: a form drawn by the robots.")
     heading: str | Angle | None = Field(
-        default=None,
-        description="Where robots look, if said: towards, away, a target id, or degrees as of an "
-        "arc.",
+        default=None, description="Robots look: towards, away, a target id, or degrees; if said."
     )
 
     @model_validator(mode="after")

@@ -45,7 +45,7 @@ class ShapeSpec(Value):
         default=None, description="arc: from, to in degrees, clockwise from the right."
     )
     opens: Opens | None = Field(
-        default=None, description="v, u, arc (half circle): its mouth; else towards the target."
+        default=None, description="v, u, arc (half circle): its mouth, if said."
     )
     box: Four | None = Field(default=None, description="x0, y0, x1, y1 to fit it into; or where.")
     where: Where | None = Field(default=None, description="By the target.")

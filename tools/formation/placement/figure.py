@@ -142,7 +142,7 @@ def _figure_placed(
         return _figure_inside(sketch, group, site, group.offsets(radius)[0])
     gap = nominal(group.offsets()) + radius
     if shape.where == "around":
-        return _figure_around(sketch, outline, gap, round_about=shape.kind == "arc")
+        return _figure_around(sketch, outline, gap, shape)
     return _figure_beside(sketch, group, site, shape.where, gap, radius)
 
 
@@ -164,7 +164,7 @@ def _figure_inside(sketch: Sketch, group: Group, site: Site, margin: float) -> S
     raise ToolError(f"It has no room inside the target, {site.length(margin)} from its edge.")
 
 
-def _figure_around(sketch: Sketch, outline: Outline, gap: float, *, round_about: bool) -> Sketch:
+def _figure_around(sketch: Sketch, outline: Outline, gap: float, shape: ShapeSpec) -> Sketch:
     """As small as it holds the outline and keeps off it; an arc as the whole circle holds it."""
     circle = shapely.minimum_bounding_circle(outline.filled)
     centre = (float(circle.centroid.x), float(circle.centroid.y))
@@ -172,7 +172,8 @@ def _figure_around(sketch: Sketch, outline: Outline, gap: float, *, round_about:
     def holds(scale: float) -> bool:
         placed = sketch.at(centre, scale)
         line = LineString(placed.lines[0])
-        whole = Point(centre).buffer(placed.size[0] / 2) if round_about else Polygon(line)
+        arc = shape.kind == "arc"
+        whole = Point(centre).buffer(placed.size[0] / 2) if arc else Polygon(line)
         return whole.contains(outline.filled) and line.distance(outline.filled) >= gap
 
     low, high = 0.0, 1.0
