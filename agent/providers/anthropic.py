@@ -10,7 +10,8 @@ from pydantic import BaseModel
 from ...tools.tool import Tool
 from ..messages import Reply, Result, Usage, User
 from ..model import Request
-from .failures import cut_off, empty, refused
+from .calls import CallIds, give_names, read
+from .failures import cut_off, refused
 from .prices import Price
 from .wire import (
     Assembly,
@@ -20,7 +21,6 @@ from .wire import (
     count,
     described,
     dumped,
-    make_calls,
     media_type,
     safe_name,
     usage_of,
@@ -32,7 +32,18 @@ MAX_TOKENS = 8_192
 """Of one reply; the interface wants a bound, and this is the least of the current models'."""
 CACHED_TURNS = 2
 """The last turn's mark writes the cache for the next request, the one before reads it."""
+_PLAIN = {"text", "tool_use"}
+"""Blocks that can be written anew; thoughts, signed or hidden, have to come back as they came."""
 _MARK = b',"cache_control":{"type":"ephemeral"}}'
+
+
+_GROWING = {
+    "text": "text",
+    "partial_json": "input",
+    "thinking": "thinking",
+    "signature": "signature",
+}
+"""Fields of deltas, and the fields of blocks that they make grow."""
 
 
 class _Block(BaseModel):
@@ -53,20 +64,19 @@ class _Assembly(Assembly):
     events = "messages"
 
     def __init__(self) -> None:
-        self._blocks: dict[int, _Block] = {}
-        self._texts: dict[int, io.StringIO] = {}
-        self._inputs: dict[int, io.StringIO] = {}
+        self._blocks: dict[int, dict[str, Any]] = {}
+        self._grown: dict[tuple[int, str], io.StringIO] = {}
         self._stop: str | None = None
         self._usage: dict[str, Any] = {}
 
     def whole(self) -> Any:
-        content: list[dict[str, Any]] = []
-        for index, block in sorted(self._blocks.items()):
-            streamed, given = self._texts.get(index), self._inputs.get(index)
-            text = (block.text or "") + (streamed.getvalue() if streamed else "")
-            # What was streamed as text stays text: only a complete reply is read.
-            written = block.input if given is None else given.getvalue()
-            content.append(block.model_dump() | {"text": text, "input": written})
+        # What was streamed as text stays text: only a complete reply is read.
+        for (index, name), text in self._grown.items():
+            block, field = self._blocks.setdefault(index, {}), _GROWING[name]
+            begun = block.get(field)
+            block[field] = (begun if isinstance(begun, str) else "") + text.getvalue()
+        self._grown = {}
+        content = [block for _, block in sorted(self._blocks.items())]
         return {"content": content, "stop_reason": self._stop, "usage": self._usage}
 
     def take(self, event: dict[str, Any]) -> str:
@@ -75,13 +85,12 @@ class _Assembly(Assembly):
             raise TypeError
         delta: dict[str, Any] = event.get("delta") or {}
         if kind == "content_block_delta":
-            text, written = delta.get("text") or "", delta.get("partial_json") or ""
-            self._texts.setdefault(index, io.StringIO()).write(text)
-            if written:
-                self._inputs.setdefault(index, io.StringIO()).write(written)
-            return text
+            for name in _GROWING.keys() & delta.keys():
+                if delta[name]:
+                    self._grown.setdefault((index, name), io.StringIO()).write(delta[name])
+            return delta.get("text") or ""
         if kind == "content_block_start":
-            self._blocks[index] = _Block.model_validate(event["content_block"])
+            self._blocks[index] = {} | event["content_block"]
         message: dict[str, Any] = event.get("message") or {}
         for owner in (message, event):
             usage: dict[str, Any] = owner.get("usage") or {}
@@ -96,9 +105,10 @@ class Anthropic(Wire):
 
     assembly = _Assembly
 
-    def __init__(self, model: str, price: Price) -> None:
+    def __init__(self, model: str, price: Price, owner: str = "") -> None:
         self._model, self.price = dumped(model), price
-        self._blocks = MessageCache(_role_and_blocks)
+        self._ids = CallIds(owner or f"anthropic:{model}")
+        self._blocks = MessageCache(self._role_and_blocks)
 
     def path(self, *, stream: bool) -> str:
         """What follows the base URL."""
@@ -124,18 +134,22 @@ class Anthropic(Wire):
     def reply(self, body: Any, request: Request) -> Reply:
         """What a complete body answers to a request."""
         message = validated(body, _Message, "message")
-        text = "".join(b.text or "" for b in message.content if b.type == "text").strip()
+        text = "".join(b.text or "" for b in message.content if b.type == "text")
         if message.stop_reason == "refusal":
-            raise refused(text)
+            raise refused(text.strip())
         if message.stop_reason == "max_tokens":
             raise cut_off(MAX_TOKENS)
         if message.stop_reason == "model_context_window_exceeded":
             raise cut_off()
         written = [(b.id, b.name or "", b.input) for b in message.content if b.type == "tool_use"]
-        if not text and not written:
-            raise empty()
-        calls = make_calls(written, request.messages)
-        return Reply(text=text, calls=calls, usage=_anthropic_usage(message.usage, self.price))
+        text, calls = read(text, written, request)
+        items: tuple[dict[str, Any], ...] = ()
+        if len(written) == len(calls) and any(b.type not in _PLAIN for b in message.content):
+            blocks: list[dict[str, Any]] = body["content"]
+            give_names([b for b in blocks if b["type"] == "tool_use"], calls, "id", "input")
+            items = tuple(b for b in blocks if b["type"] != "text" or (b.get("text") or "").strip())
+        usage = _anthropic_usage(message.usage, self.price)
+        return Reply(text=text, calls=calls, usage=usage, opaque=self._ids.opaque(calls, items))
 
     def _turns(self, request: Request) -> bytes:
         """Messages by turns: results and what a person says belong to the same one."""
@@ -148,6 +162,34 @@ class Anthropic(Wire):
             [b'{"role":"%b","content":[%b]}' % (role, b",".join(blocks)) for role, blocks in turns]
         )
 
+    def _role_and_blocks(self, message: User | Reply | Result) -> tuple[bytes, bytes]:
+        """Role and blocks of a message; none where it says nothing, for empty ones are refused."""
+        if isinstance(message, Reply):
+            blocks = self._ids.items(message) or self._blocks_of(message)
+            return b"assistant", b",".join(map(dumped, blocks))
+        spoken = [_text_block(message.text)] if message.text.strip() else []
+        shown = [_image_block(image) for image in message.images]
+        if isinstance(message, User):
+            return b"user", b",".join([*shown, *spoken])
+        head = {"type": "tool_result", "tool_use_id": self._ids(message.call_id)}
+        head |= {"is_error": True} if message.error else {}
+        content = b",".join([*spoken, *shown])
+        return b"user", dumped(head)[:-1] + b',"content":[' + content + b"]}"
+
+    def _blocks_of(self, reply: Reply) -> list[dict[str, Any]]:
+        """A reply of which text and calls are all there is."""
+        text = [{"type": "text", "text": reply.text}] if reply.text.strip() else []
+        calls = [
+            {
+                "type": "tool_use",
+                "id": self._ids(call.id),
+                "name": safe_name(call.name),
+                "input": call.arguments,
+            }
+            for call in reply.calls
+        ]
+        return [*text, *calls]
+
 
 def _anthropic_usage(usage: Any, price: Price) -> Usage:
     return usage_of(
@@ -157,36 +199,6 @@ def _anthropic_usage(usage: Any, price: Price) -> Usage:
         written=count(usage, "cache_creation_input_tokens"),
         output=count(usage, "output_tokens"),
     )
-
-
-def _role_and_blocks(message: User | Reply | Result) -> tuple[bytes, bytes]:
-    """Role and blocks of a message; none where it says nothing, for empty ones are refused."""
-    if isinstance(message, Reply):
-        uses = [
-            dumped(
-                {
-                    "type": "tool_use",
-                    "id": safe_name(call.id),
-                    "name": safe_name(call.name),
-                    "input": call.arguments,
-                }
-            )
-            for call in message.calls
-        ]
-        spoken = [_text_block(message.text)] if message.text.strip() else []
-        return b"assistant", b",".join([*spoken, *uses])
-    spoken = [_text_block(message.text)] if message.text.strip() else []
-    shown = [_image_block(image) for image in message.images]
-    if isinstance(message, User):
-        return b"user", b",".join([*shown, *spoken])
-    return b"user", _result_block(message, b",".join([*spoken, *shown]))
-
-
-def _result_block(result: Result, content: bytes) -> bytes:
-    head = {"type": "tool_result", "tool_use_id": safe_name(result.call_id)}
-    if result.error:
-        head |= {"is_error": True}
-    return dumped(head)[:-1] + b',"content":[' + content + b"]}"
 
 
 def _text_block(text: str) -> bytes:

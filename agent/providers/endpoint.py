@@ -2,11 +2,20 @@
 
 import ipaddress
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from urllib.parse import urlsplit
+from typing import Any, cast
+from unicodedata import normalize
+from urllib.parse import unquote, urlsplit
 
 from ...tools.errors import InputError
+
+SHORTEST_KEY = 8
+"""Characters; people give such as "none" to servers that want no key."""
+_KEYS_COME = "Keys come from the environment."
+MOST_KEY = 8_192
+"""Characters; a file with more holds something else."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +45,31 @@ class Endpoint:
         """A text with the key struck out: some servers repeat it in their errors."""
         return text.replace(self.key, "[key]") if self.key else text
 
+    def masked(self, value: Any) -> Any:
+        """A reply's JSON with the key struck out; words as short as "none" are no secret."""
+        if isinstance(value, str) and len(self.key or "") >= SHORTEST_KEY:
+            return self.without_key(value)
+        if isinstance(value, dict):
+            fields = cast("dict[Any, Any]", value)
+            return {self.masked(name): self.masked(held) for name, held in fields.items()}
+        if isinstance(value, list | tuple):
+            return [self.masked(held) for held in cast("list[Any]", value)]
+        return value
+
+    def masking(self, show: Callable[[str], object]) -> Callable[..., None]:
+        """What shows fragments of text without the key, however it is cut."""
+        held, key = "", self.key or ""
+
+        def shown(text: str, *, last: bool = False) -> None:
+            nonlocal held
+            text = str(self.masked(held + text))
+            ends = range(0 if last else len(key) - 1, 0, -1)
+            held = next((key[:n] for n in ends if text.endswith(key[:n])), "")
+            if now := text.removesuffix(held):
+                show(now)
+
+        return shown
+
 
 def endpoint(base_url: str, *variables: str) -> Endpoint:
     """An endpoint with the key that the environment holds for it.
@@ -64,17 +98,17 @@ def endpoint(base_url: str, *variables: str) -> Endpoint:
 
 def _checked_url(base_url: str) -> str:
     advice = "give one such as http://127.0.0.1:8000/v1"
+    if "@" in normalize("NFKC", unquote(unquote(base_url))):  # however the rest is spelled
+        raise InputError(f"The base URL holds a name or a password; {advice}. {_KEYS_COME}")
+    if "?" in base_url or "#" in base_url:  # what stands behind may be a key: it is not repeated
+        raise InputError(f"The base URL holds more than a path; {advice}. {_KEYS_COME}")
     try:
         parts = urlsplit(base_url)
         usable = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
     except ValueError:
         raise InputError(f"The base URL cannot be read; {advice}.") from None
-    if parts.username is not None or parts.password is not None:
-        raise InputError("The base URL holds a name or a password; keys come from the environment.")
     if not usable or not base_url.isascii() or not base_url.isprintable() or " " in base_url:
         raise InputError(f"{base_url!r} is no base URL of a server; {advice}.")
-    if parts.query or parts.fragment:
-        raise InputError(f"{base_url!r} holds more than a path; {advice}.")
     return base_url.rstrip("/")
 
 
@@ -84,14 +118,18 @@ def _key_from_environment(variable: str) -> str | None:
     if not key and path:
         source = f"the file that {variable}_FILE names"
         try:
-            key = Path(path).read_text(encoding="utf-8").strip()
+            with Path(path).open(encoding="utf-8") as file:
+                key = file.read(MOST_KEY + 1).strip()
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) else "no text"
             raise InputError(
                 f"{variable}_FILE names {path}, which cannot be read: {why}."
             ) from None
-        if not key:
-            raise InputError(f"{variable}_FILE names {path}, which is empty.")
+        if not key or len(key) > MOST_KEY:
+            why = f"holds more than {MOST_KEY:,} characters" if key else "is empty"
+            raise InputError(
+                f"{variable}_FILE names {path}, which {why}: name a file with the key."
+            )
     if not (key.isascii() and key.isprintable()) or " " in key:
         raise InputError(f"The key in {source} holds characters that no key has.")
     return key or None

@@ -6,14 +6,16 @@ reply that holds one is kept, and sent back, part by part.
 
 import re
 from functools import lru_cache
+from itertools import groupby
 from typing import Any
 from urllib.parse import quote
 
 from pydantic import BaseModel
 
 from ...tools.tool import Tool
-from ..messages import Call, Opaque, Reply, Result, Usage, User
+from ..messages import Reply, Result, Usage, User
 from ..model import Request
+from .calls import CallIds, give_names, read
 from .failures import AskError, cut_off, empty, refused, unexpected
 from .prices import Price
 from .wire import (
@@ -24,7 +26,6 @@ from .wire import (
     count,
     described,
     dumped,
-    make_calls,
     media_type,
     usage_of,
     validated,
@@ -74,6 +75,14 @@ class _Candidate(BaseModel):
     finishReason: str | None = None  # noqa: N815
     finishMessage: str | None = None  # noqa: N815
 
+    @property
+    def parts(self) -> list[_Part]:
+        return (self.content.parts if self.content else None) or []
+
+    @property
+    def calls(self) -> list[_Function]:
+        return [part.functionCall for part in self.parts if part.functionCall is not None]
+
 
 class _Feedback(BaseModel):
     blockReason: str | None = None  # noqa: N815
@@ -90,45 +99,47 @@ class _Assembly(Assembly):
     events = "Gemini's contents"
 
     def __init__(self) -> None:
-        self._parts: list[dict[str, Any]] = []
-        self._text: list[str] = []
+        self._candidates: dict[int, dict[str, Any]] = {}
         self._whole: dict[str, Any] = {}
-        self._end: dict[str, Any] | None = None
 
     def whole(self) -> Any:
-        self._close_text()
-        if self._end is None:
-            return self._whole
-        return self._whole | {"candidates": [self._end | {"content": {"parts": self._parts}}]}
+        found = [
+            end | {"content": {"parts": _joined(end["content"])}}
+            for _, end in sorted(self._candidates.items())
+        ]
+        return self._whole | ({"candidates": found} if found else {})
 
     def take(self, event: dict[str, Any]) -> str:
         known = {key: event[key] for key in event.keys() & _KEYS if event[key] is not None}
         if not known:
             raise KeyError
-        candidates = known.pop("candidates", None)
+        candidates = known.pop("candidates", None) or ()
         self._whole |= known
         self.done = self.done or bool(known.get("promptFeedback", {}).get("blockReason"))
-        if not candidates:
-            return ""
-        first: dict[str, Any] = candidates[0]
-        end = {key: first.get(key) for key in ("finishReason", "finishMessage")}
-        self._end = (self._end or {}) | {key: value for key, value in end.items() if value}
-        self.done = self.done or bool(self._end.get("finishReason"))
-        content: dict[str, Any] = first.get("content") or {}
-        return "".join([self._part(part) for part in content.get("parts") or ()])
+        return "".join([self._candidate(candidate) for candidate in candidates])
 
-    def _part(self, part: dict[str, Any]) -> str:
-        if part.keys() == {"text"}:
-            self._text.append(part["text"])
-        else:
-            self._close_text()
-            self._parts.append(part)
-        return "" if part.get("thought") else part.get("text") or ""
+    def _candidate(self, fragment: dict[str, Any]) -> str:
+        """Take a fragment in; the text it brings to the first candidate."""
+        index = int(fragment.get("index") or 0)
+        candidate = self._candidates.setdefault(index, {"content": []})
+        ends = {key: fragment.get(key) for key in ("finishReason", "finishMessage")}
+        candidate |= {key: value for key, value in ends.items() if value}
+        self.done = self.done or bool(candidate.get("finishReason"))
+        content: dict[str, Any] = fragment.get("content") or {}
+        parts: list[dict[str, Any]] = list(content.get("parts") or ())
+        candidate["content"] += parts
+        said = [p.get("text") or "" for p in parts if not p.get("thought")]
+        return "" if index else "".join(said)
 
-    def _close_text(self) -> None:
-        if self._text:
-            self._parts.append({"text": "".join(self._text)})
-            self._text = []
+
+def _joined(parts: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Parts of one text as one; what is signed or anything else stays apart."""
+    runs = groupby(parts, key=lambda part: part.keys() == {"text"})
+    return [
+        part
+        for plain, run in runs
+        for part in ([{"text": "".join([p["text"] or "" for p in run])}] if plain else run)
+    ]
 
 
 class Gemini(Wire):
@@ -136,8 +147,8 @@ class Gemini(Wire):
 
     assembly = _Assembly
 
-    def __init__(self, model: str, price: Price) -> None:
-        self._name, self.price = f"gemini:{model}", price
+    def __init__(self, model: str, price: Price, owner: str = "") -> None:
+        self.price, self._ids = price, CallIds(owner or f"gemini:{model}")
         self._resource = quote(model if "/" in model else f"models/{model}")
         self._signs = _WANTS_SIGNATURES.match(model) is not None
         self._turns = MessageCache(self._turn)
@@ -165,20 +176,19 @@ class Gemini(Wire):
         response = validated(body, _Response, "content of Gemini's")
         if not response.candidates:
             raise _without_candidates(body, response.promptFeedback)
-        candidate = response.candidates[0]
-        _check_finish_reason(candidate)
-        parts = candidate.content.parts or [] if candidate.content else []
-        text = "".join(part.text or "" for part in parts if not part.thought).strip()
-        made = [part.functionCall for part in parts if part.functionCall is not None]
-        if not text and not made:
-            raise empty()
-        calls = make_calls([(f.id, f.name or "", f.args) for f in made], request.messages)
-        opaque = None
-        if any(part.thoughtSignature for part in parts):
-            written = body["candidates"][0]["content"]["parts"]
-            opaque = Opaque(model=self._name, items=_with_ids(written, calls))
+        candidates = response.candidates
+        place = next((n for n, c in enumerate(candidates) if c.calls), 0)
+        _check_finish_reason(candidates[place])
+        parts, made = candidates[place].parts, candidates[place].calls
+        said = "".join(part.text or "" for part in parts if not part.thought)
+        text, calls = read(said, [(f.id, f.name or "", f.args) for f in made], request)
+        items: tuple[dict[str, Any], ...] = ()
+        if len(made) == len(calls) and any(part.thoughtSignature for part in parts):
+            items = tuple(body["candidates"][place]["content"]["parts"])
+            signed = [i["functionCall"] for i in items if i.get("functionCall") is not None]
+            give_names(signed, calls, "id", "args", _function_name)
         usage = _gemini_usage(response.usageMetadata, self.price)
-        return Reply(text=text, calls=calls, usage=usage, opaque=opaque)
+        return Reply(text=text, calls=calls, usage=usage, opaque=self._ids.opaque(calls, items))
 
     def _contents(self, request: Request) -> bytes:
         """Messages by turns: all results of one reply belong to the same."""
@@ -214,8 +224,8 @@ class Gemini(Wire):
         return b"user", b",".join(map(dumped, [{"functionResponse": answer}, *shown]))
 
     def _model_parts(self, reply: Reply) -> list[dict[str, Any]]:
-        if reply.opaque and reply.opaque.model == self._name:
-            return list(reply.opaque.items)
+        if kept := self._ids.items(reply):
+            return list(kept)
         text = [{"text": reply.text}] if reply.text.strip() else []
         calls: list[dict[str, Any]] = [
             {
@@ -251,17 +261,6 @@ def _check_finish_reason(candidate: _Candidate) -> None:
         # MALFORMED_FUNCTION_CALL above all: the model wrote a call that is none.
         what = f"broke its reply off ({reason})"
         raise AskError(what, "try again, or use another model", "unless-same")
-
-
-def _with_ids(parts: list[dict[str, Any]], calls: tuple[Call, ...]) -> tuple[dict[str, Any], ...]:
-    """Parts whose calls have the ids that their results will name: some models give none."""
-    ids = iter(calls)
-    return tuple(
-        part | {"functionCall": part["functionCall"] | {"id": next(ids).id}}
-        if part.get("functionCall") is not None
-        else part
-        for part in parts
-    )
 
 
 def _gemini_usage(usage: Any, price: Price) -> Usage:

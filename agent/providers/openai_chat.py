@@ -3,56 +3,66 @@
 Only fields that every such server knows are sent, and never a null: some refuse either.
 """
 
-import io
-import re
 from functools import lru_cache
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 from annotated_types import MinLen
-from pydantic import BaseModel
-from pydantic_core import from_json
+from pydantic import BaseModel, ConfigDict
 
 from ...tools.tool import Tool
 from ..messages import Reply, Result, Usage, User
 from ..model import Request
-from .failures import AskError, cut_off, empty, refused
+from .calls import CallIds, read
+from .chat_stream import ChatAssembly, goes_back, joined_text
+from .failures import AskError, cut_off, refused
 from .prices import Price
 from .wire import (
-    Assembly,
     MessageCache,
     Wire,
     count,
     data_url,
     described,
     dumped,
-    make_calls,
     safe_name,
     usage_of,
     validated,
 )
 
-_THOUGHTS = re.compile(r"\A\s*<think>.*?</think>", re.DOTALL)
-_FENCES = re.compile(r"\A(?:```(?:json)?\s(.*)```|<tool_call>(.*)</tool_call>)\Z", re.DOTALL)
+_BRIDGE = b'{"role":"assistant","content":"OK."}'
+"""Strict servers take no user's message directly after a tool's."""
+_BESIDE_CALLS = {"reasoning", "reasoning_content"}
+"""Thoughts as plain text are wanted back with calls alone; some servers refuse them elsewhere."""
 
 
-class _Function(BaseModel):
+class _Open(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    @property
+    def more(self) -> dict[str, Any]:
+        """What the interface does not know of; a null says nothing."""
+        return {k: v for k, v in (self.model_extra or {}).items() if v is not None}
+
+
+class _Function(_Open):
     name: str | None = None
     arguments: Any = None
 
 
-class _Call(BaseModel):
+class _Call(_Open):
     id: str | int | None = None
+    index: Any = None
+    type: Any = None
     function: _Function = _Function()
 
 
-class _Message(BaseModel):
+class _Message(_Open):
     content: str | list[dict[str, Any]] | None = None
     refusal: str | None = None
     tool_calls: list[_Call] | None = None
 
     @property
     def text(self) -> str:
-        return _joined_text(self.content or "")
+        return joined_text(self.content or "")
 
 
 class _Choice(BaseModel):
@@ -65,69 +75,17 @@ class _Completion(BaseModel):
     usage: Any = None
 
 
-class _Assembly(Assembly):
-    events = "chat completions"
-
-    def __init__(self) -> None:
-        self._text, self._refusal = io.StringIO(), io.StringIO()
-        self._calls: list[dict[str, Any]] = []
-        self._at: dict[int | None, dict[str, Any]] = {}
-        self._finish: str | None = None
-        self._usage: Any = None
-
-    def take(self, event: dict[str, Any]) -> str:
-        self._usage = event.get("usage") or self._usage
-        choices = event.get("choices") or ()
-        return "".join([self._choice(c) for c in choices if not c.get("index")])
-
-    def whole(self) -> Any:
-        calls = [
-            {"id": c["id"], "function": {"name": c["name"], "arguments": "".join(c["arguments"])}}
-            for c in self._calls
-        ]
-        content, refusal = self._text.getvalue(), self._refusal.getvalue()
-        message = {"content": content, "refusal": refusal, "tool_calls": calls}
-        return {
-            "choices": [{"message": message, "finish_reason": self._finish}],
-            "usage": self._usage,
-        }
-
-    def _choice(self, choice: dict[str, Any]) -> str:
-        """Take the fragment of an answer in; the text it brings."""
-        if choice.get("finish_reason"):
-            self._finish, self.done = choice["finish_reason"], True
-        delta: dict[str, Any] = choice.get("delta") or {}
-        for part in delta.get("tool_calls") or ():
-            self._call(part)
-        if delta.get("refusal"):
-            self._refusal.write(_joined_text(delta["refusal"]))
-        text = _joined_text(delta.get("content") or "")
-        self._text.write(text)
-        return text
-
-    def _call(self, part: dict[str, Any]) -> None:
-        """Take the fragment of a call in."""
-        call, id = self._at.get(part.get("index")), part.get("id")
-        # Some servers leave the index out, or give every parallel call the same one.
-        if call is None or (id and call["id"] and id != call["id"]):
-            call = self._at[part.get("index")] = {"id": None, "name": None, "arguments": []}
-            self._calls.append(call)
-        function: dict[str, Any] = part.get("function") or {}
-        call["id"] = call["id"] or id
-        call["name"] = call["name"] or function.get("name")
-        given = function.get("arguments")
-        if given is not None:
-            call["arguments"].append(given if isinstance(given, str) else dumped(given).decode())
-
-
 class OpenAIChat(Wire):
     """Speaks Chat Completions."""
 
-    assembly = _Assembly
+    assembly = ChatAssembly
 
-    def __init__(self, model: str, price: Price) -> None:
+    def __init__(self, model: str, price: Price, owner: str = "") -> None:
         self._model, self.price = dumped(model), price
-        self._messages = MessageCache(_rendered)
+        self._ids = CallIds(owner or f"openai:{model}")
+        self._returned: set[str] = set()
+        self._refused: set[str] = set()
+        self._messages = MessageCache(self._rendered)
 
     def path(self, *, stream: bool) -> str:
         """What follows the base URL."""
@@ -136,16 +94,8 @@ class OpenAIChat(Wire):
     def body(self, request: Request, *, stream: bool) -> bytes:
         """A request as JSON."""
         written = [_system_message(request.system)] if request.system else []
-        pictures: list[bytes] = []
-        for message in request.messages:
-            if pictures and not isinstance(message, Result):
-                written += pictures
-                pictures = []
-            text, picture = self._messages(message)
-            written.append(text)
-            if picture:
-                pictures.append(picture)
-        parts = [b'{"model":', self._model, b',"messages":[', b",".join(written + pictures), b"]"]
+        written += self._conversation(request)
+        parts = [b'{"model":', self._model, b',"messages":[', b",".join(written), b"]"]
         if request.tools:
             parts += [b',"tools":', _functions(request.tools)]
         if stream:
@@ -155,54 +105,105 @@ class OpenAIChat(Wire):
     def reply(self, body: Any, request: Request) -> Reply:
         """What a complete body answers to a request."""
         completion = validated(body, _Completion, "chat completion")
-        choice = completion.choices[0]
+        choices = completion.choices
+        # Some gateways make a choice each of the words and of the calls of one reply.
+        spoken = next((c for c in choices if c.message.text.strip()), choices[0])
+        choice = next((c for c in choices if c.message.tool_calls), spoken)
         message = choice.message
         if message.refusal:
             raise refused(message.refusal)
         _check_finish_reason(choice.finish_reason)
-        text = _THOUGHTS.sub("", message.text).strip()
         written = [
             (None if c.id is None else str(c.id), c.function.name or "", c.function.arguments)
             for c in message.tool_calls or ()
         ]
-        if not written and (call := call_in_text(text, request.tools)):
-            text, written = "", [(None, *call)]
-        if not text and not written:
-            raise empty()
-        calls = make_calls(written, request.messages)
-        usage = openai_usage(completion.usage, self.price, "prompt", "completion")
-        return Reply(text=text, calls=calls, usage=usage)
+        text, calls = read(spoken.message.text, written, request)
+        kept = _kept(message, bool(calls))
+        return Reply(
+            text=text,
+            calls=calls,
+            usage=openai_usage(completion.usage, self.price, "prompt", "completion"),
+            opaque=self._ids.opaque(calls, (kept,) if kept else ()),
+        )
+
+    def gives_up(self, refusal: str) -> bool:
+        """Do without fields that came with replies where the server refuses them by name."""
+        named = {name for name in self._returned if name in refusal} - self._refused
+        self._refused |= named
+        if named:
+            self._messages = MessageCache(self._rendered)
+        return bool(named)
+
+    def _conversation(self, request: Request) -> list[bytes]:
+        """Messages in an order that strict servers take: what users say in a row is one message."""
+        written: list[bytes] = []
+        said: list[tuple[bytes, bytes]] = []
+        after_tool = False
+        for message in request.messages:
+            text, shown = self._messages(message)
+            if isinstance(message, Reply):
+                written += _users_turn(said, after_tool)
+                said = []
+            if not isinstance(message, User):
+                written.append(text)
+                after_tool = isinstance(message, Result)
+            if shown:
+                said.append((text if isinstance(message, User) else b"", shown))
+        return written + _users_turn(said, after_tool)
+
+    def _rendered(self, message: User | Reply | Result) -> tuple[bytes, bytes]:
+        """A message, and the parts of a user's one: results hold text only in this interface.
+
+        Of a user's message the first is its content, where that is text alone.
+        """
+        if isinstance(message, User):
+            parts = [_text_part(message.text), *map(_image_part, message.images)]
+            return b"" if message.images else dumped(message.text), b",".join(parts)
+        if isinstance(message, Reply):
+            return self._assistant_message(message), b""
+        id = self._ids(message.call_id)
+        result = {"role": "tool", "tool_call_id": id, "content": message.text}
+        if not message.images:
+            return dumped(result), b""
+        caption = _text_part(f"What {safe_name(message.name)} shows ({id}):")
+        return dumped(result), b",".join([caption, *map(_image_part, message.images)])
+
+    def _assistant_message(self, reply: Reply) -> bytes:
+        """A reply, with what came beside its text and calls."""
+        items = self._ids.items(reply)
+        kept = {k: v for k, v in (items[0] if items else {}).items() if k not in self._refused}
+        signs: list[dict[str, Any]] = [*kept.pop("tool_calls", ()), *({} for _ in reply.calls)]
+        message: dict[str, Any] = {"role": "assistant", "content": reply.text} | kept
+        self._returned.update(kept)
+        calls: list[dict[str, Any]] = []
+        for call, sign in zip(reply.calls, signs, strict=False):
+            more = {k: v for k, v in sign.items() if k not in self._refused}
+            self._returned.update(more)
+            function = {"name": safe_name(call.name), "arguments": dumped(call.arguments).decode()}
+            function |= more.pop("function", {})
+            calls.append(
+                {"id": self._ids(call.id), "type": "function", "function": function} | more
+            )
+        return dumped(message | ({"tool_calls": calls} if calls else {}))
 
 
-def _joined_text(content: str | list[dict[str, Any]]) -> str:
-    """Text; some servers answer in parts, as one may ask."""
-    if isinstance(content, str):
-        return content
-    return "".join([str(part.get("text") or "") for part in content])
-
-
-def call_in_text(text: str, tools: tuple[Tool, ...]) -> tuple[str, dict[str, Any]] | None:
-    """The call that a text is and nothing else: name and arguments, or None.
-
-    Servers that do not know a model's format leave its calls in the text. One is taken as a call
-    only if the whole text, a code fence or tool_call tags aside, is one JSON object of `name` and
-    `arguments` (or `parameters`) and the name is a tool's; anything more may be meant as words.
-    """
-    fenced = _FENCES.match(text)
-    try:
-        data: Any = from_json((fenced[1] or fenced[2]) if fenced else text, allow_inf_nan=False)
-    except ValueError:
-        return None
-    if not isinstance(data, dict):
-        return None
-    fields = dict(cast("dict[str, Any]", data))
-    if fields.get("type") == "function":
-        del fields["type"]
-    name, arguments = fields.get("name"), fields.get("arguments", fields.get("parameters"))
-    known = any(tool.name == name for tool in tools)
-    if len(fields) != 2 or not known or not isinstance(arguments, dict):
-        return None
-    return str(name), cast("dict[str, Any]", arguments)
+def _kept(message: _Message, calling: bool) -> dict[str, Any]:
+    """What came beside text and calls and has to go back, as fields of the message to be sent."""
+    kept = {name: value for name, value in message.more.items() if goes_back(name)}
+    if not calling:
+        return {name: value for name, value in kept.items() if name not in _BESIDE_CALLS}
+    signs = [
+        call.more | ({"function": call.function.more} if call.function.more else {})
+        for call in message.tool_calls or ()
+    ]
+    if any(signs):
+        kept["tool_calls"] = signs
+    content = message.content or ""
+    thinks = (
+        "</think" in content if isinstance(content, str) else any("text" not in p for p in content)
+    )
+    # Where the calls stand in the text, it is written anew.
+    return kept | ({"content": content} if thinks and message.tool_calls else {})
 
 
 def _check_finish_reason(reason: str | None) -> None:
@@ -224,40 +225,23 @@ def openai_usage(usage: Any, price: Price, read: str, wrote: str) -> Usage:
     return usage_of(price, fresh=fresh, cached=cached, written=written, output=output)
 
 
-def _rendered(message: User | Reply | Result) -> tuple[bytes, bytes | None]:
-    """A message, and the one that must follow the last result to show its images."""
-    if isinstance(message, User):
-        return _user_message(message.text, message.images), None
-    if isinstance(message, Reply):
-        return _assistant_message(message), None
-    result = {"role": "tool", "tool_call_id": safe_name(message.call_id), "content": message.text}
-    caption = f"What {safe_name(message.name)} shows ({safe_name(message.call_id)}):"
-    # Results of tools hold text only in this interface.
-    return dumped(result), _user_message(caption, message.images) if message.images else None
+def _users_turn(said: list[tuple[bytes, bytes]], after_tool: bool) -> list[bytes]:
+    """The message that says all this, and what has to stand before it; text alone stays text."""
+    if not said:
+        return []
+    (content, parts), alone = said[0], len(said) == 1
+    if not (alone and content):
+        content = b"[%b]" % (parts if alone else b",".join(shown for _, shown in said))
+    turn = b'{"role":"user","content":%b}' % content
+    return [_BRIDGE, turn] if after_tool else [turn]
 
 
-def _user_message(text: str, images: tuple[bytes, ...]) -> bytes:
-    if not images:
-        return dumped({"role": "user", "content": text})
-    shown = [{"type": "image_url", "image_url": {"url": data_url(image)}} for image in images]
-    return dumped({"role": "user", "content": [{"type": "text", "text": text}, *shown]})
+def _text_part(text: str) -> bytes:
+    return dumped({"type": "text", "text": text})
 
 
-def _assistant_message(reply: Reply) -> bytes:
-    message: dict[str, Any] = {"role": "assistant", "content": reply.text}
-    if reply.calls:
-        message["tool_calls"] = [
-            {
-                "id": safe_name(call.id),
-                "type": "function",
-                "function": {
-                    "name": safe_name(call.name),
-                    "arguments": dumped(call.arguments).decode(),
-                },
-            }
-            for call in reply.calls
-        ]
-    return dumped(message)
+def _image_part(image: bytes) -> bytes:
+    return dumped({"type": "image_url", "image_url": {"url": data_url(image)}})
 
 
 @lru_cache(maxsize=16)

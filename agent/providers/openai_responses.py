@@ -3,15 +3,17 @@
 Nothing is stored there, so that what a model thought comes back to it encrypted, with its calls.
 """
 
+import io
 from functools import lru_cache
 from typing import Any
 
 from pydantic import BaseModel
 
 from ...tools.tool import Tool
-from ..messages import Call, Opaque, Reply, Result, User
+from ..messages import Reply, Result, User
 from ..model import Request
-from .failures import AskError, cut_off, empty, of_error_body, refused
+from .calls import CallIds, give_names, read
+from .failures import AskError, cut_off, of_error_body, refused
 from .openai_chat import openai_usage
 from .prices import Price
 from .wire import (
@@ -21,7 +23,6 @@ from .wire import (
     data_url,
     described,
     dumped,
-    make_calls,
     safe_name,
     validated,
 )
@@ -61,19 +62,23 @@ class _Assembly(Assembly):
     events = "responses"
 
     def __init__(self) -> None:
-        self._items: list[Any] = []
+        self._items: dict[Any, dict[str, Any]] = {}
+        self._written: dict[Any, io.StringIO] = {}
         self._response: dict[str, Any] = {}
 
     def whole(self) -> Any:
         # Some servers end with a response that repeats nothing of what they streamed.
-        return self._response | {"output": self._response.get("output") or self._items}
+        items = [self._item(place) for place in self._items]
+        return self._response | {"output": self._response.get("output") or items}
 
     def take(self, event: dict[str, Any]) -> str:
-        kind = event["type"]
-        if kind == "response.output_text.delta":
-            return "".join([event["delta"]])
-        if kind == "response.output_item.done":
-            self._items.append(event["item"])
+        kind, place = event["type"], event.get("output_index", len(self._items))
+        hash(place)
+        if kind in ("response.output_text.delta", "response.function_call_arguments.delta"):
+            self._written.setdefault(place, io.StringIO()).write(event["delta"])
+            return event["delta"] if "text" in kind else ""
+        if kind in ("response.output_item.added", "response.output_item.done"):
+            self._items[place] = {} | event["item"]
         elif kind in _ENDS:
             self._response, self.done = {} | event["response"], True
         elif kind == "error" and (failure := of_error_body({"error": event}, _KEY_ADVICE)):
@@ -82,14 +87,24 @@ class _Assembly(Assembly):
             raise TypeError
         return ""
 
+    def _item(self, place: Any) -> dict[str, Any]:
+        """An item as it was completed, or else of its fragments."""
+        item = self._items[place]
+        written = self._written[place].getvalue() if place in self._written else ""
+        if item.get("type") == "function_call":
+            return item | {"arguments": item.get("arguments") or written}
+        text = [{"type": "output_text", "text": written}] if written else []
+        return item | ({"content": item.get("content") or text} if text else {})
+
 
 class OpenAIResponses(Wire):
     """Speaks Responses."""
 
     assembly = _Assembly
 
-    def __init__(self, model: str, price: Price) -> None:
-        self._model, self._name, self.price = dumped(model), f"openai-responses:{model}", price
+    def __init__(self, model: str, price: Price, owner: str = "") -> None:
+        self._model, self.price = dumped(model), price
+        self._ids = CallIds(owner or f"openai-responses:{model}")
         self._keeps_thoughts = True
         self._items = MessageCache(self._written)
 
@@ -122,17 +137,16 @@ class OpenAIResponses(Wire):
         parts = [part for message in messages for part in message.content or ()]
         if refusal := "".join(part.refusal or "" for part in parts):
             raise refused(refusal)
-        text = "".join(part.text or "" for part in parts).strip()
         made = [item for item in response.output if item.type == "function_call"]
-        if not text and not made:
-            raise empty()
         written = [(item.call_id, item.name or "", item.arguments) for item in made]
-        calls = make_calls(written, request.messages)
-        opaque = None
-        if _must_be_kept(response.output):
-            opaque = Opaque(model=self._name, items=_with_ids(body["output"], calls))
+        text, calls = read("".join(part.text or "" for part in parts), written, request)
+        items: tuple[dict[str, Any], ...] = ()
+        if len(made) == len(calls) and _must_be_kept(response.output):
+            said: list[dict[str, Any]] = body["output"]
+            items = tuple({k: v for k, v in item.items() if v is not None} for item in said)
+            give_names([i for i in items if i["type"] == "function_call"], calls, "call_id")
         usage = openai_usage(response.usage, self.price, "input", "output")
-        return Reply(text=text, calls=calls, usage=usage, opaque=opaque)
+        return Reply(text=text, calls=calls, usage=usage, opaque=self._ids.opaque(calls, items))
 
     def gives_up(self, refusal: str) -> bool:
         """Do without encrypted thoughts: models that do not think refuse to be asked for them."""
@@ -147,12 +161,25 @@ class OpenAIResponses(Wire):
         if isinstance(message, User):
             return dumped({"role": "user", "content": _input_content(message.text, message.images)})
         if isinstance(message, Result):
-            head = {"type": "function_call_output", "call_id": safe_name(message.call_id)}
+            head = {"type": "function_call_output", "call_id": self._ids(message.call_id)}
             return dumped(head | {"output": _input_content(message.text, message.images)})
-        opaque = message.opaque if self._keeps_thoughts else None
-        own = opaque is not None and opaque.model == self._name
-        items = opaque.items if opaque and own else _items_of(message)
-        return b",".join(map(dumped, items))
+        items = self._ids.items(message)
+        kept = items if self._keeps_thoughts else ()
+        return b",".join(map(dumped, kept or self._items_of(message)))
+
+    def _items_of(self, reply: Reply) -> list[dict[str, Any]]:
+        """A reply of which text and calls are all there is."""
+        text = [{"role": "assistant", "content": reply.text}] if reply.text.strip() else []
+        calls = [
+            {
+                "type": "function_call",
+                "call_id": self._ids(call.id),
+                "name": safe_name(call.name),
+                "arguments": dumped(call.arguments).decode(),
+            }
+            for call in reply.calls
+        ]
+        return [*text, *calls]
 
 
 def _check_status(response: _Response) -> None:
@@ -174,31 +201,6 @@ def _must_be_kept(items: list[_Item]) -> bool:
     thoughts = [item for item in items if item.type not in ("message", "function_call")]
     whole = all(item.encrypted_content or item.content for item in thoughts)
     return whole and bool(thoughts or any(item.phase for item in items))
-
-
-def _with_ids(items: list[dict[str, Any]], calls: tuple[Call, ...]) -> tuple[dict[str, Any], ...]:
-    """Items whose calls have the ids that their results will name."""
-    ids = iter(calls)
-    kept: list[dict[str, Any]] = []
-    for item in items:
-        call = {"call_id": safe_name(next(ids).id)} if item["type"] == "function_call" else {}
-        kept.append({name: value for name, value in item.items() if value is not None} | call)
-    return tuple(kept)
-
-
-def _items_of(reply: Reply) -> tuple[dict[str, Any], ...]:
-    """A reply of which text and calls are all there is."""
-    text = [{"role": "assistant", "content": reply.text}] if reply.text.strip() else []
-    calls = [
-        {
-            "type": "function_call",
-            "call_id": safe_name(call.id),
-            "name": safe_name(call.name),
-            "arguments": dumped(call.arguments).decode(),
-        }
-        for call in reply.calls
-    ]
-    return (*text, *calls)
 
 
 def _input_content(text: str, images: tuple[bytes, ...]) -> str | list[dict[str, str]]:

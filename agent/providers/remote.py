@@ -29,7 +29,7 @@ class _Provider:
         billed_as: the name its prices are listed under.
     """
 
-    wire: Callable[[str, Price], Wire]
+    wire: Callable[[str, Price, str], Wire]
     base_url: str
     elsewhere: str
     variables: tuple[str, ...]
@@ -91,12 +91,12 @@ class RemoteModel:
         Raises:
             ModelError: there is none.
         """
-        try:
-            return await self._ask(request)
-        except ModelError as error:
-            if not self._gives_up(str(error)):
-                raise
-        return await self._ask(request)
+        while True:
+            try:
+                return await self._ask(request)
+            except ModelError as error:
+                if not self._gives_up(str(error)):
+                    raise
 
     async def aclose(self) -> None:
         """Close the connections of the running event loop."""
@@ -133,8 +133,11 @@ def remote_model(
     known = _PROVIDERS[provider]
     base_url = base_url or os.environ.get(known.elsewhere)
     # Who runs another server sets other prices.
-    wire = known.wire(model, UNKNOWN if base_url else price_of(known.billed_as, model))
+    price = UNKNOWN if base_url else price_of(known.billed_as, model)
     at = endpoint(base_url or known.base_url, *known.variables)
+    wire = known.wire(
+        model, price, f"{provider}:{model}" + (f" at {at.base_url}" if base_url else "")
+    )
     path = wire.path(stream=show is not None)
     if _VERSION_AT_END.search(at.base_url):
         path = _VERSION_AT_START.sub("", path)

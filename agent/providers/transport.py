@@ -9,7 +9,7 @@ import ssl
 from asyncio import AbstractEventLoop
 from collections.abc import AsyncIterator, Awaitable, Callable
 from functools import cache
-from typing import Any
+from typing import Any, cast
 from urllib.request import getproxies, proxy_bypass
 from weakref import WeakKeyDictionary
 
@@ -30,6 +30,8 @@ CONNECT_S = 10.0
 SILENCE_S = 300.0
 """The longest a server may say nothing: large models think for minutes."""
 MAX_BYTES = 64 * 2**20
+_MARK = b"\xef\xbb\xbf"
+"""That a text is UTF-8, as some servers begin theirs."""
 
 Sleep = Callable[[float], Awaitable[object]]
 
@@ -124,43 +126,61 @@ class Transport:
     async def _read(
         self, wire: Wire, request: Request, response: httpx.Response, show: Show | None
     ) -> Reply:
-        advice = self._endpoint.key_advice
         if not response.is_success:
             body = await _whole_body(response)
+            advice = self._endpoint.key_advice
             raise of_status(response.status_code, response.headers, body, advice)
-        if response.headers.get("content-type", "").startswith("text/event-stream"):
-            return wire.reply(await self._assembled(response, wire.assembly(), show), request)
-        data = _parsed_json(await _whole_body(response))
-        if failure := of_error_body(data, advice):
-            raise failure
+        shown = None if show is None else self._endpoint.masking(show)
+        data, streamed = await self._body(response, wire.assembly(), shown)
         reply = wire.reply(data, request)
-        if show is not None:
-            show(reply.text)
-        return reply
+        if shown is not None:
+            shown("" if streamed else reply.text, last=True)
+        return Reply.model_validate(self._endpoint.masked(reply.model_dump()))
 
-    async def _assembled(
+    async def _body(
         self, response: httpx.Response, assembly: Assembly, show: Show | None
-    ) -> Any:
-        events, size = Events(), 0
+    ) -> tuple[Any, bool]:
+        """A complete body, and whether it came as a stream: some servers call either the other."""
+        events, plain, size, streamed = Events(), bytearray(), 0, False
         try:
             async for chunk in _chunks(response):
                 size = _bounded_size(size + len(chunk))
-                for event in events.feed(chunk):
-                    if event == b"[DONE]":
-                        assembly.done = True
-                        continue
-                    data = _parsed_json(event)
-                    if failure := of_error_body(data, self._endpoint.key_advice):
-                        raise failure
-                    text = assembly.add(data)
-                    if text and show is not None:
-                        show(text)
+                found = events.feed(chunk)
+                streamed = streamed or bool(found)
+                plain += b"" if streamed else chunk
+                self._take(found, assembly, show)
+            last = events.end()
+            self._take(last, assembly, show)
         except httpx.HTTPError:
             if not assembly.done:
                 raise
-        if not assembly.done:
-            raise _dropped_connection()
-        return assembly.whole()
+        else:
+            whole = bytes(plain).removeprefix(_MARK)
+            if not (streamed or last) and not _is_event_stream(response, whole):
+                return self._joined(_parsed_json(whole), assembly), False
+        return _ended(assembly), True
+
+    def _joined(self, data: Any, assembly: Assembly) -> Any:
+        """A complete body; some servers send the events of a stream as one list."""
+        listed = isinstance(data, list) and len(cast("list[Any]", data)) > 0
+        for event in cast("list[Any]", data if listed else [data]):
+            if failure := of_error_body(event, self._endpoint.key_advice):
+                raise failure
+            if listed:
+                assembly.add(event)
+        return _ended(assembly) if listed else cast("Any", data)
+
+    def _take(self, events: list[bytes], assembly: Assembly, show: Show | None) -> None:
+        """Take the data of events in; an empty object only keeps a connection alive."""
+        for event in events:
+            if event == b"[DONE]":
+                assembly.done = True
+            elif (data := _parsed_json(event)) != {}:
+                if failure := of_error_body(data, self._endpoint.key_advice):
+                    raise failure
+                text = assembly.add(data)
+                if text and show is not None:
+                    show(text)
 
 
 class Events:
@@ -169,12 +189,19 @@ class Events:
     def __init__(self) -> None:
         self._rest: list[bytes] = []
         self._data: list[bytes] = []
+        self._half = False  # whether the last line ended in the first half of CR LF
 
     def feed(self, chunk: bytes) -> list[bytes]:
-        """Data of the events that are complete with this chunk."""
+        """Data of the events that are complete with this chunk; none where it is empty."""
         one = chunk[:5] == b"data:" and chunk.find(b"\n\n") == chunk.find(b"\n") == len(chunk) - 2
-        if one and not (self._rest or self._data):
-            return [chunk[5:].strip()]  # nearly always: one event, whole
+        if one and b"\r" not in chunk and not (self._rest or self._data):
+            self._half = False
+            return [data] if (data := chunk[5:].strip()) else []  # nearly always: one event, whole
+        if self._half:
+            chunk = chunk.removeprefix(b"\n")
+        self._half = chunk.endswith(b"\r")
+        if b"\r" in chunk:
+            chunk = chunk.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         self._rest.append(chunk)
         if b"\n" not in chunk:
             return []
@@ -182,13 +209,17 @@ class Events:
         self._rest = [rest] if rest else []
         events: list[bytes] = []
         for line in lines:
-            content = line.rstrip(b"\r")
+            content = line.removeprefix(_MARK)
             if content.startswith(b"data:"):
                 self._data.append(content[5:].strip())
             elif not content and self._data:
                 events.append(b"\n".join(self._data))
                 self._data = []
-        return events
+        return [event for event in events if event]
+
+    def end(self) -> list[bytes]:
+        """Data of an event that ended with the connection, and not in its midst."""
+        return [event for event in self.feed(b"\n\n") if event == b"[DONE]" or _is_json(event)]
 
 
 def _proxy(url: httpx.URL) -> str | None:
@@ -223,6 +254,12 @@ async def _whole_body(response: httpx.Response) -> bytes:
     return b"".join(chunks)
 
 
+def _is_event_stream(response: httpx.Response, plain: bytes) -> bool:
+    """Whether a body without events is a stream that has not begun."""
+    kind = response.headers.get("content-type", "")
+    return kind.startswith("text/event-stream") and plain.lstrip()[:1] not in (b"{", b"[")
+
+
 def _bounded_size(size: int) -> int:
     """The size of an answer so far, bytes.
 
@@ -235,11 +272,25 @@ def _bounded_size(size: int) -> int:
     return size
 
 
+def _is_json(body: bytes) -> bool:
+    try:
+        return from_json(body) is not None
+    except ValueError:
+        return False
+
+
 def _parsed_json(body: bytes) -> Any:
     try:
         return from_json(body)
     except ValueError:
         raise unexpected("something that is not JSON") from None
+
+
+def _ended(assembly: Assembly) -> Any:
+    """The complete body of a stream that has ended."""
+    if not assembly.done:
+        raise _dropped_connection()
+    return assembly.whole()
 
 
 def _dropped_connection() -> AskError:

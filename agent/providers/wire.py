@@ -1,4 +1,4 @@
-"""What every adapter needs: messages written once, calls read whatever they look like."""
+"""What every adapter needs: the protocol of one, messages written once, tokens counted."""
 
 import base64
 import json
@@ -8,19 +8,15 @@ from collections.abc import Callable, Iterable
 from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import from_json
 
 from ...tools.tool import Tool
-from ..messages import Call, History, Reply, Result, Usage, User
+from ..messages import Reply, Result, Usage, User
 from ..model import Request
 from .failures import unexpected
 from .prices import Price
 
 T = TypeVar("T")
 Body = TypeVar("Body", bound=BaseModel)
-UNREADABLE = "this is not a JSON object"
-"""The argument under which a model gets back what it wrote in place of its arguments. No tool has
-such a parameter, so the call fails and says so, and what is sent on to servers is valid JSON."""
 MOST_TOKENS = 10**12
 """No request counts so many; a server that says so does not know."""
 _JPEG = b"\xff\xd8"
@@ -62,7 +58,7 @@ class Assembly(Protocol):
 class Wire(Protocol):
     """One provider's language, made of a model as the server calls it and the price of its tokens.
 
-    It does no I/O.
+    It does no I/O. A third argument, the owner, says whose replies it may send back as they came.
     """
 
     assembly: type[Assembly]
@@ -155,40 +151,8 @@ def data_url(image: bytes) -> str:
 
 
 def safe_name(name: str) -> str:
-    """A name or id that no server refuses, for models make up others."""
+    """A name that no server refuses, for models make up others."""
     return re.sub(r"[^a-zA-Z0-9_-]", "_", name)[:64] or "unnamed"
-
-
-def arguments_of(given: object) -> dict[str, Any]:
-    """A call's arguments, whether they come as text or as an object.
-
-    What is no JSON object is kept under `UNREADABLE`: the tool refuses it, the model reads why.
-    """
-    value: Any = given
-    if isinstance(given, str):
-        try:
-            value = from_json(given, allow_inf_nan=False) if given.strip() else {}
-        except ValueError:
-            return {UNREADABLE: given}
-    if value is None:
-        return {}
-    return cast("dict[str, Any]", value) if isinstance(value, dict) else {UNREADABLE: value}
-
-
-def make_calls(
-    written: Iterable[tuple[str | None, str, object]], history: History
-) -> tuple[Call, ...]:
-    """Calls from (id, name, arguments); ids that lack or repeat are made up, for each means one."""
-    taken = {c.id for m in history if isinstance(m, Reply) for c in m.calls}
-    calls: list[Call] = []
-    for given, name, arguments in written:
-        id, number = given or "call", len(taken)
-        while id in taken or id == "call":
-            number += 1
-            id = f"call_{number}"
-        taken.add(id)
-        calls.append(Call(id=id, name=name, arguments=arguments_of(arguments)))
-    return tuple(calls)
 
 
 def count(usage: object, *path: str) -> int:

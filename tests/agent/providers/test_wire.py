@@ -9,17 +9,20 @@ import pytest
 from formup.agent.messages import Call, History, Reply, Result, User
 from formup.agent.model import Request
 from formup.agent.providers.anthropic import Anthropic
+from formup.agent.providers.calls import CallIds, arguments_of
 from formup.agent.providers.gemini import Gemini
 from formup.agent.providers.openai_chat import OpenAIChat
 from formup.agent.providers.openai_responses import OpenAIResponses
 from formup.agent.providers.prices import UNKNOWN, Price
 from formup.agent.providers.transport import Events
-from formup.agent.providers.wire import Wire, arguments_of, safe_name
+from formup.agent.providers.wire import Wire, safe_name
 from formup.tools.builtin import TOOLS
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic_core import from_json
 
+ODD_ID = CallIds("another")("b c")
+"""What an id becomes that servers may refuse and that no model of theirs made."""
 PNG, JPEG = b"\x89PNG\r\n\x1a\n...", b"\xff\xd8\xff..."
 PNG_TEXT, JPEG_TEXT = (base64.b64encode(image).decode() for image in (PNG, JPEG))
 HISTORY: History = (
@@ -60,7 +63,7 @@ def test_openai() -> None:
     ]
     calls = [
         {"id": id, "type": "function", "function": function}
-        for id, function in zip(("a", "b_c"), functions, strict=True)
+        for id, function in zip(("a", ODD_ID), functions, strict=True)
     ]
     shown = [text("What look shows (a):"), url("png", PNG_TEXT)]
     assert sent == {
@@ -72,7 +75,8 @@ def test_openai() -> None:
             {"role": "user", "content": "well?"},
             {"role": "assistant", "content": "", "tool_calls": calls},
             {"role": "tool", "tool_call_id": "a", "content": "{}"},
-            {"role": "tool", "tool_call_id": "b_c", "content": "no"},
+            {"role": "tool", "tool_call_id": ODD_ID, "content": "no"},
+            {"role": "assistant", "content": "OK."},
             {"role": "user", "content": shown},
             {"role": "assistant", "content": "Hm."},
             {"role": "user", "content": "go on"},
@@ -86,9 +90,9 @@ def test_anthropic() -> None:
     mark = {"cache_control": {"type": "ephemeral"}}
     uses: list[dict[str, Any]] = [
         {"type": "tool_use", "id": "a", "name": "look", "input": {}},
-        {"type": "tool_use", "id": "b_c", "name": "functions_x", "input": {"k": "ü"}},
+        {"type": "tool_use", "id": ODD_ID, "name": "functions_x", "input": {"k": "ü"}},
     ]
-    failed = {"tool_use_id": "b_c", "is_error": True, "content": [text("no")]}
+    failed = {"tool_use_id": ODD_ID, "is_error": True, "content": [text("no")]}
     shown = [text("{}"), image("png", PNG_TEXT)]
     results = [
         {"type": "tool_result", "tool_use_id": "a", "content": shown},
@@ -116,7 +120,7 @@ def test_responses() -> None:
         {"type": "function_call", "call_id": id, "name": name, "arguments": arguments}
         for id, name, arguments in (
             ("a", "look", "{}"),
-            ("b_c", "functions_x", '{"k":"\\u00fc"}'),
+            (ODD_ID, "functions_x", '{"k":"\\u00fc"}'),
         )
     ]
 
@@ -136,7 +140,7 @@ def test_responses() -> None:
             {"role": "user", "content": "well?"},
             *calls,
             output | {"call_id": "a", "output": shown("{}", "png", PNG_TEXT)},
-            output | {"call_id": "b_c", "output": "no"},
+            output | {"call_id": ODD_ID, "output": "no"},
             {"role": "assistant", "content": "Hm."},
             {"role": "user", "content": "go on"},
         ],
