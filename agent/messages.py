@@ -59,13 +59,14 @@ class User(_Value):
 
 
 class Opaque(_Value):
-    """A reply as its server wrote it, with the signed or encrypted thoughts that belong to it.
+    """What is kept of a reply as its server wrote it: thoughts, signed or encrypted, and odd ids.
 
     It goes back to the model it came from, which may refuse the conversation without; no other
     model and nothing else reads it.
 
     Attributes:
-        model: whose it is, such as gemini:NAME.
+        model: whose it is, such as gemini:NAME, and where it was asked if not at its own address.
+        items: what goes back beside text and calls; none where only ids have to stay as they are.
     """
 
     model: str

@@ -91,6 +91,9 @@ class _Assembly(Assembly):
             return delta.get("text") or ""
         if kind == "content_block_start":
             self._blocks[index] = {} | event["content_block"]
+        if kind == "message":  # all of it in one event
+            blocks: list[dict[str, Any]] = event["content"]
+            self._blocks, delta = dict(enumerate(blocks)), event
         message: dict[str, Any] = event.get("message") or {}
         for owner in (message, event):
             usage: dict[str, Any] = owner.get("usage") or {}

@@ -36,7 +36,6 @@ _FENCED = re.compile(r"\A\s*```\w*\s(.*)```\s*\Z", re.DOTALL)
 _CLOSED = re.compile(r"(?:\s*(?:</[\w-]+>|<\|[\w-]+\|>))+\s*\Z")
 _OPENED = re.compile(r"^\s*(?=<tool_call>|<function_call>|\[TOOL_CALLS\])", re.MULTILINE)
 _TAGS = re.compile(r"</?(?:tool_call|function_call)>|\[TOOL_CALLS\]")
-_SPACE = re.compile(r"\s*")
 _DECODER = json.JSONDecoder()
 
 
@@ -113,13 +112,12 @@ def calls_in_text(text: str, tools: tuple[Tool, ...]) -> tuple[str, list[Written
         values = [value for piece in pieces for value in _values(piece)]
     except (ValueError, RecursionError):
         return None
-    calls = [_written_call(v, tools) for value in values for v in _listed(value)]
+    listed: list[Any] = []
+    for value in values:
+        listed += value if isinstance(value, list) else [value]
+    calls = [_written_call(value, tools) for value in listed]
     known = [call for call in calls if call is not None]
     return (said.strip(), known) if known and len(known) == len(calls) else None
-
-
-def _listed(value: Any) -> list[Any]:
-    return cast("list[Any]", value) if isinstance(value, list) else [value]
 
 
 def give_names(
@@ -212,8 +210,7 @@ def _values(text: str) -> list[Any]:
     while at < len(body):
         _, end = _DECODER.raw_decode(body, at)
         values.append(from_json(body[at:end], allow_inf_nan=False))
-        space = _SPACE.match(body, end)
-        at = space.end() if space else end
+        at = len(body) - len(body[end:].lstrip())
     return values
 
 
@@ -238,9 +235,13 @@ def _shaped(value: Any, schema: Mapping[str, Any], kinds: Mapping[str, Any]) -> 
     choices = [kinds.get(str(o.get("$ref", ""))[len("#/$defs/") :], o) for o in options]
     wanted = {choice.get("type") for choice in choices}
     if isinstance(value, str):
-        inner = None if "string" in wanted else _container(value)
-        fits = ("object" if isinstance(inner, dict) else "array") in wanted
-        return _shaped(inner, schema, kinds) if inner is not None and fits else value
+        if "string" in wanted or not wanted & {"object", "array"}:
+            return value
+        try:
+            inner = _parsed(value)
+        except (ValueError, RecursionError):
+            return value
+        return _shaped(inner, schema, kinds) if isinstance(inner, dict | list) else value
     if isinstance(value, list):
         items = [choice["items"] for choice in choices if "items" in choice]
         return [_shaped(v, (items or [{}])[0], kinds) for v in cast("list[Any]", value)]
@@ -252,12 +253,3 @@ def _shaped(value: Any, schema: Mapping[str, Any], kinds: Mapping[str, Any]) -> 
         for name, each in given
         if each is not None or not fields or name in needed
     }
-
-
-def _container(text: str) -> Any:
-    """The object or list that a text is, or None."""
-    try:
-        value = _parsed(text) if text.lstrip()[:1] in ("{", "[", "`") else None
-    except (ValueError, RecursionError):
-        return None
-    return cast("Any", value) if isinstance(value, dict | list) else None

@@ -174,13 +174,13 @@ class OpenAIChat(Wire):
         kept = {k: v for k, v in (items[0] if items else {}).items() if k not in self._refused}
         signs: list[dict[str, Any]] = [*kept.pop("tool_calls", ()), *({} for _ in reply.calls)]
         message: dict[str, Any] = {"role": "assistant", "content": reply.text} | kept
-        self._returned.update(kept)
+        self._returned.update(kept.keys() - {"content"})
         calls: list[dict[str, Any]] = []
         for call, sign in zip(reply.calls, signs, strict=False):
             more = {k: v for k, v in sign.items() if k not in self._refused}
-            self._returned.update(more)
             function = {"name": safe_name(call.name), "arguments": dumped(call.arguments).decode()}
             function |= more.pop("function", {})
+            self._returned.update(more)
             calls.append(
                 {"id": self._ids(call.id), "type": "function", "function": function} | more
             )

@@ -72,6 +72,8 @@ class _Assembly(Assembly):
         return self._response | {"output": self._response.get("output") or items}
 
     def take(self, event: dict[str, Any]) -> str:
+        if event.get("object") == "response":  # all of it in one event
+            event = {"type": "response.completed", "response": event}
         kind, place = event["type"], event.get("output_index", len(self._items))
         hash(place)
         if kind in ("response.output_text.delta", "response.function_call_arguments.delta"):

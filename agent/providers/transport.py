@@ -131,34 +131,35 @@ class Transport:
             advice = self._endpoint.key_advice
             raise of_status(response.status_code, response.headers, body, advice)
         shown = None if show is None else self._endpoint.masking(show)
-        data, streamed = await self._body(response, wire.assembly(), shown)
+        data, told = await self._body(response, wire.assembly(), shown)
         reply = wire.reply(data, request)
         if shown is not None:
-            shown("" if streamed else reply.text, last=True)
+            shown("" if told else reply.text, last=True)
         return Reply.model_validate(self._endpoint.masked(reply.model_dump()))
 
     async def _body(
         self, response: httpx.Response, assembly: Assembly, show: Show | None
     ) -> tuple[Any, bool]:
-        """A complete body, and whether it came as a stream: some servers call either the other."""
-        events, plain, size, streamed = Events(), bytearray(), 0, False
+        """A complete body, a stream's or not whatever it is called, and whether text was shown."""
+        events, plain, size, streamed, told = Events(), bytearray(), 0, False, False
         try:
             async for chunk in _chunks(response):
                 size = _bounded_size(size + len(chunk))
                 found = events.feed(chunk)
                 streamed = streamed or bool(found)
                 plain += b"" if streamed else chunk
-                self._take(found, assembly, show)
+                told = self._take(found, assembly, show) or told
             last = events.end()
-            self._take(last, assembly, show)
+            told = self._take(last, assembly, show) or told
         except httpx.HTTPError:
             if not assembly.done:
                 raise
         else:
-            whole = bytes(plain).removeprefix(_MARK)
-            if not (streamed or last) and not _is_event_stream(response, whole):
+            whole = bytes(plain).removeprefix(_MARK).strip()
+            typed = response.headers.get("content-type", "").startswith("text/event-stream")
+            if not (streamed or last or (typed and whole[:1] not in (b"{", b"["))):
                 return self._joined(_parsed_json(whole), assembly), False
-        return _ended(assembly), True
+        return _ended(assembly), told
 
     def _joined(self, data: Any, assembly: Assembly) -> Any:
         """A complete body; some servers send the events of a stream as one list."""
@@ -170,8 +171,9 @@ class Transport:
                 assembly.add(event)
         return _ended(assembly) if listed else cast("Any", data)
 
-    def _take(self, events: list[bytes], assembly: Assembly, show: Show | None) -> None:
-        """Take the data of events in; an empty object only keeps a connection alive."""
+    def _take(self, events: list[bytes], assembly: Assembly, show: Show | None) -> bool:
+        """Take the data of events in, and whether it brought text; an empty object says nothing."""
+        told = False
         for event in events:
             if event == b"[DONE]":
                 assembly.done = True
@@ -179,8 +181,10 @@ class Transport:
                 if failure := of_error_body(data, self._endpoint.key_advice):
                     raise failure
                 text = assembly.add(data)
+                told = told or bool(text)
                 if text and show is not None:
                     show(text)
+        return told
 
 
 class Events:
@@ -252,12 +256,6 @@ async def _whole_body(response: httpx.Response) -> bytes:
         size = _bounded_size(size + len(chunk))
         chunks.append(chunk)
     return b"".join(chunks)
-
-
-def _is_event_stream(response: httpx.Response, plain: bytes) -> bool:
-    """Whether a body without events is a stream that has not begun."""
-    kind = response.headers.get("content-type", "")
-    return kind.startswith("text/event-stream") and plain.lstrip()[:1] not in (b"{", b"[")
 
 
 def _bounded_size(size: int) -> int:

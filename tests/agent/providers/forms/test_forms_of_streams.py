@@ -46,6 +46,7 @@ FORMS: dict[str, Form] = {
     "JSON in lines typed as a stream": lambda events, body: (pretty(body), SSE),
     "JSON with a mark": lambda events, body: (b"\xef\xbb\xbf" + pretty(body), JSON),
     "JSON after blanks": lambda events, body: (b"\n \n" + pretty(body), JSON),
+    "all in one event": lambda events, body: (lines([body]).encode(), SSE),
     "events as a list": lambda events, body: (
         json.dumps([e for e in events if e != "[DONE]"]).encode(),
         JSON,
