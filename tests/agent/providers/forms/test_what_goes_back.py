@@ -178,6 +178,50 @@ def test_a_server_that_wants_what_is_lost_is_not_asked_for_ever(
         forms.ask(model, *history)
 
 
+DETAILS: dict[str, tuple[list[dict[str, Any]], list[dict[str, Any]]]] = {
+    "by index": (
+        [
+            {"type": "reasoning.text", "text": "Two ", "index": 0},
+            {"type": "reasoning.encrypted", "data": "aa", "index": 1},
+            {"type": "reasoning.text", "text": "rings.", "index": 0, "signature": None},
+            {"type": "reasoning.text", "signature": "c2ln", "index": 0},
+        ],
+        [
+            {"type": "reasoning.text", "text": "Two rings.", "index": 0, "signature": "c2ln"},
+            {"type": "reasoning.encrypted", "data": "aa", "index": 1},
+        ],
+    ),
+    "in a row": (
+        [
+            {"type": "reasoning.text", "text": "Two "},
+            {"type": "reasoning.text", "text": "rings."},
+            {"type": "reasoning.text", "signature": "c2ln"},
+            {"type": "reasoning.text", "text": "Go."},
+            {"type": "reasoning.encrypted", "data": "aa"},
+            {"type": "reasoning.encrypted", "data": "bb"},
+        ],
+        [
+            {"type": "reasoning.text", "text": "Two rings.", "signature": "c2ln"},
+            {"type": "reasoning.text", "text": "Go."},
+            {"type": "reasoning.encrypted", "data": "aa"},
+            {"type": "reasoning.encrypted", "data": "bb"},
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", DETAILS)
+def test_fragments_of_signed_thoughts_are_joined(
+    kind: str, server: Any, openai: Any, forms: Any, http: Any
+) -> None:
+    fragments, whole = DETAILS[kind]
+    events = [{"choices": [{"index": 0, "delta": {"reasoning_details": [f]}}]} for f in fragments]
+    calls = forms.events(openai, openai.body("", CALLS, "calls"))
+    server.script = [http.stream([*events, *calls]), http.response(openai.body("done"))]
+    forms.ask(server.model("openai"), *answered(forms.ask(server.model("openai"))))
+    assert forms.items(openai, server.requests[1])[0]["reasoning_details"] == whole
+
+
 PNG = b"\x89PNG\r\n\x1a\n..."
 
 
