@@ -59,19 +59,21 @@ def scale(text: str | None) -> float | None:
 
 
 def numbers(
+    robots_text: str | None,
     scale_text: str | None,
     radius: str | None,
     clearance: str | None,
     threshold: str | None,
     seed: str,
 ) -> dict[str, Any]:
-    """The scale, the robots' radius, the clearance, the threshold and the seed, as of Settings.
+    """The number of robots, the scale, the robots' radius, the clearance, the threshold and the seed, as of Settings.
 
     Raises:
         InputError: one of them is none, or not in its range.
     """
     metres_per_pixel = scale(scale_text)
     return {
+        "robots": robots(robots_text),
         "metres_per_pixel": metres_per_pixel,
         "robot_radius": length("--robot-radius", radius, metres_per_pixel),
         "clearance": length("--clearance", clearance, metres_per_pixel),

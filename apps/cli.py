@@ -94,8 +94,7 @@ def run(
 ) -> None:
     """Carry out an instruction on a picture."""
     fixed = Settings(
-        robots=arguments.robots(robots),
-        **arguments.numbers(metres_per_pixel, robot_radius, clearance, threshold, seed),
+        **arguments.numbers(robots, metres_per_pixel, robot_radius, clearance, threshold, seed),
         detector=detector,
         segmenter=segmenter,
         descriptor=arguments.descriptor(descriptor),

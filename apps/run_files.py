@@ -87,7 +87,6 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
         "picture": None,
         "animation": None,
         "trace": NAME,
-        "contract": None,
     }
     picture, world, report = run.context.picture, run.world, run.report
     node = world.plans.get(report.plan_id or "")
@@ -112,7 +111,7 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
     if (contract := suggested(run.outcome)) is not None:
         data = contract.model_dump_json(indent=1, exclude_defaults=True).encode()
         files["contract"] = folder.write(CONTRACT, data)
-    folder.drop_but(files["picture"], files["contract"], "plan.png" if standing else None)
+    folder.drop_but(files["picture"], files.get("contract"), "plan.png" if standing else None)
     return files
 
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from PIL import Image, ImageFilter
 from shapely.geometry import Polygon, box
 
 from ...tools.errors import InputError
@@ -64,7 +64,8 @@ def check_frame(entry: dict[str, Any], folder: Path) -> None:
                 "around the thing."
             )
     size = np.asarray(picture.size, dtype=float)
-    pixels = cv2.GaussianBlur(picture.pixels, (0, 0), 1.5).astype(float)
+    soft = Image.fromarray(picture.pixels).filter(ImageFilter.GaussianBlur(1.5))
+    pixels = np.asarray(soft, dtype=float)
     fit = {n: _contrast(pixels, [f(r, size) for r in rings], SMALLEST) for n, f in FRAMES.items()}
     best = max(fit, key=fit.__getitem__)
     fits = fit[best] > BETTER * max(_contrast(pixels, rings, 0.0), float(pixels.std()) / 2)

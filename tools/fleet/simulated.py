@@ -7,7 +7,6 @@ from itertools import count, islice
 
 import numpy as np
 import shapely
-from scipy.spatial.distance import cdist
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import InputError
@@ -250,7 +249,8 @@ def checked_starts(
             f"Robot {i + 1} starts at ({x:g}, {y:g}), outside the picture of "
             f"{frame.width:g} x {frame.height:g} px{swapped}."
         )
-    apart = cdist(starts, starts) + np.diag(np.full(len(starts), np.inf))
+    apart = np.linalg.norm(starts[:, None] - starts[None], axis=2)
+    np.fill_diagonal(apart, np.inf)
     if apart.min() < max(2 * radius, MIN_SPACING):
         i, j = map(int, np.argwhere(apart == apart.min())[0])
         x, y = starts[i]
