@@ -66,7 +66,7 @@ def numbers(
     threshold: str | None,
     seed: str,
 ) -> dict[str, Any]:
-    """The number of robots, the scale, the robots' radius, the clearance, the threshold and the seed, as of Settings.
+    """Robots, scale, the robots' radius, clearance, threshold and seed, as of Settings.
 
     Raises:
         InputError: one of them is none, or not in its range.

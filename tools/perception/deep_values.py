@@ -54,7 +54,7 @@ def as_8_bits(image: Image.Image, data: bytes | None) -> tuple[Image.Image, str]
 def _scaled(
     values: NDArray[np.floating], what: str, *, whole: bool
 ) -> tuple[NDArray[np.uint8], str]:
-    least, greatest = _range(values)
+    least, greatest = _range(values, step=1 if whole else 0)
     finite = np.isfinite(values)
     kept = finite & (values >= least) & (values <= greatest)
     low = float(values.min(where=kept, initial=np.inf))
@@ -84,12 +84,13 @@ def _scaled(
     return values.astype(np.uint8), ", ".join(notes)
 
 
-def _range(values: NDArray[np.floating]) -> tuple[float, float]:
-    """The least and the greatest value that count; infinite where all do."""
+def _range(values: NDArray[np.floating], step: float) -> tuple[float, float]:
+    """The least and the greatest value that count, infinite where all do; of values in steps."""
     rows = values[:: max(1, values.size // SAMPLED)]
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(rows, axis=1))
-    noise = NOISE * float(np.median(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
+    seen = steps[np.isfinite(steps)]
+    noise = NOISE * max(step, float(np.median(seen)) if seen.size else 0.0)
     ranked = np.sort(rows[np.isfinite(rows)])
     bounds = [np.inf, np.inf]  # of the values, and of the same with the other sign
     for turn in (0, 1, 0, 1):

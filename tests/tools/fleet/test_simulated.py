@@ -67,6 +67,26 @@ def test_a_start_on_a_target_is_refused_by_its_number(place: tuple[float, float]
         checked_starts(starts, 9, FRAME, SOLID, RADIUS)
 
 
+@pytest.mark.parametrize(
+    ("apart", "refused"), [(0, True), (2 * RADIUS - 0.5, True), (2 * RADIUS, False)]
+)
+def test_robots_may_touch_but_not_start_in_each_other(apart: float, refused: bool) -> None:
+    starts = spread_starts(5, FRAME, SOLID, RADIUS)
+    starts[3] = starts[1] + (apart, 0)
+    if refused:
+        with pytest.raises(InputError, match="Robots 2 and 4 start on the same spot"):
+            checked_starts(starts, 5, FRAME, SOLID, RADIUS)
+    else:
+        checked_starts(starts, 5, FRAME, SOLID, RADIUS)
+
+
+def test_starts_with_y_before_x_are_called_that() -> None:
+    starts = np.array([[20.0, 30.0], [20.0, SIZE[0] - 20.0]])
+    assert SIZE[1] < SIZE[0] - 20
+    with pytest.raises(InputError, match="y before x"):
+        checked_starts(starts, 2, FRAME, SOLID, RADIUS)
+
+
 @pytest.mark.parametrize("n", [1, 2, 7, 60, 200, 400])
 def test_spread_starts_are_free_apart_and_in_the_picture(n: int) -> None:
     starts = spread_starts(n, FRAME, SOLID, RADIUS)
