@@ -1,9 +1,7 @@
 """`--contract FILE`: a contract as JSON, and the things in the picture that it names."""
 
-import json
 import re
 from pathlib import Path
-from typing import Any, cast
 
 from pydantic import ValidationError
 
@@ -16,36 +14,30 @@ from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.store import read_text
 from ..tools.tool import violations
 
-WRITTEN = ("text", "reading")
-"""Fields in which c3 is no candidate."""
+Things = tuple[TargetPrompt, ...]
+CANDIDATE = re.compile(r'(?<!"text":)(?<!"text": )"(c[1-9][0-9]{0,3})"')
 
 
 def decided(
-    path: Path | None,
-    pointed: tuple[TargetPrompt, ...],
-    settings: Settings,
-    *,
-    model: str,
-    planner: str | None,
-) -> tuple[str | StatedContract, tuple[TargetPrompt, ...]]:
+    path: Path | None, pointed: Things, settings: Settings, *, model: str, planner: str | None
+) -> tuple[str | StatedContract, Things]:
     """Who decides, and about what: the contract of a file if there is one, else the model.
 
-    A candidate that the contract names by its id, such as c3, becomes the next of t1, t2, ...
-
-    Args:
-        path: of the file.
-        pointed: what the person pointed at.
-        settings: what the person fixed; it must not contradict the contract.
-        model, planner: as named at the command line.
-
     Raises:
-        InputError: the file cannot be read or used, or names what nothing points at.
+        InputError: the file cannot be read, contradicts what else is given, or names what nothing
+            points at.
     """
     if path is None:
         return model, pointed
     if model != "offline" or planner is not None:
         raise InputError("--contract leaves nothing to decide; leave out --model and --planner.")
     contract, things = _read(path, pointed)
+    missing = [n for n in contract.target_ids if n not in {p.id for p in things}]
+    if missing:
+        raise InputError(
+            f"--contract {path} names {missing[0]!r}, which nothing points at; point at it with "
+            "--point, --box, --outline or --target, or name a thing in the picture such as c3."
+        )
     try:
         contract_in_pixels(contract, settings.metres_per_pixel)
     except ToolError:
@@ -62,42 +54,18 @@ def decided(
     return StatedContract(contract), things
 
 
-def _read(
-    path: Path, pointed: tuple[TargetPrompt, ...]
-) -> tuple[Contract, tuple[TargetPrompt, ...]]:
-    """The contract of a file, and the things that are pointed at or named in it."""
+def _read(path: Path, pointed: Things) -> tuple[Contract, Things]:
+    """The contract of a file and what it is about; the candidates it names become t1, t2, ..."""
+    text = read_text(path)
+    ids = {p.candidate: p.id for p in pointed if p.candidate is not None}
+    named = [c for c in dict.fromkeys(CANDIDATE.findall(text)) if c not in ids]
+    found = [TargetPrompt(id=f"t{len(pointed) + i}", candidate=c) for i, c in enumerate(named, 1)]
+    ids |= {p.candidate: p.id for p in found}
     try:
-        data: Any = json.loads(read_text(path))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"--contract {path} is not JSON: {error}.") from None
-    names = {p.candidate: p.id for p in pointed if p.candidate is not None}
-    data = _named(data, names, len(pointed))
-    found = [TargetPrompt(id=n, candidate=c) for c, n in names.items()]
-    things = (*pointed, *(p for p in found if p not in pointed))
-    try:
-        contract = Contract.model_validate(data)
+        contract = Contract.model_validate_json(CANDIDATE.sub(lambda m: f'"{ids[m[1]]}"', text))
     except ValidationError as error:
         raise InputError(
             f"--contract {path} is no contract: {violations(error)} "
             "formup tools schema contract prints what it may hold."
         ) from None
-    missing = [n for n in contract.target_ids if n not in {p.id for p in things}]
-    if missing:
-        raise InputError(
-            f"--contract {path} names {missing[0]!r}, which nothing points at; point at it with "
-            "--point, --box, --outline or --target, or name a thing in the picture such as c3."
-        )
-    return contract, things
-
-
-def _named(node: Any, names: dict[str, str], given: int) -> Any:
-    """The JSON with candidates' ids replaced by those of things, which are added to `names`."""
-    if isinstance(node, list):
-        return [_named(item, names, given) for item in cast("list[Any]", node)]
-    if isinstance(node, dict):
-        fields = cast("dict[str, Any]", node)
-        return {k: v if k in WRITTEN else _named(v, names, given) for k, v in fields.items()}
-    if isinstance(node, str) and re.fullmatch("c[1-9][0-9]{0,3}", node):
-        used = {f"t{i}" for i in range(1, given + 1)} | set(names.values())
-        return names.setdefault(node, f"t{len(used) + 1}")
-    return node
+    return contract, (*pointed, *found)

@@ -116,7 +116,7 @@ def test_what_cannot_be_met_is_impossible_and_nothing_else_is_tried(
     ("content", "options", "said"),
     [
         (None, (), "No such file"),
-        ("{", (), "is not JSON"),
+        ("{", (), "Invalid JSON"),
         ("[1]", (), "is no contract"),
         ('{"groups": []}', (), "groups"),
         ('{"groups": [{"relation": "ring", "robots": 0}]}', (), "robots"),

@@ -30,25 +30,19 @@ def as_8_bits(image: Image.Image, data: bytes | None) -> tuple[Image.Image, str]
 
     Args:
         image: decoded.
-        data: the file, if it has 16 bits of each colour, of which Pillow drops the lower 8.
+        data: the file, if it has 16 bits of each colour, of which Pillow drops the lower 8; with
+            transparency they stay dropped.
     """
     if image.mode == "F" or image.mode.startswith("I"):
         grey, note = _scaled(np.array(image, dtype=np.float64), "grey", whole=image.mode != "F")
         return Image.fromarray(grey), note
-    if data is None:
+    if data is None or image.mode != "RGB":
         return image, ""
     found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if found is None or found.dtype != np.uint16 or found.ndim != 3 or found.shape[2] < 3:
         return image, ""
-    colour = found[:, :, 2::-1].astype(np.float32)
-    seen = found[:, :, 3] if image.mode in ("LA", "RGBA") and found.shape[2] == 4 else None
-    if seen is not None:
-        colour[seen == 0] = np.nan
-    rgb, note = _scaled(colour, "colour", whole=True)
-    made = Image.fromarray(rgb)
-    if seen is not None:
-        made.putalpha(Image.fromarray((seen // 257).astype(np.uint8)))
-    return made, note
+    rgb, note = _scaled(found[:, :, 2::-1].astype(np.float32), "colour", whole=True)
+    return Image.fromarray(rgb), note
 
 
 def _scaled(
@@ -103,10 +97,8 @@ def _range(values: NDArray[np.floating], step: float) -> tuple[float, float]:
 
 def _last(ranked: NDArray[np.floating], noise: float) -> int:
     """The last of (n,) sorted values that is not alone: further on than all before it span."""
-    if len(ranked) < 2:
-        return len(ranked) - 1
-    index = np.arange(len(ranked) - 1)
-    span = ranked[:-1] - ranked[0]
+    index = np.arange(max(len(ranked) - 1, 0))
+    span = ranked[:-1] - ranked[:1]
     alone = (np.diff(ranked) > span) & (span > noise) & (index >= len(ranked) // 2)
-    alone &= (len(ranked) - 1 - index <= FEW * len(ranked)) | (ranked[1:] == ranked[-1])
+    alone &= (len(ranked) - 1 - index <= FEW * len(ranked)) | (ranked[1:] == ranked[-1:])
     return int(np.argmax(alone)) if alone.any() else len(ranked) - 1

@@ -105,16 +105,6 @@ def test_colour_that_uses_its_16_bits_stays() -> None:
     assert picture.notes == ()
 
 
-def test_transparent_parts_of_deep_colour_are_shown_on_white() -> None:
-    values = field(120, 700, np.uint16)
-    seen = np.full_like(values, 65535)
-    values[:20], seen[:20] = 60_000, 0
-    picture = loaded(np.dstack([values, values, values, seen]))
-    assert picture.pixels[:20].min() == 255
-    assert int(picture.pixels[PLATE][0]) - int(picture.pixels[30, 10, 0]) > 200
-    assert picture.notes[1] == "transparent parts shown on white"
-
-
 def test_deep_pictures_are_turned_upright_too() -> None:
     file, exif = BytesIO(), Image.Exif()
     exif[0x0112] = 6
