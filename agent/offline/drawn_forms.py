@@ -8,20 +8,21 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from .arrangements import number_words, whole_number
+from ...tools.formation.number_words import SMALL, TENS, numbers_in
 
-MAKE = r"\b(?:form|make|draw|build)(?:ing)?\s+"
+MAKE = r"\b(?:form|make|draw|build|be|want|trace|lay out|outline|like|do)(?:ing)?\s+(?:up\s+)?(?:in(?:to)?\s+)?"
 STAND = (
     r"(?P<kept>^\s*|\b(?:robots?|bots?|drones?|rovers?|agents?|units?|stand|arranged?|them|line up"
-    r"|placed?)\s+)(?:in|into|as)\s+(?:the (?:shape|form) of\s+)?"
+    r"|placed?|up|be)\s+)?(?:in|into|as|be|like)\s+(?:the (?:shape|form) of\s+)?"
 )
+SIZES = r"(?:(?:big|large|giant|huge|small|little|neat|proper|capital|block) )?"
+CARDINALS = "|".join((*SMALL, *TENS))
+COUNT = rf"(?:[0-9]{{1,4}}|\b(?:{CARDINALS})(?:[- ](?:{CARDINALS}))?\b)"
 CORNERED = {"triangle": 3, "square": 4, "pentagon": 5, "hexagon": 6, "octagon": 8}
 SIDES = {"left": "left", "right": "right", "top": "above", "bottom": "below"}
 BESIDE = ("right", "left", "below", "above")
 """Where a form beside a thing is tried, one place after another."""
-ENCLOSING = frozenset({"star", "polygon"})
-READING = "The robots draw the form that the words name."
-"""Said to the tool, which knows such words as those for other arrangements too."""
+ENCLOSING = frozenset({"arc", "polygon", "star", "u", "v"})
 
 
 @dataclass(frozen=True)
@@ -38,42 +39,16 @@ class Form:
     wording: str
     robots: int | None = None
 
-    def where(self, relations: tuple[str, ...], side: str | None, attempt: int) -> str | None:
-        """Its place by the target as the other words have it; None where they have none for it.
 
-        Args:
-            relations, side: of the instruction without the form.
-            attempt: how many places beside the target had no room.
-        """
-        if relations == ("along",):
-            if side is None:
-                return BESIDE[attempt] if attempt < len(BESIDE) else None
-            return SIDES.get(side)
-        if relations == ("around",) and self.shape["kind"] in ENCLOSING:
-            return "around"
-        return "inside" if relations == ("inside",) else None
-
-
-def form_in(instruction: str) -> tuple[Form | None, str]:
-    """The form that an instruction names, and the instruction without it."""
+def form_in(instruction: str) -> tuple[Form | None, tuple[int, int]]:
+    """The form that an instruction names, and where its words stand: first, past-the-last."""
     for read in (_letters, _grid, _figure):
         found = read(instruction)
         if found is not None:
             form, match = found
             kept = match.groupdict().get("kept") or ""
-            rest = f"{instruction[: match.start()]}{kept} {instruction[match.end() :]}"
-            return form, rest
-    return None, instruction
-
-
-def faced_in(instruction: str) -> tuple[str, str | None]:
-    """An instruction without what a side is to face, and that: "the blue car with 5 robots"."""
-    found = re.match(
-        r"(?is)(?P<main>.+?),?\s+(?:and\s+)?(?:all\s+)?(?:(?:that|which)\s+)?(?:facing|faces)\s+"
-        r"(?P<faced>(?:the|it|that|this)\b.*)$",
-        instruction,
-    )
-    return (instruction, None) if found is None else (found["main"], found["faced"])
+            return form, (match.start() + len(kept), match.end())
+    return None, (0, 0)
 
 
 Found = tuple[Form, re.Match[str]] | None
@@ -86,10 +61,11 @@ def _letters(text: str) -> Found:
     """
     more = r"(?: [A-Z0-9]{2,}(?! ?(?:px|pixels?|c?m)\b))*"
     written = rf"(?P<q>[\"'])(?P<quoted>[ !#-&(-~]+)(?P=q)|(?P<plain>[A-Z0-9]+{more})"
-    signs = r"(?:outlined? )?(?:word|letter|number|digit)s?"
+    signs = rf"{SIZES}(?:outlined? )?(?:word|letter|number|digit)s?"
     lead = (
         rf"(?i:\b(?:spell|write)(?: out)?(?: the)?(?: {signs})?\s+|"
-        rf"{MAKE}(?:the|an?) {signs}\s+|{STAND}(?:the|an?) {signs}\s+)"
+        rf"{MAKE}(?:the|an?) {signs}\s+|{STAND}(?:the|an?) {signs}\s+|"
+        rf"(?:shape|form) of (?:an?|the) (?:{signs}\s+)?|(?:^|[.,:]\s+)(?:an?|the) {signs}\s+)"
     )
     tail = r"(?i:\s+in (?:outline|outlined (?:letters|digits))(?![\w-]))?"
     found = re.search(rf"{lead}(?:{written})(?![\w'-]){tail}", text)
@@ -109,37 +85,40 @@ def _letters(text: str) -> Found:
 
 
 def _grid(text: str) -> Found:
-    number = rf"(?:[0-9]{{1,4}}|{number_words()})"
-    size = rf"(?P<rows>{number})\s*(?:by|x|\u00d7)\s*(?P<columns>{number})"
-    grid = rf"an?\s+(?:{size}\s+grid|grid\s+of\s+{size.replace('P<', 'P<of_')}|grid)(?![\w-])"
+    size = rf"(?P<rows>{COUNT})\s*(?:by|x|\u00d7)\s*(?P<columns>{COUNT})"
+    grid = rf"an?\s+{SIZES}(?:{size}\s+grid|grid\s+of\s+{size.replace('P<', 'P<of_')}|grid)(?![\w-])"
     found = re.search(rf"(?i)(?:{MAKE}|{STAND}){grid}", text)
     if found is None:
         return None
     wording = [
         found[f"{of}{n}"] for of in ("", "of_") for n in ("rows", "columns") if found[f"{of}{n}"]
     ]
-    counts = [whole_number(word.lower()) for word in wording]
+    counts = [_whole(word) for word in wording]
     if not counts:
         return Form({"kind": "grid"}, "a grid"), found
     rows, columns = counts
     if not rows or not columns:
         return None
     return Form(
-        {"kind": "grid", "rows": rows}, f"a grid of {rows} by {columns}", rows * columns
+        {"kind": "grid", "rows": rows}, f"a {rows} by {columns} grid", rows * columns
     ), found
 
 
 def _figure(text: str) -> Found:
     names = "|".join(CORNERED)
-    tips = rf"(?:(?P<tips>[0-9]{{1,2}}|{number_words()})[- ]pointed\s+)?"
+    tips = rf"(?:(?P<tips>{COUNT})[- ]pointed\s+)?"
     figure = (
-        rf"an?\s+(?:regular\s+)?(?:{tips}(?P<star>star)|(?P<name>{names}))(?![\w-]|\s+of\s+the)"
+        rf"an?\s+{SIZES}(?:regular\s+)?(?:{tips}(?P<star>star)|(?P<name>{names}))(?![\w-]|\s+of\s+the)"
     )
     found = re.search(rf"(?i)(?:{MAKE}|{STAND}){figure}", text)
     if found is None:
         return None
     if found["name"]:
         name = found["name"].lower()
-        return Form({"kind": "polygon", "corners": CORNERED[name]}, f"the {name}"), found
-    tips = None if found["tips"] is None else whole_number(found["tips"].lower())
+        return Form({"kind": "polygon", "corners": CORNERED[name]}, f"a {name}"), found
+    tips = None if found["tips"] is None else _whole(found["tips"])
     return Form({"kind": "star"} | ({"corners": tips} if tips else {}), "a star"), found
+
+
+def _whole(words: str) -> int | None:
+    return next((n.whole for n in numbers_in(words)), None)

@@ -6,45 +6,40 @@ the planner can say so.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from .descriptions import STRANGERS, Description, Reference
 from .phrases import HEADS, STOPS, Words, phrase, several, table
 
-CAGED = re.compile(
-    r"\bin(?:side|to)? an?(?: (?:escape[- ]proof|closed|tight))* cage\b"
-    r"(?: (?:made )?of \w+ robots)?",
-    re.IGNORECASE,
-)
-"""Says what robots are to make, not where a thing is."""
 
+def described(phrases: Sequence[str]) -> tuple[Reference, ...]:
+    """The things that noun phrases in English refer to; those that take up another are left out.
 
-@dataclass(frozen=True)
-class Reading:
-    """The things an instruction speaks of, and its words with "it" in their place."""
-
-    things: tuple[Reference, ...]
-    rest: str
-
-
-def references(instruction: str) -> Reading:
-    """Read the noun phrases of an instruction in English."""
-    made = CAGED.findall(instruction)
-    words = _split_words(CAGED.sub(" ", instruction))
+    What is not understood of a phrase is among the `unknown` words of its thing.
+    """
     found: list[Reference] = []
-    rest: list[str] = []
-    at = 0
+    for phrase_ in phrases:
+        words = _split_words(phrase_)
+        if words and words[0] not in table()["determiners"]:
+            words = ["the", *words]
+        found += _described_all(words)
+    return _without_echoes(found)
+
+
+def _described_all(words: Words) -> list[Reference]:
+    found: list[Reference] = []
+    at, left = 0, list[str]()
     while at < len(words):
         read = _read_reference(words, at)
         if read is None or (found and read[0].strange):
-            rest.append(words[at])
+            left.append(words[at])
             at += 1
         else:
             found.append(read[0])
-            owner = read[1] > at and words[read[1] - 1].endswith("'s")
-            rest.append("its" if owner else "it")
             at = read[1]
-    return Reading(_without_echoes(found), " ".join([*rest, *made]))
+    rest = [w for w in left if w not in STOPS and w not in table()["follow"]]
+    if found and rest:
+        found[-1].unknown.append(" ".join(rest))
+    return found
 
 
 def _split_words(text: str) -> list[str]:

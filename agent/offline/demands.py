@@ -1,0 +1,227 @@
+"""What an instruction demands beside number, thing and arrangement, by the rules of demands.yaml.
+
+The words are laid out as one line of symbols, in which a phrase for a thing and a quantity are
+one symbol each; a rule takes the symbols that its pattern matches, and no other rule may.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import yaml
+
+from ...tools.formation.quantities import Quantity, quantities_in
+from .tagging import Tagging, Token
+
+SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
+WRAPPED = re.compile(r"\s*\|\s*")
+SENTENCE_ENDS = (".", "!", "?", ";")
+
+
+@dataclass(frozen=True)
+class Item:
+    """One symbol of the line: a word, a sign, a quantity or a whole phrase for a thing.
+
+    Attributes:
+        symbol: the word, lower case, or <t>, <n>, <l>, <a>, <s>, <c>.
+        start, end: where it stands in the instruction.
+        label, certainty: what it is there for, one of tagging.LABELS, and how surely.
+        quantity: the number or length; None of other symbols.
+    """
+
+    symbol: str
+    start: int
+    end: int
+    label: str
+    certainty: float
+    quantity: Quantity | None = None
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a rule found.
+
+    Attributes:
+        sets: what it is about, as demands.yaml calls it.
+        value: what the rule itself says, such as "towards"; "" where the words say it.
+        sides: left, right, top, bottom, up, down, in the order of the words.
+        quantity: the number or length that was named, if one was.
+        numbers: all numbers in it.
+        bound: "least", "most" or "", how the quantity bounds.
+        first, last: its items, first and past-the-last index.
+    """
+
+    sets: str
+    value: str
+    sides: tuple[str, ...]
+    quantity: Quantity | None
+    numbers: tuple[Quantity, ...]
+    bound: str
+    first: int
+    last: int
+
+
+def items_of(text: str, words: Sequence[Token], tagging: Tagging) -> tuple[Item, ...]:
+    """The symbols of an instruction; phrases for things that touch are one."""
+    labels = dict(zip((w.start for w in words), tagging.labels, strict=True))
+    plain = [q for q in quantities_in(text) if _is_plain(q, words, labels)]
+    found: list[Item] = []
+    for word, label, certainty in zip(words, tagging.labels, tagging.certainty, strict=True):
+        last = found[-1] if found else None
+        covering = next((q for q in plain if q.start <= word.start < q.end), None)
+        if covering is not None:
+            if last is None or last.quantity is not covering:
+                symbol = SYMBOLS.get(covering.kind, "<n>")
+                found.append(Item(symbol, covering.start, covering.end, label, certainty, covering))
+        elif label == "thing" and last is not None and last.symbol == "<t>":
+            found[-1] = Item("<t>", last.start, word.end, label, min(last.certainty, certainty))
+        else:
+            symbol = "<t>" if label == "thing" else word.text
+            found.append(Item(symbol, word.start, word.end, label, certainty))
+    return tuple(found)
+
+
+def _is_plain(quantity: Quantity, words: Sequence[Token], labels: dict[int, str]) -> bool:
+    """Whether it is no part of a phrase for a thing, and no "one" that stands for a noun."""
+    inside = [labels[w.start] for w in words if quantity.start <= w.start < quantity.end]
+    if "thing" in inside:
+        return False
+    if quantity.wording.lower() != "one":
+        return True
+    after = next((w.text for w in words if w.start >= quantity.end), "")
+    before = next((w.text for w in reversed(words) if w.end <= quantity.start), "")
+    return before not in ("no", "the", "each", "every", "any", "this", "that", "single") and (
+        after not in ("after", "by", "another", "behind", "beside", "next", "to", *_table()["rows"])
+    )
+
+
+def demands_in(items: Sequence[Item]) -> tuple[Demand, ...]:
+    """What the rules find, each item in one demand at most; in the order of the rules."""
+    line = _Line(items)
+    free = [True] * len(items)
+    found: list[Demand] = []
+    for rule in _rules():
+        for pattern in rule.patterns:
+            for match in pattern.finditer(line.text):
+                first, last = line.items_of(match)
+                counts = any(i.quantity or i.label != "background" for i in items[first:last])
+                if last > first and all(free[first:last]) and counts:
+                    free[first:last] = [False] * (last - first)
+                    found.append(_demand(rule, match, items, first, last, line))
+    return tuple(found)
+
+
+def stops_in(items: Sequence[Item]) -> tuple[tuple[str, str], ...]:
+    """Why an instruction is no order to place robots now: the kind and the words for it.
+
+    What is background stops nothing.
+    """
+    found: list[tuple[str, str]] = []
+    for sentence in sentences(items):
+        line = _Line(sentence)
+        for kind, pattern in _stops():
+            for match in pattern.finditer(line.text):
+                first, last = line.items_of(match)
+                if any(i.label != "background" for i in sentence[first:last]):
+                    found.append((kind, match[0].strip().replace("<t>", "it")))
+    return tuple(dict.fromkeys(found))
+
+
+def sentences(items: Sequence[Item]) -> list[list[Item]]:
+    """The items, sentence by sentence."""
+    found: list[list[Item]] = [[]]
+    for item in items:
+        found[-1].append(item)
+        if item.symbol in SENTENCE_ENDS:
+            found.append([])
+    return [s for s in found if s]
+
+
+class _Line:
+    """The symbols as one text, and which of them a match covers."""
+
+    def __init__(self, items: Sequence[Item]) -> None:
+        self.text = " ".join(i.symbol for i in items)
+        self._starts: list[int] = []
+        at = 0
+        for item in items:
+            self._starts.append(at)
+            at += len(item.symbol) + 1
+
+    def items_of(self, match: re.Match[str], group: str | int = 0) -> tuple[int, int]:
+        """First and past-the-last index of the items in a group of a match."""
+        start, end = match.span(group)
+        covered = [k for k, at in enumerate(self._starts) if start <= at < end]
+        return (covered[0], covered[-1] + 1) if covered else (0, 0)
+
+
+@dataclass(frozen=True)
+class _Rule:
+    sets: str
+    value: str
+    patterns: tuple[re.Pattern[str], ...]
+
+
+def _demand(
+    rule: _Rule, match: re.Match[str], items: Sequence[Item], first: int, last: int, line: _Line
+) -> Demand:
+    named = {
+        name: value for name, value in match.groupdict().items() if value is not None and value
+    }
+    lengths = [name for name in named if name.rstrip("0123456789") == "l"]
+    quantity = items[line.items_of(match, lengths[0])[0]].quantity if lengths else None
+    sides = tuple(
+        _side(value) for name, value in named.items() if name.rstrip("0123456789") == "side"
+    )
+    numbers = tuple(i.quantity for i in items[first:last] if i.quantity is not None)
+    bound = next((b for b in ("least", "most") if any(n.startswith(b) for n in named)), "")
+    return Demand(
+        rule.sets,
+        rule.value,
+        sides,
+        quantity or next(iter(numbers), None),
+        numbers,
+        bound,
+        first,
+        last,
+    )
+
+
+def _side(word: str) -> str:
+    return next((side for side, names in _table()["sides"].items() if word in names), word)
+
+
+@cache
+def _table() -> dict[str, Any]:
+    text = resources.files(__package__ or "").joinpath("demands.yaml").read_text("utf-8")
+    return yaml.safe_load(text)
+
+
+@cache
+def _rules() -> tuple[_Rule, ...]:
+    return tuple(
+        _Rule(row["sets"], str(row.get("value", "")), tuple(_compiled(p) for p in row["patterns"]))
+        for row in _table()["rules"]
+    )
+
+
+@cache
+def _stops() -> tuple[tuple[str, re.Pattern[str]], ...]:
+    return tuple(
+        (kind, _compiled(pattern))
+        for kind, patterns in _table()["stops"].items()
+        for pattern in patterns
+    )
+
+
+def _compiled(pattern: str) -> re.Pattern[str]:
+    """The pattern with its lists written out, between whole symbols, its groups told apart."""
+    words = _table()["words"]
+    while (name := re.search(r"\{([A-Z_]+)\}", pattern)) is not None:
+        pattern = pattern.replace(name[0], f"(?:{re.sub(WRAPPED, '|', words[name[1]])})")
+    number = iter(range(10_000))
+    pattern = re.sub(r"\(\?P<(\w+)>", lambda m: f"(?P<{m[1]}{next(number)}>", pattern)
+    return re.compile(rf"(?<!\S)(?:{pattern})(?!\S)")

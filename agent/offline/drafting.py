@@ -1,0 +1,193 @@
+"""From what was read to a contract, or to the question that has to be asked first."""
+
+from typing import Any
+
+from ...tools.formation.contract import MAX_ROBOTS
+from ..first_message import Task
+from .drawn_forms import BESIDE, ENCLOSING, SIDES
+from .reading import Reading
+
+EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
+UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
+NAMES = {
+    "around": "around it",
+    "cage": "in a closed ring around it",
+    "inside": "inside it, spread evenly",
+    "along": "in a row along it",
+    "corners": "at its corners",
+    "between": "between the two",
+    "centre": "at its centre",
+    "shape": "in a form drawn by it",
+}
+"""Arrangements as questions name them."""
+
+
+def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
+    """What has to be asked before anything is looked for; None where all is settled."""
+    return (
+        _stopped(reading)
+        or _not_understood(reading, robots)
+        or _unsettled(reading)
+        or _how_many(reading, robots)
+        or _which_things(task, reading)
+    )
+
+
+def things_needed(reading: Reading) -> int:
+    """How many things the arrangement is about."""
+    return 2 if reading.relation == "between" else 1
+
+
+def contract_of(
+    reading: Reading, robots: int, targets: list[str], others: list[str], attempt: int = 0
+) -> dict[str, Any]:
+    """The contract as arguments of propose_formation.
+
+    Args:
+        reading: settled.
+        robots: in all.
+        targets: ids of what the arrangement is about.
+        others: ids of what to stay clear of; of a row whose side faces one, that one is the last.
+        attempt: how many places beside the target had no room for a form.
+    """
+    fields = {"spacing": "even", "fit": "normal"} | reading.group
+    basics = {"targets": targets, **fields}
+    if reading.faced:
+        *others, faced = others
+        basics |= {"facing": faced}
+    contract: dict[str, Any] = {"groups": _groups(reading, robots, basics, attempt)}
+    if others:
+        contract["keep_out"] = others
+    if reading.robot_radius is not None:
+        contract["robot_radius"] = reading.robot_radius
+    return contract
+
+
+def _groups(
+    reading: Reading, robots: int, basics: dict[str, Any], attempt: int
+) -> list[dict[str, Any]]:
+    relation = reading.relation
+    if reading.shares:
+        counts = [count or robots // 2 for _, count in reading.shares]
+        counts = counts if sum(counts) == robots else [robots - robots // 2, robots // 2]
+        sides = [side for side, _ in reading.shares]
+        rows = zip(sides, counts, strict=True)
+        return [basics | {"relation": "along", "side": s, "robots": n} for s, n in rows]
+    if reading.rings == 2:
+        outer = basics | {"fit": "wide"}
+        if "clearance" in basics:
+            outer["clearance"] = [2 * d for d in basics["clearance"]]
+        less = robots * 2 // 5 or 1
+        pair = zip((basics, outer), (less, robots - less), strict=True)
+        return [_group(reading, g | {"robots": n}) for g, n in pair]
+    if relation == "shape":
+        return [basics | {"relation": "shape", "robots": robots} | _drawn(reading, basics, attempt)]
+    return [_group(reading, basics | {"robots": robots})]
+
+
+def _group(reading: Reading, basics: dict[str, Any]) -> dict[str, Any]:
+    group = basics | {"relation": reading.relation}
+    if reading.relation == "along" and not {"side", "facing"} & set(group):
+        group["side"] = "long"
+    return group
+
+
+def _drawn(reading: Reading, basics: dict[str, Any], attempt: int) -> dict[str, Any]:
+    """The shape of a form with its place by the target; takes side and opens out of the group."""
+    assert reading.form is not None
+    shape = reading.form.shape | {"where": place_of(reading, attempt)}
+    if "opens" in basics:
+        shape["opens"] = basics.pop("opens")
+    basics.pop("side", None)
+    return {"shape": shape}
+
+
+def place_of(reading: Reading, attempt: int) -> str | None:
+    """Where by the target a form is drawn; None where the words do not settle it."""
+    assert reading.form is not None
+    side = reading.group.get("side")
+    if side is not None:
+        return SIDES.get(side)
+    likely = next((m for m, _ in reading.meanings if m in ("around", "inside", "along")), "")
+    place = reading.place or likely
+    if place == "around" and reading.form.shape["kind"] in ENCLOSING:
+        return "around"
+    if place == "inside":
+        return "inside"
+    return BESIDE[attempt] if place == "along" and attempt < len(BESIDE) else None
+
+
+def _stopped(reading: Reading) -> str | None:
+    if not reading.stops:
+        return None
+    kind, words = reading.stops[0]
+    return (
+        f'The words "{words}" are {kind}: the offline rules place robots now, once, or not at all. '
+        "Say where they should stand, without it."
+    )
+
+
+def _not_understood(reading: Reading, robots: int | None) -> str | None:
+    if reading.unscaled:
+        return f'"{reading.unscaled[0]}" cannot be measured: {UNSCALED[0].lower()}{UNSCALED[1:]}'
+    if not reading.unread:
+        return None
+    quoted = " and ".join(f'"{words}"' for words in reading.unread)
+    return (
+        f"I would put {robots or 'the'} robots {NAMES.get(reading.relation, 'somewhere by it')}; "
+        f"I do not know what to do with {quoted}. Say it another way, or leave it out."
+    )
+
+
+def _unsettled(reading: Reading) -> str | None:
+    relation = reading.relation
+    if relation == "ask" or (relation == "several" and not reading.shares):
+        return (
+            "The offline rules read no single arrangement in that. Say one arrangement of all the "
+            f"robots, for example {EXAMPLES}."
+        )
+    if not reading.sure:
+        likely = [m for m, _ in reading.meanings if m in NAMES][:2]
+        return f"Which arrangement is meant: {' or '.join(NAMES[m] for m in likely)}?"
+    if relation == "shape" and reading.form is None:
+        return "Which form should the robots draw? For example a V, an arc, a star or the letter A."
+    if relation == "shape" and reading.form and place_of(reading, 0) is None:
+        around = ", around" if reading.form.shape["kind"] in ENCLOSING else ""
+        return (
+            f"Where are the robots to draw {reading.form.wording}? Inside a thing{around}, or left, "
+            "right, above or below."
+        )
+    return "The offline rules place two rings or rows at most." if reading.rings > 2 else None
+
+
+def _how_many(reading: Reading, robots: int | None) -> str | None:
+    if robots is None and reading.odd_count:
+        return f"How many robots? {reading.odd_count!r} names no whole number above 0."
+    if robots is not None and robots > MAX_ROBOTS:
+        return f"How many robots? {robots:,} are more than the {MAX_ROBOTS:,} that can be placed."
+    form = reading.form
+    if form and form.robots is not None and robots not in (None, form.robots):
+        return (
+            f"{form.wording} takes {form.robots} robots, {robots} were named. Which?".capitalize()
+        )
+    return None if robots else "How many robots? Say it in the words or with -n."
+
+
+def _which_things(task: Task, reading: Reading) -> str | None:
+    pointed = list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))
+    needed = things_needed(reading)
+    others = [*reading.others, *([reading.faced] if reading.faced else [])]
+    if pointed and others:
+        return (
+            f'Which thing is "{others[0]}"? Mark it with --keep-out, or point at nothing so that '
+            "both are looked for."
+        )
+    if len(pointed) == 1 and needed == 2:
+        return "Which two things? Point at both: --point X,Y --point X,Y."
+    if len(pointed) > needed:
+        named = ", ".join(pointed)
+        return (
+            f"{len(pointed)} things were pointed at ({named}), the arrangement is about {needed}. "
+            "Which?"
+        )
+    return None

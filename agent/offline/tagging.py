@@ -1,0 +1,265 @@
+"""What the words of an instruction are there for: a small linear model, trained on sentences.
+
+It says of every word whether it belongs to the command, to a phrase for a thing, to a further
+demand or to the background, and which arrangement the command means, each with a probability.
+It is no language model: n-grams and weights in tagging.npz, made by `make wordings`.
+"""
+
+import re
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+LABELS = ("command", "thing", "demand", "background")
+MEANINGS = (
+    *("around", "cage", "inside", "along", "corners", "between", "centre", "shape"),
+    *("several", "ask"),
+)
+"""Arrangements that a command may mean; "ask": none that can simply be carried out."""
+TAG_BUCKETS, MEANING_BUCKETS = 1 << 16, 1 << 15
+"""Features are hashed into so many weights a label."""
+TOKEN = re.compile(r"\d+(?:[.,]\d+)*|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[^\w\s]|_")
+SENTENCE_ENDS = frozenset(".!?;\n")
+ENDINGS = ("ing", "ed", "es", "s", "e")
+LONGEST = 4
+"""Words of the longest phrase of classes.yaml that is looked for."""
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Token:
+    """A word, a number in digits or a sign, lower case, and where it stands in the text."""
+
+    text: str
+    start: int
+    end: int
+
+
+def tokens(text: str) -> tuple[Token, ...]:
+    """The words of a text, in order."""
+    found = TOKEN.finditer(text)
+    return tuple(Token(m[0].lower().replace("\u2019", "'"), m.start(), m.end()) for m in found)
+
+
+@dataclass(frozen=True)
+class Tagging:
+    """What words are there for.
+
+    Attributes:
+        labels: one of LABELS for each token.
+        certainty: the probability of each label, 0 to 1.
+        meaning: probabilities of the MEANINGS of the command.
+    """
+
+    labels: tuple[str, ...]
+    certainty: tuple[float, ...]
+    meaning: dict[str, float]
+
+
+def tag(words: Sequence[Token]) -> Tagging:
+    """The most likely labels of the words of one instruction, and the meaning of its command."""
+    model = shipped()
+    labels, certainty = model.labels([w.text for w in words], may_command([w.text for w in words]))
+    return Tagging(labels, certainty, model.meaning([w.text for w in words], labels))
+
+
+def may_command(words: Sequence[str]) -> list[bool]:
+    """Whether each word is known in commands; of others it is open only what they speak of."""
+    known = shipped_words()
+    return [
+        not word[0].isalpha() or bool(kinds) or stem(word) in known
+        for word, kinds in zip(words, word_classes(words), strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """A linear-chain conditional random field over words, and a softmax over whole commands.
+
+    Source: Lafferty, McCallum and Pereira 2001; hashed features, Weinberger et al. 2009.
+
+    Attributes:
+        emission: (TAG_BUCKETS, L) weights of features for labels.
+        transition: (L, L) from a label to the next.
+        command: (MEANING_BUCKETS, M) weights of features for meanings.
+        temperature: softmax of meanings is of scores divided by it, so that it is calibrated.
+    """
+
+    emission: Floats
+    transition: Floats
+    command: Floats
+    temperature: float = 1.0
+
+    def labels(
+        self, words: Sequence[str], may_command: Sequence[bool] = ()
+    ) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """The label of each word with the greatest marginal, and that probability.
+
+        Args:
+            words: of one instruction.
+            may_command: for each word whether it can be one of the command.
+        """
+        if not words:
+            return (), ()
+        scores = np.array([self.emission[row].sum(axis=0) for row in tag_features(words)])
+        if may_command:
+            scores[~np.asarray(may_command), LABELS.index("command")] = -np.inf
+        marginal = _marginals(scores, self.transition)
+        best = marginal.argmax(axis=1)
+        return tuple(LABELS[k] for k in best), tuple(marginal.max(axis=1).tolist())
+
+    def meaning(self, words: Sequence[str], labels: Sequence[str]) -> dict[str, float]:
+        """Probabilities of MEANINGS."""
+        scores = self.command[meaning_features(words, labels)].sum(axis=0) / self.temperature
+        shares = np.exp(scores - scores.max())
+        return dict(zip(MEANINGS, (shares / shares.sum()).tolist(), strict=True))
+
+
+def _marginals(scores: Floats, transition: Floats) -> Floats:
+    """(N, L) marginal probabilities of labels by the forward-backward algorithm."""
+    forward, backward = scores.copy(), np.zeros_like(scores)
+    for i in range(1, len(scores)):
+        forward[i] += np.logaddexp.reduce(forward[i - 1][:, None] + transition, axis=0)
+    for i in range(len(scores) - 2, -1, -1):
+        backward[i] = np.logaddexp.reduce(
+            transition + (scores[i + 1] + backward[i + 1])[None, :], axis=1
+        )
+    joint = forward + backward
+    return np.exp(joint - np.logaddexp.reduce(joint, axis=1, keepdims=True))
+
+
+@cache
+def shipped() -> LinearModel:
+    """The weights in tagging.npz, each array stored as whole numbers and a step."""
+    stored = _stored()
+    emission, transition, command = (
+        stored[name] * float(stored[f"{name}_step"])
+        for name in ("emission", "transition", "command")
+    )
+    return LinearModel(emission, transition, command, float(stored["temperature"]))
+
+
+@cache
+def shipped_words() -> dict[str, frozenset[str]]:
+    """Words of commands it was trained on, and the meanings of those they stood in."""
+    words = (str(row).split() for row in _stored()["words"])
+    return {word: frozenset(meanings) for word, *meanings in words}
+
+
+@cache
+def _stored() -> dict[str, NDArray[Any]]:
+    with resources.files(__package__ or "").joinpath("tagging.npz").open("rb") as file:
+        return dict(np.load(file))
+
+
+def tag_features(words: Sequence[str]) -> list[list[int]]:
+    """The hashed features of each word, by its neighbourhood and its clause."""
+    plain = ["#" if w[0].isdigit() else w for w in words]
+    around = ["<", "<", *plain, ">", ">"]
+    opening, classes = _clauses(plain), [(), *word_classes(words), ()]
+    rows: list[list[int]] = []
+    for i, word in enumerate(plain):
+        before2, before, _, after, after2 = around[i : i + 5]
+        clause = opening[i]
+        names = (
+            *("bias", f"w={word}", f"-1={before}", f"+1={after}", f"-2={before2}", f"+2={after2}"),
+            *(f"-1,0={before} {word}", f"0,1={word} {after}", f"-2,-1={before2} {before}"),
+            *(f"1,2={after} {after2}", f"-1,1={before} {after}", f"<{word[:3]}", f"<{word[:4]}"),
+            *(f"{word[-2:]}>", f"{word[-3:]}>", f"c={clause[0]}", f"cc={clause[0]} {clause[1]}"),
+            *(f"s={clause[2]}", f"c,w={clause[0]} {word}", f"p={clause[3]}", f"r={clause[4]}"),
+        )
+        named = [f"{k}:{c}" for k in (-1, 0, 1) for c in classes[i + 1 + k]]
+        rows.append([_bucket(name, TAG_BUCKETS) for name in (*names, *named)])
+    return rows
+
+
+def word_classes(words: Sequence[str]) -> list[tuple[str, ...]]:
+    """The classes of classes.yaml that each word belongs to, alone or in a longer phrase."""
+    stems = [stem(w) for w in words]
+    found: list[set[str]] = [set() for _ in words]
+    for start in range(len(words)):
+        for length in range(min(LONGEST, len(words) - start), 0, -1):
+            kinds = _classes().get(tuple(stems[start : start + length]), ())
+            for k in range(start, start + length):
+                found[k].update(kinds)
+            if kinds:
+                break
+    return [tuple(sorted(kinds)) for kinds in found]
+
+
+@cache
+def _classes() -> dict[tuple[str, ...], tuple[str, ...]]:
+    text = resources.files(__package__ or "").joinpath("classes.yaml").read_text("utf-8")
+    found: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for kind, phrases in yaml.load(text, yaml.CSafeLoader).items():
+        for phrase in phrases:
+            stems = tuple(stem(w.text) for w in tokens(phrase))
+            found[stems] = tuple(dict.fromkeys((*found.get(stems, ()), kind)))
+    return found
+
+
+def stem(word: str) -> str:
+    """A word without the ending of its form."""
+    return next(
+        (word[: -len(e)] for e in ENDINGS if word.endswith(e) and len(word) - len(e) >= 3), word
+    )
+
+
+def _clauses(words: Sequence[str]) -> list[tuple[str, str, str, str, str]]:
+    """For each word the first two of its clause and the first of its sentence, where it stands.
+
+    The last two tell whether the clause is first or last, and whether it counts something.
+    """
+    bounds = [
+        0,
+        *(i + 1 for i, w in enumerate(words) if w in SENTENCE_ENDS or w in ",:-"),
+        len(words),
+    ]
+    found: list[tuple[str, str, str, str, str]] = []
+    sentence = "<"
+    for start, end in zip(bounds, bounds[1:], strict=False):
+        clause = words[start:end]
+        if not clause:
+            continue
+        if start == 0 or words[start - 1] in SENTENCE_ENDS:
+            sentence = clause[0]
+        place = f"{start == 0}{end == len(words)}"
+        counts = str("#" in clause)
+        second = clause[1] if len(clause) > 1 else ">"
+        found += [(clause[0], second, sentence, place, counts)] * len(clause)
+    return found
+
+
+def meaning_features(words: Sequence[str], labels: Sequence[str]) -> list[int]:
+    """The hashed n-grams of what is not a phrase for a thing; those of the command count apart."""
+    names: list[str] = ["bias"]
+    for kinds, label in zip(word_classes(words), labels, strict=True):
+        names += [f"{label}:{kind}" for kind in kinds]
+    for kept in (("command", "demand"), ("command", "demand", "background")):
+        line: list[str] = []
+        for word, label in zip(words, labels, strict=True):
+            if label == "thing":
+                line += [] if line[-1:] == ["_"] else ["_"]
+            elif label in kept:
+                line.append("#" if word[0].isdigit() else word)
+            elif line[-1:] != ["|"]:
+                line.append("|")
+        mark = len(kept)
+        names += [f"{mark}{w}" for w in line]
+        names += [f"{mark}{a} {b}" for a, b in zip(line, line[1:], strict=False)]
+        names += [f"{mark}{a} {b} {c}" for a, b, c in zip(line, line[1:], line[2:], strict=False)]
+        if mark == 2:
+            names += [f"<{w[:k]}" for w in line for k in (3, 4, 5) if len(w) > k]
+            names += [f"{w[-k:]}>" for w in line for k in (3, 4) if len(w) > k]
+    return [_bucket(name, MEANING_BUCKETS) for name in dict.fromkeys(names)]
+
+
+def _bucket(name: str, buckets: int) -> int:
+    return zlib.crc32(name.encode()) % buckets

@@ -1,0 +1,265 @@
+"""Numbers as people write and say them: "78", "a hundred and twenty", "two and a half dozen".
+
+Read here because no kept library reads dozens, halves, fractions and "a hundred" with their
+place in the text (text2num, the best of those tried, reads plain cardinals only).
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+SMALL = {
+    name: number
+    for number, name in enumerate(
+        [
+            "zero",
+            "one",
+            "two",
+            "three",
+            "four",
+            "five",
+            "six",
+            "seven",
+            "eight",
+            "nine",
+            "ten",
+            "eleven",
+            "twelve",
+            "thirteen",
+            "fourteen",
+            "fifteen",
+            "sixteen",
+            "seventeen",
+            "eighteen",
+            "nineteen",
+        ]
+    )
+} | {"nought": 0, "naught": 0, "nil": 0}
+TENS = {
+    name: 10 * number
+    for number, name in enumerate(
+        ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"], start=2
+    )
+} | {"fourty": 40}
+SCALES = {"hundred": 100, "thousand": 1_000, "million": 1_000_000}
+GROUPS = {"dozen": 12, "score": 20, "pair": 2, "couple": 2, "gross": 144, "trio": 3, "quartet": 4}
+"""Nouns that count: "three pairs of robots" are six."""
+PARTS = {"half": 2, "third": 3, "quarter": 4, "fifth": 5, "sixth": 6, "eighth": 8, "tenth": 10}
+SIGNS = {"\u00bd": 0.5, "\u00bc": 0.25, "\u00be": 0.75, "\u2153": 1 / 3, "\u2154": 2 / 3}
+DIGITS = r"[0-9]{1,3}(?:[,\u00a0\u2009\u202f'][0-9]{3})+(?:\.[0-9]+)?|[0-9]{1,3}(?: [0-9]{3})+(?![0-9.,])|[0-9]*\.?[0-9]+(?:e[0-9]+)?"
+ATOM = re.compile(
+    rf"(?P<digits>(?<![\w.,])(?:{DIGITS})(?![\d]))|(?P<sign>[\u00bd\u00bc\u00be\u2153\u2154])|"
+    r"(?P<word>[^\W\d_]+(?:'s)?)|(?P<mark>[-\u2013\u2014\u2212+*\u00d7/\u00b1%,.;:!?()'\"])",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number that stands in a text, or a range of numbers.
+
+    Attributes:
+        least, most: the number; of a range its ends.
+        start, end: where it stands, first and past-the-last character.
+    """
+
+    least: float
+    most: float
+    start: int
+    end: int
+
+    @property
+    def whole(self) -> int | None:
+        """A count: a whole number above 0 that is no range; else None."""
+        value = round(self.least)
+        exact = abs(value - self.least) < 1e-9 and self.most == self.least
+        return value if exact and value > 0 else None
+
+
+@dataclass(frozen=True)
+class _Atom:
+    text: str
+    kind: str
+    start: int
+    end: int
+
+
+def numbers_in(text: str) -> tuple[Number, ...]:
+    """The numbers of a text in their order, read as far as they go.
+
+    Ordinals, "no one" and "the one" are none. Sums, products and shares of a number come to one
+    number, "20-30" and "between 20 and 30" to a range, "25 \u00b1 2" too.
+    """
+    atoms = [_Atom(m[0].lower(), str(m.lastgroup), m.start(), m.end()) for m in ATOM.finditer(text)]
+    found: list[Number] = []
+    at = 0
+    while at < len(atoms):
+        read = _expression(atoms, at)
+        if read is None:
+            at += 1
+            continue
+        found.append(read[0])
+        at = read[1]
+    return tuple(found)
+
+
+def _expression(atoms: Sequence[_Atom], at: int) -> tuple[Number, int] | None:
+    """A number with its sign, and what is added to it or spans a range with it."""
+    start = at
+    negative = _text(atoms, at) in ("minus", "-", "\u2212") and _begins(atoms, at)
+    between = _text(atoms, at) == "between"
+    first = _quantity(atoms, at + (negative or between))
+    if first is None:
+        return None
+    value, at = first
+    low = high = -value if negative else value
+    while (joined := _text(atoms, at)) and not negative:
+        second = _quantity(atoms, at + 1)
+        if second is None:
+            break
+        other, after = second
+        if joined in ("+", "plus"):
+            low, high = low + other, high + other
+        elif joined in ("*", "\u00d7", "x", "times"):
+            low, high = low * other, high * other
+        elif joined == "\u00b1":
+            low, high = low - other, high + other
+        elif joined in ("-", "\u2013", "\u2014", "to") or (joined == "and" and between):
+            low, high = min(low, other), max(high, other)
+        elif joined == "or" and other > high:
+            high = other
+        else:
+            break
+        at = after
+    if between and low == high:
+        start += 1
+    return Number(low, high, atoms[start].start, atoms[at - 1].end), at
+
+
+def _begins(atoms: Sequence[_Atom], at: int) -> bool:
+    """Whether a minus sign is one: directly before the number, and joined to nothing before."""
+    if atoms[at].text == "minus":
+        return True
+    close = at + 1 < len(atoms) and atoms[at].end == atoms[at + 1].start
+    return close and (at == 0 or atoms[at - 1].end < atoms[at].start)
+
+
+def _quantity(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
+    """A number with its halves, and times the dozens, scores or pairs that it counts."""
+    if _text(atoms, at) in ("a", "an") and _text(atoms, at + 1) == "baker's":
+        return (13.0, at + 3) if _text(atoms, at + 2) == "dozen" else None
+    share = _share(atoms, at)
+    if share is not None:
+        return share
+    read = _number(atoms, at)
+    if read is None:
+        noun = _text(atoms, at + 1)
+        if _text(atoms, at) in ("a", "an") and noun in GROUPS and noun != "score":
+            return float(GROUPS[noun]), at + 2 + (_text(atoms, at + 2) == "of")
+        return None
+    value, at = read
+    value, at = _and_a_half(atoms, value, at)
+    noun = _text(atoms, at).removesuffix("s") if _text(atoms, at) != "gross" else "gross"
+    if noun in GROUPS:
+        value, at = value * GROUPS[noun], at + 1
+        at += _text(atoms, at) == "of"
+    return value, at
+
+
+def _share(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
+    """Half a dozen, half of 40, two thirds of a (metre), three quarters of an hour."""
+    count, k = 1.0, at
+    if _text(atoms, k) in ("a", "an", "one") and _text(atoms, k + 1) in PARTS:
+        k += 1
+    elif _text(atoms, k) in SMALL and _text(atoms, k + 1).removesuffix("s") in PARTS:
+        count, k = float(SMALL[_text(atoms, k)]), k + 1
+    name = _text(atoms, k)
+    part = PARTS.get(name) or PARTS.get(name.removesuffix("s")) or (2 if name == "halves" else None)
+    if part is None or (k == at and name != "half"):
+        return None
+    share, k = count / part, k + 1
+    k += _text(atoms, k) == "of"
+    if _text(atoms, k) in ("a", "an"):
+        noun = _text(atoms, k + 1)
+        return (share * GROUPS[noun], k + 2) if noun in GROUPS else (share, k + 1)
+    whole = _number(atoms, k)
+    return (share * whole[0], whole[1]) if whole else None
+
+
+def _and_a_half(atoms: Sequence[_Atom], value: float, at: int) -> tuple[float, int]:
+    if _text(atoms, at) == "and":
+        share = _text(atoms, at + 2).removesuffix("s")
+        if _text(atoms, at + 1) in ("a", "one") and share in PARTS:
+            return value + 1 / PARTS[share], at + 3
+        if _text(atoms, at + 1) in SMALL and share in PARTS:
+            return value + SMALL[_text(atoms, at + 1)] / PARTS[share], at + 3
+    if at < len(atoms) and atoms[at].kind == "sign":
+        return value + SIGNS[atoms[at].text], at + 1
+    return value, at
+
+
+def _number(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
+    """Digits, a fraction in digits, or a cardinal in words with what follows its point."""
+    if at >= len(atoms):
+        return None
+    atom = atoms[at]
+    if atom.kind == "sign":
+        return SIGNS[atom.text], at + 1
+    if atom.kind == "digits":
+        value = float(re.sub(r"[^0-9.e]", "", atom.text))
+        if _text(atoms, at + 1) == "/" and at + 2 < len(atoms) and atoms[at + 2].kind == "digits":
+            below = float(re.sub(r"[^0-9.e]", "", atoms[at + 2].text))
+            return (value / below, at + 3) if below else None
+        scale = SCALES.get(_text(atoms, at + 1))
+        return (value * scale, at + 2) if scale else (value, at + 1)
+    return _cardinal(atoms, at)
+
+
+def _cardinal(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
+    """Four hundred and twenty-one; one point five. "One" alone counts only before a noun."""
+    total, current, k = 0, 0, at
+    if _text(atoms, k) in ("a", "an") and _text(atoms, k + 1) in SCALES:
+        current, k = 1, k + 1
+    while k < len(atoms):
+        word = _text(atoms, k)
+        if word in TENS and current % 100 == 0:
+            current += TENS[word]
+        elif word in SMALL and (current % 10 == 0 if SMALL[word] < 10 else current % 100 == 0):
+            if current and current % 100 == 0 and SMALL[word] == 0:
+                break
+            current += SMALL[word]
+            if current % 100 in range(1, 20) and _text(atoms, k + 1) in (*SMALL, *TENS):
+                k += 1
+                break
+        elif word == "hundred" and current:
+            current *= 100
+        elif word in SCALES and current:
+            total, current = total + current * SCALES[word], 0
+        elif (
+            word == "and" and (current % 100 == 0 and (current or total)) and _next_counts(atoms, k)
+        ) or (word == "-" and k > at and _next_counts(atoms, k) and _is_joined(atoms, k)):
+            pass
+        else:
+            break
+        k += 1
+    if k == at:
+        return None
+    value = float(total + current)
+    if _text(atoms, k) == "point" and _text(atoms, k + 1) in SMALL:
+        k, scale = k + 1, 0.1
+        while _text(atoms, k) in SMALL and SMALL[_text(atoms, k)] < 10:
+            value, scale, k = value + SMALL[_text(atoms, k)] * scale, scale / 10, k + 1
+        value = round(value, 9)
+    return value, k
+
+
+def _next_counts(atoms: Sequence[_Atom], at: int) -> bool:
+    return _text(atoms, at + 1) in (*SMALL, *TENS)
+
+
+def _is_joined(atoms: Sequence[_Atom], at: int) -> bool:
+    return atoms[at - 1].end == atoms[at].start and atoms[at].end == atoms[at + 1].start
+
+
+def _text(atoms: Sequence[_Atom], at: int) -> str:
+    return atoms[at].text if 0 <= at < len(atoms) else ""
