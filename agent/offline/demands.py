@@ -122,7 +122,10 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, str], ...]:
     found: list[tuple[str, str]] = []
     for sentence in sentences(items):
         line = _Line(sentence)
+        counted_elsewhere = any(i.quantity for i in items if i not in sentence)
         for kind, pattern in _stops():
+            if kind == "a question" and counted_elsewhere:
+                continue
             for match in pattern.finditer(line.text):
                 first, last = line.items_of(match)
                 if any(i.label != "background" for i in sentence[first:last]):

@@ -5,7 +5,7 @@ that is repeated to the person, or is left unread: then the planner asks and quo
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -16,10 +16,10 @@ from .tagging import shipped_words, stem, tag, tokens, word_classes
 
 FARTHEST = 100_000
 """Stands for no upper bound of a clearance, px."""
-SURE = 0.5
+SURE = 0.55
 """Least probability of an arrangement that is carried out unasked, fitted on other authors."""
 SURE_BACKGROUND = 0.5
-SCENIC = 0.6
+SCENIC = 0.4
 """Share of a sentence's words that are no command from which on all of it is background."""
 OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
 OPENS = {
@@ -129,6 +129,9 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
     form, span = form_in(text)
     words = tokens(text)
     tagging = tag(words)
+    relation = max(tagging.meaning, key=lambda m: tagging.meaning[m])
+    known = _known_words([w.text for w in words], relation)
+    tagging = tag(words, known)
     items = [_drawn(item, span) for item in items_of(text, words, tagging)]
     meanings = sorted(tagging.meaning.items(), key=lambda m: -m[1])
     reading = Reading(meanings, form=form, stops=stops_in(items))
@@ -140,6 +143,27 @@ def _drawn(item: Item, span: tuple[int, int]) -> Item:
     if span[0] <= item.start < span[1]:
         return Item("<f>", item.start, item.end, "demand", 1.0)
     return item
+
+
+def _known_words(words: Sequence[str], relation: str) -> list[bool]:
+    """For each word whether it can be part of a command for an arrangement."""
+    return [
+        not word[0].isalpha()
+        or word in _fillers()
+        or word in HEAVY
+        or bool(set(classes) & DEMANDING)
+        or goes_with(word, set(classes), relation)
+        for word, classes in zip(words, word_classes(words), strict=True)
+    ]
+
+
+def goes_with(word: str, classes: set[str], relation: str) -> bool:
+    """Whether a word goes with an arrangement: by the thesaurus or in other commands."""
+    if classes & {*CLASSES_OF.get(relation, ()), *NEUTRAL}:
+        return True
+    meanings = shipped_words().get(stem(word), frozenset())
+    others = {c for r, named in CLASSES_OF.items() if r != relation for c in named}
+    return relation in meanings or (bool(meanings) and not classes & (others | DEMANDING))
 
 
 class _Reader:
@@ -169,13 +193,18 @@ class _Reader:
 
     def _scenery(self) -> list[bool]:
         """For each item whether its sentence only sets the scene, beside one that commands."""
+        demanded = {k for d in self.demands for k in range(d.first, d.last)}
         scenic: list[bool] = []
         for sentence in sentences(self.items):
+            place = range(len(scenic), len(scenic) + len(sentence))
             words = [i for i in sentence if i.symbol[0].isalnum() or i.symbol == "<t>"]
             aside = [i for i in words if i.label in ("background", "thing")]
-            share = 1.0 if any(i.quantity for i in sentence) else SCENIC
-            mostly = bool(words) and len(aside) >= share * len(words)
-            scenic += [mostly and len(sentence) < len(self.items)] * len(sentence)
+            weighs = demanded & {*place} or any(
+                i.quantity or i.symbol in HEAVY or "robot" in self.classes[k]
+                for k, i in zip(place, sentence, strict=True)
+            )
+            share = 1.0 if weighs else SCENIC
+            scenic += [bool(words) and len(aside) >= share * len(words)] * len(sentence)
         return scenic if not all(scenic) else [False] * len(self.items)
 
     def _settle_meaning(self) -> None:
@@ -185,12 +214,20 @@ class _Reader:
         forced = "cage" if self._closes() else None
         if reading.form is not None or "form" in sets:
             forced = "shape"
+        elif self._parts():
+            forced = "between"
         elif "rings" in sets and reading.relation in ("several", "shape"):
             forced = next(m for m, _ in reading.meanings if m in ("around", "cage", "along"))
         elif "groups" in sets and reading.relation in ("several", "around"):
             forced = "along"
         if forced and reading.relation != "ask":
             reading.meanings = [(forced, 1.0), *reading.meanings]
+
+    def _parts(self) -> bool:
+        """Whether the command says between: the arrangement is no other then."""
+        return any(i.symbol == "between" and i.label == "command" for i in self.items) and (
+            dict(self.reading.meanings).get("between", 0) >= MAY_CLOSE
+        )
 
     def _closes(self) -> bool:
         """Whether a command for a ring has a word that closes it: a barrier all round."""
@@ -499,7 +536,8 @@ class _Reader:
             return "unread"
         if item.symbol in _fillers():
             return "filler"
-        return "" if self._is_known(k) else "unread"
+        known = goes_with(item.symbol, self.classes[k], self.reading.relation)
+        return "" if known else "unread"
 
     def _counts_corners(self, item: Item) -> bool:
         """Four corners, one robot at each."""
@@ -515,17 +553,6 @@ class _Reader:
         if relation == "corners" and word in ("each", "every"):
             return True
         return bool(self.classes[k] & {*CLASSES_OF.get(relation, ())})
-
-    def _is_known(self, k: int) -> bool:
-        """Whether the word goes with the arrangement: by the thesaurus or in other commands."""
-        relation, classes = self.reading.relation, self.classes[k]
-        if classes & {*CLASSES_OF.get(relation, ()), *NEUTRAL}:
-            return True
-        meanings = shipped_words().get(stem(self.items[k].symbol), frozenset())
-        if relation in meanings:
-            return True
-        others = {c for r, named in CLASSES_OF.items() if r != relation for c in named}
-        return bool(meanings) and not classes & (others | DEMANDING)
 
     def _quote(self, first: int, last: int) -> str:
         return " ".join(self.text[self.items[first].start : self.items[last - 1].end].split())

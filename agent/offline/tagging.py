@@ -18,6 +18,8 @@ import yaml
 from numpy.typing import NDArray
 
 LABELS = ("command", "thing", "demand", "background")
+DEMAND, SURE_DEMAND = LABELS.index("demand"), 0.5
+"""Words are a demand only where that is at least so probable."""
 MEANINGS = (
     *("around", "cage", "inside", "along", "corners", "between", "centre", "shape"),
     *("several", "ask"),
@@ -63,20 +65,16 @@ class Tagging:
     meaning: dict[str, float]
 
 
-def tag(words: Sequence[Token]) -> Tagging:
-    """The most likely labels of the words of one instruction, and the meaning of its command."""
+def tag(words: Sequence[Token], may_command: Sequence[bool] = ()) -> Tagging:
+    """The most likely labels of the words of one instruction, and the meaning of its command.
+
+    Args:
+        words: of the instruction.
+        may_command: for each word whether it can be one of the command; left out, all can.
+    """
     model = shipped()
-    labels, certainty = model.labels([w.text for w in words], may_command([w.text for w in words]))
+    labels, certainty = model.labels([w.text for w in words], may_command)
     return Tagging(labels, certainty, model.meaning([w.text for w in words], labels))
-
-
-def may_command(words: Sequence[str]) -> list[bool]:
-    """Whether each word is known in commands; of others it is open only what they speak of."""
-    known = shipped_words()
-    return [
-        not word[0].isalpha() or bool(kinds) or stem(word) in known
-        for word, kinds in zip(words, word_classes(words), strict=True)
-    ]
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ class LinearModel:
     def labels(
         self, words: Sequence[str], may_command: Sequence[bool] = ()
     ) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """The label of each word with the greatest marginal, and that probability.
+        """The likeliest label of each word, demands only where they are sure, and its probability.
 
         Args:
             words: of one instruction.
@@ -112,8 +110,10 @@ class LinearModel:
         if may_command:
             scores[~np.asarray(may_command), LABELS.index("command")] = -np.inf
         marginal = _marginals(scores, self.transition)
-        best = marginal.argmax(axis=1)
-        return tuple(LABELS[k] for k in best), tuple(marginal.max(axis=1).tolist())
+        likely = marginal.copy()
+        likely[marginal[:, DEMAND] < SURE_DEMAND, DEMAND] = 0
+        best = likely.argmax(axis=1)
+        return tuple(LABELS[k] for k in best), tuple(marginal[range(len(best)), best].tolist())
 
     def meaning(self, words: Sequence[str], labels: Sequence[str]) -> dict[str, float]:
         """Probabilities of MEANINGS."""

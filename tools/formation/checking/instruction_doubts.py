@@ -1,15 +1,15 @@
 """The plain facts of an instruction, held against the contract that is to carry it out.
 
-Only words that hardly mean anything else count, and none that stand beside a negation: a doubt is
-a question to the model, which may answer that the contract is right.
+Only words that hardly mean anything else count: a doubt is a question to the model, which may
+answer that the contract is right.
 """
 
 import re
 from collections.abc import Iterator, Sequence
 
-from ..contract import Contract, Relation
-from ..named_lengths import LENGTH, NUMBERS, named_lengths
-from ..units import LENGTHS, length_text
+from ..contract import Contract, Group, Relation
+from ..quantities import Quantity, quantities_in
+from ..units import length_text
 
 NEGATION = re.compile(r"(?:\b(?:not|no|never|without|except|instead of)|n't)(?:\W+\w+){0,3}\W*\Z")
 PLAIN: tuple[tuple[str, str, frozenset[Relation]], ...] = (
@@ -24,7 +24,21 @@ PLAIN: tuple[tuple[str, str, frozenset[Relation]], ...] = (
     (r"\b(?:surround|encircle)\b", "surround", frozenset({"around", "cage", "corners"})),
 )
 """A pattern, the word to quote, and the relations that can be meant by it."""
-COUNT = re.compile(rf"\b(\d+|{'|'.join(NUMBERS)})\W+(?:\w+\W+)?(?:robots?|bots?|agents?|drones?)\b")
+ROBOTS = re.compile(r"\W+(?:[\w-]+\W+){0,2}?(?:robots?|bots?|agents?|drones?|rovers?)\b")
+SIDE = r"(?:left|right|top|bottom|upper|lower|north|south|east|west)(?:ern)?(?:[ -]hand)?"
+WEIGHTY: tuple[tuple[str, str], ...] = (
+    (r"\b(?:all|each|noses?|cameras?|backs?|fronts?)\b[^.;]{0,20}\b(?:facing|face|outwards?|inwards?)"
+     r"\b|\bfacing (?:out|in|away|outwards?|inwards?|it)\b", "heading"),
+    (r"\b(?:leave|leaving|with)\b(?! no)[^.;]{0,20}\b(?:gap|opening|doorway|entrance|exit)\b",
+     "opening"),
+    (rf"\b(?:along|on|at|down|beside|leave|leaving) (?:the |its )?{SIDE} (?:side|edge|flank)\b",
+     "side"),
+    (r"\b(?:clear of|keep off|stay off|hands off|keep away from|without touching)\b", "keep_out"),
+    (r"\b(?:each|both|every one) of (?:the|these|those)\b(?! robots| four| \w+ corners| corners)",
+     "targets"),
+    (r"\b(?:all|everything|anything|everyone) (?:but|except)\b|\bexcept\b", "sides"),
+)  # fmt: skip
+"""Words that a contract has to answer, and the part of it that does."""
 SAME = 0.05
 """Share by which a length of the contract may differ from the one named."""
 
@@ -38,22 +52,24 @@ def doubts(
         instruction: in the person's words; words of other languages count nothing.
         contract: as a model stated it, in px.
         counted: whether the person gave the number of robots apart from the words.
-        scale: metres per pixel. Where there is one, lengths can be stated in either unit, so that
-            those the words name are looked for; None leaves them alone.
+        scale: metres per pixel; without one only lengths in px are looked for.
     """
-    text = " ".join(instruction.lower().split())
-    lengths = () if scale is None else _length_doubts(text, contract, scale)
+    text = " ".join(instruction.split())
+    quantities = quantities_in(text)
+    text = text.lower()
     return [
-        *(() if counted else _count_doubts(text, contract)),
+        *(() if counted else _count_doubts(text, quantities, contract)),
         *_relation_doubts(text, contract),
-        *lengths,
+        *_length_doubts(quantities, contract, scale),
+        *_weight_doubts(text, contract),
     ]
 
 
-def _count_doubts(text: str, contract: Contract) -> Iterator[str]:
-    counted = COUNT.findall(LENGTH.sub(",", text))  # "0.4 m robots" are not four
-    wording = [NUMBERS.index(n) if n in NUMBERS else int(n) for n in counted]
-    found = [n for n in wording if n > 1]  # "one robot at each corner" counts nothing
+def _count_doubts(
+    text: str, quantities: Sequence[Quantity], contract: Contract
+) -> Iterator[str]:
+    counted = [q.whole for q in quantities if q.whole and ROBOTS.match(text, q.end)]
+    found = [n for n in counted if n > 1]  # "one robot at each corner" counts nothing
     if found and contract.robots not in {*found, sum(found)}:
         counts = " and ".join(map(str, found))
         yield f"the instruction speaks of {counts} robots, the contract has {contract.robots}"
@@ -68,27 +84,53 @@ def _relation_doubts(text: str, contract: Contract) -> Iterator[str]:
             yield f"the instruction says {word!r}, but no group has the relation {names}"
 
 
-def _length_doubts(text: str, contract: Contract, scale: float) -> Iterator[str]:
+def _weight_doubts(text: str, contract: Contract) -> Iterator[str]:
+    for pattern, part in WEIGHTY:
+        found = re.search(pattern, text)
+        if found and not _answers(contract, part):
+            yield f"the instruction says {found[0]!r}, but no group has a {part} for it"
+
+
+def _answers(contract: Contract, part: str) -> bool:
+    """Whether a contract has something to say of a part."""
+    if part == "keep_out":
+        return bool(contract.keep_out)
+    if part == "targets":
+        return len(contract.target_ids) > 1
+    fields = {
+        "heading": ("heading", "facing"),
+        "opening": ("opening", "opening_towards", "sides", "shape"),
+        "side": ("side", "sides", "edges", "facing", "opening_towards", "shape"),
+        "sides": ("side", "sides", "opening", "opening_towards", "edges"),
+    }[part]
+    return any(getattr(g, name) is not None for g in contract.groups for name in fields)
+
+
+def _length_doubts(
+    quantities: Sequence[Quantity], contract: Contract, scale: float | None
+) -> Iterator[str]:
     """Lengths of the words that the contract has not; forms have lengths of their own."""
-    drawn = any(group.relation == "shape" for group in contract.groups)
-    stated = [
-        length
-        for g in contract.groups
-        for length in (*(g.clearance or ()), *(getattr(g, name) for name in LENGTHS))
-        if length is not None
-    ]
-    stated += [sum(g.clearance) / 2 for g in contract.groups if g.clearance is not None]
-    for named in named_lengths(text):
-        px = named.px(scale)
-        if named.of in ("across", "radius"):
-            wanted = px / 2 if named.of == "across" else px
-            rings = [g.radius for g in contract.groups if g.radius is not None]
-            if not _is_near(wanted, [contract.robot_radius, *rings]):
-                has = length_text(contract.robot_radius, scale)
-                yield f"the instruction says {named.wording} {named.of}, but robot_radius is {has}"
-        elif named.of != "something" and not drawn and not _is_near(px, stated):
-            yield f"the instruction names {named.wording}, which is no length of the contract"
+    if any(group.relation == "shape" for group in contract.groups):
+        return
+    radius = contract.robot_radius
+    stated = [radius, 2 * radius, *(n for g in contract.groups for n in _lengths(g))]
+    for quantity in quantities:
+        named = quantity.px(scale) if quantity.is_length else None
+        if named is None or named[0] <= 0:
+            continue
+        if not all(any(abs(px - s) <= SAME * px for s in stated) for px in named):
+            yield (
+                f"the instruction names {quantity.wording}, which is no length of the contract"
+                + (f" ({length_text(named[0], scale)})" if quantity.kind == "m" else "")
+            )
 
 
-def _is_near(length: float, among: Sequence[float]) -> bool:
-    return any(abs(length - other) <= SAME * length for other in among)
+def _lengths(group: Group) -> Iterator[float]:
+    clearance = group.clearance or ()
+    yield from clearance
+    if clearance:
+        yield sum(clearance) / 2
+    named = (group.min_spacing, group.max_gap, group.pitch, group.radius, group.opening)
+    for length in named:
+        if length is not None:
+            yield from (length, 2 * length)
