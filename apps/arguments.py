@@ -15,7 +15,7 @@ from ..prompts.inputs import Input
 from ..tools.context import Descriptor
 from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_LENGTH, MAX_ROBOTS
-from ..tools.formation.named_lengths import named_lengths
+from ..tools.formation.quantities import quantities_in
 from ..tools.formation.units import COARSEST, FINEST
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.store import read_text
@@ -103,15 +103,16 @@ def length(name: str, text: str | None, metres_per_pixel: float | None) -> float
 
 def _metric(name: str, text: str, metres_per_pixel: float | None) -> float | None:
     """A length with its unit, px; None where it is none."""
-    found = named_lengths(text.strip().lower())
-    if len(found) != 1 or found[0].wording != text.strip().lower():
+    found = quantities_in(text.strip())
+    if len(found) != 1 or found[0].wording != text.strip() or not found[0].is_length:
         return None
-    if found[0].unit == "m" and metres_per_pixel is None:
+    px = found[0].px(metres_per_pixel)
+    if px is None:
         raise InputError(
             f"{name} {text!r} is metric, and the picture has no scale; give --metres-per-pixel "
             "too, or pixels."
         )
-    return found[0].px(metres_per_pixel)
+    return px[0]
 
 
 def share(name: str, text: str | None) -> float | None:

@@ -18,6 +18,8 @@ from .reading import read_instruction
 from .references import described
 
 MAX_LABEL = 100
+READING = "The rules account for every word; the rest of them says which thing is meant."
+"""Answers a doubt, which comes of single words."""
 
 
 class OfflinePlanner:
@@ -76,6 +78,8 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     contract = contract_of(reading, robots, ids, others, _refusals(history))
     if task.metres_per_pixel is not None:
         contract["unit"] = "px"
+    if _was_doubted(history):
+        contract["reading"] = READING
     return _call("propose_formation", {"contract": contract, "targets": prompts})
 
 
@@ -99,7 +103,12 @@ def _prompts(found: list[tuple[str, str]], before: History) -> list[dict[str, An
 
 
 def _refusals(history: History) -> int:
-    return sum(isinstance(m, Result) and m.name == "propose_formation" for m in history)
+    """How many places beside a thing had no room."""
+    return sum(isinstance(m, Result) and m.cause == "no_room_beside" for m in history)
+
+
+def _was_doubted(history: History) -> bool:
+    return any(isinstance(m, Result) and m.cause == "doubt" for m in history)
 
 
 def _left_off(result: Result, history: History) -> str:
@@ -127,7 +136,8 @@ def _target_ids(task: Task) -> list[str]:
 
 def _after_proposal(task: Task, result: Result, history: History, before: History) -> Reply:
     if result.error:
-        if result.cause == "no_room_beside" and _may_move_on(task, history):
+        again = result.cause == "no_room_beside" and _may_move_on(task, history)
+        if again or (result.cause == "doubt" and not _was_doubted(history[:-1])):
             return _begin(task, history, before)
         if result.cause == "low_confidence":
             return _call("ask_user", {"question": result.text})
