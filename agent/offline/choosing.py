@@ -87,10 +87,70 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
             answer = next((m.text for m in history if _answers(m, call)), "").lower()
             numbers = re.findall(r"(?<![-.\w])c?([0-9]{1,4})(?!\.?[0-9])\b", answer)
             offered = [f"c{n}" for n in numbers if f"c{n}" in call.arguments["candidates"]]
+            if not offered:
+                offered = picked(answer, _sightings(call.arguments["candidates"], history))
             named = list(dict.fromkeys([*chosen, *offered]))
             if len(named) <= needed and not _excludes(answer):
                 chosen = named
     return chosen
+
+
+AGREEING = frozenset("yes yep yeah ok okay sure right correct exactly go ahead do that it".split())
+SMALL = frozenset("the one on at in of to them it please i mean is that a most and two".split())
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
+EXTREMES: dict[str, tuple[str, int]] = {
+    **dict.fromkeys(("left", "leftmost", "western"), ("x", -1)),
+    **dict.fromkeys(("right", "rightmost", "eastern"), ("x", 1)),
+    **dict.fromkeys(("top", "upper", "topmost", "above", "highest", "northern"), ("y", -1)),
+    **dict.fromkeys(("bottom", "lower", "lowest", "below", "southern"), ("y", 1)),
+    **dict.fromkeys(("big", "bigger", "biggest", "large", "larger", "largest"), ("area", 1)),
+    **dict.fromkeys(("small", "smaller", "smallest", "little", "littlest"), ("area", -1)),
+}
+"""Words of an answer that choose by place or size, and what is least or greatest then."""
+
+
+def agrees(answer: str) -> bool:
+    """Whether an answer is a plain yes."""
+    words = re.findall(r"[a-z']+", answer.lower())
+    return bool(words) and set(words) <= AGREEING | SMALL and bool(set(words) & AGREEING)
+
+
+def picked(answer: str, offered: Sequence[dict[str, Any]]) -> list[str]:
+    """The candidate that an answer such as "the left one" or "the second" chooses, if it does.
+
+    Args:
+        answer: lower case.
+        offered: what locate_object said of the candidates, in the order of the question.
+    """
+    words = [w for w in re.findall(r"[a-z']+", answer) if w not in SMALL]
+    if len(offered) == 1 and agrees(answer):
+        return [str(offered[0]["id"])]
+    if len(words) != 1 or not offered:
+        return []
+    word = words[0]
+    if word in ORDINALS and ORDINALS.index(word) < len(offered):
+        return [str(offered[ORDINALS.index(word)]["id"])]
+    if word == "last":
+        return [str(offered[-1]["id"])]
+    if word not in EXTREMES:
+        return []
+    measure, sign = EXTREMES[word]
+    ranked = sorted(offered, key=lambda c: -sign * _measure(c, measure))
+    return [str(ranked[0]["id"])]
+
+
+def _measure(candidate: dict[str, Any], name: str) -> float:
+    x0, y0, x1, y1 = candidate["box"]
+    return {"x": x0 + x1, "y": y0 + y1}.get(name, candidate["area_px"])
+
+
+def _sightings(ids: Sequence[str], history: History) -> list[dict[str, Any]]:
+    """What was said of candidates when they were found."""
+    found: dict[str, dict[str, Any]] = {}
+    for message in history:
+        if isinstance(message, Result) and message.name == "locate_object" and not message.error:
+            found |= {c["id"]: c for c in json.loads(message.text).get("candidates", ())}
+    return [found[i] for i in ids if i in found]
 
 
 def _excludes(answer: str) -> bool:

@@ -33,6 +33,12 @@ def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
     )
 
 
+def would_do(task: Task, reading: Reading) -> bool:
+    """Whether all but words that were left unread is settled, so that a contract can be shown."""
+    settled = not (reading.stops or reading.unscaled or _unsettled(reading))
+    return settled and bool(reading.unread) and not _which_things(task, reading)
+
+
 def things_needed(reading: Reading) -> int:
     """How many things the arrangement is about."""
     return 2 if reading.relation == "between" else 1

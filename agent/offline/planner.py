@@ -12,8 +12,8 @@ from ...tools.formation.units import length_text
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
-from .choosing import Step, calls_in, find, located_reasons
-from .drafting import contract_of, place_of, question_of, things_needed
+from .choosing import Step, agrees, calls_in, find, located_reasons
+from .drafting import contract_of, place_of, question_of, things_needed, would_do
 from .reading import read_instruction
 from .references import described
 
@@ -53,13 +53,19 @@ def _next_step(turn: History, before: History) -> Reply:
 
 def _begin(task: Task, history: History, before: History) -> Reply:
     """Propose a formation, or find and ask what is missing."""
-    answers = _spoken_answers(history)
-    reading = read_instruction(" . ".join([task.instruction, *answers]), task.metres_per_pixel)
+    agreed = _agreed(task, history)
+    if agreed is not None:
+        return agreed
+    reading = read_instruction(_said(task, history), task.metres_per_pixel)
     wording = reading.robots or (reading.form.robots if reading.form else None)
     robots = task.robots or wording
     question = question_of(task, reading, robots)
     if question or robots is None:
-        return _call("ask_user", {"question": question or "How many robots?"})
+        asked: dict[str, Any] = {"question": question or "How many robots?"}
+        ids = _target_ids(task)
+        if robots and ids and would_do(task, reading):
+            asked["contract"] = _in_unit(task, contract_of(reading, robots, ids, []))
+        return _call("ask_user", asked)
     ids = _target_ids(task)[: things_needed(reading)]
     prompts = [p for p in task.pointed if p["id"] not in task.targets]
     others: list[str] = []
@@ -75,11 +81,32 @@ def _begin(task: Task, history: History, before: History) -> Reply:
             found += other
         prompts = _prompts([(f.candidate, _label(f.wording)) for f in found], before)
         ids, others = _parted([p["id"] for p in prompts], len(named))
-    contract = contract_of(reading, robots, ids, others, _refusals(history))
-    if task.metres_per_pixel is not None:
-        contract["unit"] = "px"
+    contract = _in_unit(task, contract_of(reading, robots, ids, others, _refusals(history)))
     if _was_doubted(history):
         contract["reading"] = READING
+    return _call("propose_formation", {"contract": contract, "targets": prompts})
+
+
+def _in_unit(task: Task, contract: dict[str, Any]) -> dict[str, Any]:
+    return contract if task.metres_per_pixel is None else contract | {"unit": "px"}
+
+
+def _agreed(task: Task, history: History) -> Reply | None:
+    """What a plain yes or no to a question about words that were not understood comes to."""
+    asked = [c for c in calls_in(history) if c.name == "ask_user" and "contract" in c.arguments]
+    if not asked:
+        return None
+    answer = next((m for m in history if isinstance(m, Result) and m.call_id == asked[-1].id), None)
+    if answer is None or not answer.text.strip():
+        return None
+    if answer.text.strip().lower().rstrip(".!") in ("no", "nope", "no thanks"):
+        return _call("report_impossible", {"reason": "Nothing was placed, as you said no."})
+    if not agrees(answer.text):
+        return None
+    contract: dict[str, Any] = asked[-1].arguments["contract"]
+    if _was_doubted(history):
+        contract = contract | {"reading": READING}
+    prompts = [p for p in task.pointed if p["id"] not in task.targets]
     return _call("propose_formation", {"contract": contract, "targets": prompts})
 
 
@@ -118,11 +145,16 @@ def _left_off(result: Result, history: History) -> str:
     return f"{wording} {result.text}"
 
 
-def _spoken_answers(history: History) -> list[str]:
-    """Answers in words and numbers of robots, not those that choose a candidate."""
+def _said(task: Task, history: History) -> str:
+    """The instruction with the answers to questions about it, which stand for what was unread."""
+    text = task.instruction
     offered = {c.id for c in calls_in(history) if c.arguments.get("candidates")}
-    asked = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
-    return [m.text for m in asked if m.call_id not in offered]
+    for answer in history:
+        if isinstance(answer, Result) and answer.name == "ask_user" and answer.call_id not in offered:
+            for quote in read_instruction(text, task.metres_per_pixel).unread:
+                text = text.replace(quote, " ", 1)
+            text = f"{text} . {answer.text}"
+    return text
 
 
 def _label(wording: str) -> str:

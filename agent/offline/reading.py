@@ -5,14 +5,14 @@ that is repeated to the person, or is left unread: then the planner asks and quo
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from typing import Any
 
 from .demands import Demand, Item, demands_in, items_of, sentences, stops_in
 from .drawn_forms import Form, form_in
-from .tagging import shipped_words, stem, tag, tokens, word_classes
+from .tagging import in_use, stem, tag, tokens, word_classes
 
 FARTHEST = 100_000
 """Stands for no upper bound of a clearance, px."""
@@ -161,7 +161,7 @@ def goes_with(word: str, classes: set[str], relation: str) -> bool:
     """Whether a word goes with an arrangement: by the thesaurus or in other commands."""
     if classes & {*CLASSES_OF.get(relation, ()), *NEUTRAL}:
         return True
-    meanings = shipped_words().get(stem(word), frozenset())
+    meanings = in_use().words.get(stem(word), frozenset())
     others = {c for r, named in CLASSES_OF.items() if r != relation for c in named}
     return relation in meanings or (bool(meanings) and not classes & (others | DEMANDING))
 

@@ -7,11 +7,12 @@ It is no language model: n-grams and weights in tagging.npz, made by `make wordi
 
 import re
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
-from typing import Any
 
 import numpy as np
 import yaml
@@ -72,7 +73,7 @@ def tag(words: Sequence[Token], may_command: Sequence[bool] = ()) -> Tagging:
         words: of the instruction.
         may_command: for each word whether it can be one of the command; left out, all can.
     """
-    model = shipped()
+    model = in_use()
     labels, certainty = model.labels([w.text for w in words], may_command)
     return Tagging(labels, certainty, model.meaning([w.text for w in words], labels))
 
@@ -88,12 +89,14 @@ class LinearModel:
         transition: (L, L) from a label to the next.
         command: (MEANING_BUCKETS, M) weights of features for meanings.
         temperature: softmax of meanings is of scores divided by it, so that it is calibrated.
+        words: stems of words that stood in commands, and the meanings they stood in.
     """
 
     emission: Floats
     transition: Floats
     command: Floats
     temperature: float = 1.0
+    words: dict[str, frozenset[str]] = field(default_factory=dict[str, frozenset[str]])
 
     def labels(
         self, words: Sequence[str], may_command: Sequence[bool] = ()
@@ -135,28 +138,36 @@ def _marginals(scores: Floats, transition: Floats) -> Floats:
     return np.exp(joint - np.logaddexp.reduce(joint, axis=1, keepdims=True))
 
 
+_lent: ContextVar[LinearModel | None] = ContextVar("lent", default=None)
+
+
+@contextmanager
+def lent(model: LinearModel) -> Iterator[None]:
+    """Read with another model than the shipped one, to judge it."""
+    token = _lent.set(model)
+    try:
+        yield
+    finally:
+        _lent.reset(token)
+
+
+def in_use() -> LinearModel:
+    """The model that reads."""
+    return _lent.get() or shipped()
+
+
 @cache
 def shipped() -> LinearModel:
     """The weights in tagging.npz, each array stored as whole numbers and a step."""
-    stored = _stored()
+    with resources.files(__package__ or "").joinpath("tagging.npz").open("rb") as file:
+        stored = dict(np.load(file))
     emission, transition, command = (
         stored[name] * float(stored[f"{name}_step"])
         for name in ("emission", "transition", "command")
     )
-    return LinearModel(emission, transition, command, float(stored["temperature"]))
-
-
-@cache
-def shipped_words() -> dict[str, frozenset[str]]:
-    """Words of commands it was trained on, and the meanings of those they stood in."""
-    words = (str(row).split() for row in _stored()["words"])
-    return {word: frozenset(meanings) for word, *meanings in words}
-
-
-@cache
-def _stored() -> dict[str, NDArray[Any]]:
-    with resources.files(__package__ or "").joinpath("tagging.npz").open("rb") as file:
-        return dict(np.load(file))
+    rows = (str(row).split() for row in stored["words"])
+    words = {word: frozenset(meanings) for word, *meanings in rows}
+    return LinearModel(emission, transition, command, float(stored["temperature"]), words)
 
 
 def tag_features(words: Sequence[str]) -> list[list[int]]:

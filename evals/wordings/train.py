@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from .sentences import Sentence
 
 PENALTY_TAGS, PENALTY_MEANINGS = 0.5, 0.3
 """Ridge penalties, chosen by leaving one author out."""
-STEPS = 120
+STEPS = 60
 GENERAL = 5
 """Meanings, of ten, from which on a word is taken to go with any."""
 Floats = NDArray[np.float64]
@@ -122,8 +121,8 @@ def _minimum(loss: object, size: int) -> Floats:
     return found.x
 
 
-def known_words(sentences: Sequence[Sentence]) -> list[str]:
-    """Words of commands, each with the meanings that it stood for in two sentences or more.
+def known_words(sentences: Sequence[Sentence]) -> dict[str, frozenset[str]]:
+    """Stems of words of commands, each with the meanings that it stood for in two sentences or more.
 
     A word that stood in commands of many meanings says nothing of them and goes with all.
     """
@@ -132,34 +131,19 @@ def known_words(sentences: Sequence[Sentence]) -> list[str]:
         words = [w.text for w, name in zip(s.words, s.labels, strict=True) if name == "command"]
         for word in {stem(w) for w in words}:
             counted.setdefault(word, Counter())[s.meaning] += 1
-    found: list[str] = []
-    for word, meanings in sorted(counted.items()):
+    found: dict[str, frozenset[str]] = {}
+    for word, meanings in counted.items():
         often = [m for m, count in meanings.items() if count > 1]
         if len(meanings) >= GENERAL:
             often = list(MEANINGS)
         if often and word[0].isalpha():
-            found.append(" ".join([word, *sorted(often)]))
+            found[word] = frozenset(often)
     return found
 
 
-def calibrated(model: LinearModel, sentences: Sequence[Sentence]) -> float:
-    """The temperature with the least loss on sentences that the model was not trained on."""
-    choices = np.geomspace(0.5, 4, 25)
-    losses: list[float] = []
-    for temperature in choices:
-        cooled = replace(model, temperature=float(temperature))
-        found = [_meaning(cooled, s)[s.meaning] for s in sentences]
-        losses.append(-float(np.log(found).mean()))
-    return float(choices[int(np.argmin(losses))])
-
-
-def _meaning(model: LinearModel, sentence: Sentence) -> dict[str, float]:
-    words = [w.text for w in sentence.words]
-    return model.meaning(words, model.labels(words)[0])
-
-
-def store(path: Path, model: LinearModel, words: Sequence[str]) -> None:
-    """Write the weights, rounded to 127 steps each way, and the known words."""
+def store(path: Path, model: LinearModel) -> None:
+    """Write a model, its weights rounded to 127 steps each way."""
+    words = [" ".join([word, *sorted(meanings)]) for word, meanings in sorted(model.words.items())]
     arrays: dict[str, Any] = {"temperature": model.temperature, "words": np.array(words)}
     for name in ("emission", "transition", "command"):
         weights = getattr(model, name)
