@@ -73,7 +73,9 @@ def _find(things: Sequence[Reference], needed: int, history: History) -> list[Fo
     if len(found) == needed:
         return found
     which = "Which thing is meant?" if needed == 1 else "Which two things are meant?"
-    return _ask_all(f"{which} The words name none that can be found by its look.", history)
+    spoken = " or ".join(f'"{t.wording}"' for t in things)
+    named = f"By {spoken} none can be found" if spoken else "The words name none that can be found"
+    return _ask_all(f"{which} {named} by its look.", history)
 
 
 def chosen_candidates(history: History, needed: int) -> list[str]:

@@ -114,12 +114,12 @@ def demands_in(items: Sequence[Item]) -> tuple[Demand, ...]:
     return tuple(found)
 
 
-def stops_in(items: Sequence[Item]) -> tuple[tuple[str, str], ...]:
-    """Why an instruction is no order to place robots now: the kind and the words for it.
+def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
+    """Why an instruction is no order to place robots now: a kind, and where the words stand.
 
-    What is background stops nothing.
+    What is background stops nothing, unless it denies or calls off.
     """
-    found: list[tuple[str, str]] = []
+    found: list[tuple[str, int, int]] = []
     for sentence in sentences(items):
         line = _Line(sentence)
         counted_elsewhere = any(i.quantity for i in items if i not in sentence)
@@ -128,9 +128,20 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, str], ...]:
                 continue
             for match in pattern.finditer(line.text):
                 first, last = line.items_of(match)
-                if any(i.label != "background" for i in sentence[first:last]):
-                    found.append((kind, match[0].strip().replace("<t>", "it")))
-    return tuple(dict.fromkeys(found))
+                meant = any(i.label != "background" for i in sentence[first:last])
+                if meant or kind in ("a negation", "a cancellation"):
+                    found.append((kind, sentence[first].start, sentence[last - 1].end))
+    return tuple(found)
+
+
+def says_more(phrase: str) -> bool:
+    """Whether a phrase for a thing says more than which thing, such as "every coin"."""
+    return any(pattern.search(phrase.lower()) for pattern in _in_things())
+
+
+@cache
+def _in_things() -> tuple[re.Pattern[str], ...]:
+    return tuple(re.compile(pattern) for pattern in _table()["in_things"])
 
 
 def sentences(items: Sequence[Item]) -> list[list[Item]]:

@@ -10,7 +10,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from .demands import Demand, Item, demands_in, items_of, sentences, stops_in
+from .demands import Demand, Item, demands_in, items_of, says_more, sentences, stops_in
 from .drawn_forms import Form, form_in
 from .tagging import in_use, stem, tag, tokens, word_classes
 
@@ -56,6 +56,8 @@ MAY_CLOSE = 0.2
 """Least probability of a cage for one of these classes to settle it."""
 NEUTRAL = ("place", "robot", "polite")
 """Classes of classes.yaml whose words say an arrangement, or none."""
+ENDS = frozenset(",.;:!?()")
+"""Signs at which a stretch of words that was not understood ends."""
 HEAVY = frozenset(
     "each every both either neither not no none nobody never except without only instead half rest "
     "other others another first last don't doesn't isn't aren't can't cannot mustn't won't shouldn't "
@@ -134,7 +136,8 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
     tagging = tag(words, known)
     items = [_drawn(item, span) for item in items_of(text, words, tagging)]
     meanings = sorted(tagging.meaning.items(), key=lambda m: -m[1])
-    reading = Reading(meanings, form=form, stops=stops_in(items))
+    stops = tuple((kind, " ".join(text[a:b].split())) for kind, a, b in stops_in(items))
+    reading = Reading(meanings, form=form, stops=stops)
     return _Reader(text, items, reading, metres_per_pixel).read()
 
 
@@ -273,7 +276,7 @@ class _Reader:
         if quantity is None:
             return demand.sets == "opening" and self._opening(demand, 0.0)
         bare = quantity.kind == "number" and self.scale is None and quantity.least >= LEAST_BARE
-        if not bare and quantity.px(self.scale) is None:
+        if not bare and quantity.kind == "m" and self.scale is None:
             self.reading.unscaled.append(quantity.wording)
             return False
         if not (bare or quantity.is_length):
@@ -332,7 +335,7 @@ class _Reader:
         relation = self.reading.relation
         if relation == "along":
             return self._side(demand)
-        return relation == "around" and self._only([f"{demand.sides[0]} half"])
+        return relation == "around" and self._only([demand.sides[0]])
 
     def _half(self, demand: Demand) -> bool:
         self.reading.meanings = [("around", 1.0), *self.reading.meanings]
@@ -473,8 +476,12 @@ class _Reader:
         """Phrases for things: the arrangement is about those that no demand took."""
         for k, item in enumerate(self.items):
             if item.symbol == "<t>" and not self.taken[k]:
+                phrase = self._quote(k, k + 1)
                 self.taken[k] = True
-                self.reading.things.append(self.text[item.start : item.end])
+                if says_more(phrase):
+                    self.reading.unread.append(phrase)
+                else:
+                    self.reading.things.append(phrase)
 
     def _place(self) -> str:
         """What stands before the thing says where a form is drawn."""
@@ -495,29 +502,29 @@ class _Reader:
 
     def _account(self) -> None:
         """Sort what nothing took into background and unread."""
-        for first, last, background in self._runs():
-            quote = self._quote(first, last)
-            if background:
-                self.reading.background.append(quote)
-            else:
-                self.reading.unread.append(quote)
-
-    def _runs(self) -> Iterator[tuple[int, int, bool]]:
-        """Runs of words that nothing took, each background or unread as a whole."""
         kinds = [self._kind(k) for k in range(len(self.items))]
-        start = 0
-        while start < len(kinds):
-            end = start + 1
-            while end < len(kinds) and (kinds[end] == kinds[start] or self._joins(kinds, end)):
-                end += 1
-            content = [k for k in range(start, end) if kinds[k] not in ("", "filler")]
-            if content and kinds[start] != "":
-                yield content[0], content[-1] + 1, kinds[content[0]] == "background"
-            start = end
+        for first, last in self._runs():
+            within = kinds[first:last]
+            if "unread" in within:
+                self.reading.unread.append(self._quote(first, last))
+                continue
+            aside = [k for k in range(first, last) if kinds[k] == "background"]
+            if aside:
+                self.reading.background.append(self._quote(aside[0], aside[-1] + 1))
 
-    def _joins(self, kinds: Sequence[str], at: int) -> bool:
-        """Whether a filler stands within a run of one kind."""
-        return kinds[at] == "filler" and at + 1 < len(kinds) and kinds[at + 1] == kinds[at - 1]
+    def _runs(self) -> Iterator[tuple[int, int]]:
+        """Runs of words that no rule took, up to the signs and demands about them."""
+        open_ = [
+            not self.taken[k] and item.symbol not in ENDS for k, item in enumerate(self.items)
+        ]
+        start = 0
+        while start < len(open_):
+            end = start
+            while end < len(open_) and open_[end]:
+                end += 1
+            if end > start:
+                yield start, end
+            start = max(end, start + 1)
 
     def _kind(self, k: int) -> str:
         """Of an item: "" where it is accounted for, else filler, background or unread."""
