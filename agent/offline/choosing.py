@@ -97,8 +97,10 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
     return chosen
 
 
-AGREEING = frozenset("yes yep yeah ok okay sure right correct exactly go ahead do that it".split())
-SMALL = frozenset("the one on at in of to them it please i mean is that a most and two".split())
+AGREEING = {"yes", "yep", "yeah", "ok", "okay", "sure", "right", "correct", "exactly", "go", "do"}
+SMALL = {"the", "one", "on", "at", "in", "of", "to", "them", "it", "please", "i", "mean", "is"} | {
+    "that", "a", "most", "and", "two", "ahead"
+}  # fmt: skip
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 EXTREMES: dict[str, tuple[str, int]] = {
     **dict.fromkeys(("left", "leftmost", "western"), ("x", -1)),

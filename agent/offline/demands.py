@@ -134,6 +134,11 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
     return tuple(found)
 
 
+def word_list(name: str) -> frozenset[str]:
+    """A list of words of demands.yaml."""
+    return frozenset(map(str, _table()[name]))
+
+
 def says_more(phrase: str) -> bool:
     """Whether a phrase for a thing says more than which thing, such as "every coin"."""
     return any(pattern.search(phrase.lower()) for pattern in _in_things())

@@ -160,8 +160,8 @@ def _unsettled(reading: Reading) -> str | None:
     if relation == "shape" and reading.form and place_of(reading, 0) is None:
         around = ", around" if reading.form.shape["kind"] in ENCLOSING else ""
         return (
-            f"Where are the robots to draw {reading.form.wording}? Inside a thing{around}, or left, "
-            "right, above or below."
+            f"Where are the robots to draw {reading.form.wording}? Inside a thing{around}, or "
+            "left, right, above or below."
         )
     return "The offline rules place two rings or rows at most." if reading.rings > 2 else None
 

@@ -10,7 +10,10 @@ from typing import Any
 
 from ...tools.formation.number_words import SMALL, TENS, numbers_in
 
-MAKE = r"\b(?:form|make|draw|build|be|want|trace|lay out|outline|like|do)(?:ing)?\s+(?:up\s+)?(?:in(?:to)?\s+)?"
+MAKE = (
+    r"\b(?:form|make|draw|build|be|want|trace|lay out|outline|like|do)(?:ing)?\s+(?:up\s+)?"
+    r"(?:in(?:to)?\s+)?"
+)
 STAND = (
     r"(?P<kept>^\s*|\b(?:robots?|bots?|drones?|rovers?|agents?|units?|stand|arranged?|them|line up"
     r"|placed?|up|be)\s+)?(?:in|into|as|be|like)\s+(?:the (?:shape|form) of\s+)?"
@@ -86,7 +89,8 @@ def _letters(text: str) -> Found:
 
 def _grid(text: str) -> Found:
     size = rf"(?P<rows>{COUNT})\s*(?:by|x|\u00d7)\s*(?P<columns>{COUNT})"
-    grid = rf"an?\s+{SIZES}(?:{size}\s+grid|grid\s+of\s+{size.replace('P<', 'P<of_')}|grid)(?![\w-])"
+    other = size.replace("P<", "P<of_")
+    grid = rf"an?\s+{SIZES}(?:{size}\s+grid|grid\s+of\s+{other}|grid)(?![\w-])"
     found = re.search(rf"(?i)(?:{MAKE}|{STAND}){grid}", text)
     if found is None:
         return None
@@ -108,7 +112,8 @@ def _figure(text: str) -> Found:
     names = "|".join(CORNERED)
     tips = rf"(?:(?P<tips>{COUNT})[- ]pointed\s+)?"
     figure = (
-        rf"an?\s+{SIZES}(?:regular\s+)?(?:{tips}(?P<star>star)|(?P<name>{names}))(?![\w-]|\s+of\s+the)"
+        rf"an?\s+{SIZES}(?:regular\s+)?"
+        rf"(?:{tips}(?P<star>star)|(?P<name>{names}))(?![\w-]|\s+of\s+the)"
     )
     found = re.search(rf"(?i)(?:{MAKE}|{STAND}){figure}", text)
     if found is None:

@@ -12,9 +12,9 @@ from ...tools.formation.units import length_text
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
+from .accounting import read_instruction
 from .choosing import Step, agrees, calls_in, find, located_reasons
 from .drafting import contract_of, place_of, question_of, things_needed, would_do
-from .reading import read_instruction
 from .references import described
 
 MAX_LABEL = 100
@@ -150,7 +150,11 @@ def _said(task: Task, history: History) -> str:
     text = task.instruction
     offered = {c.id for c in calls_in(history) if c.arguments.get("candidates")}
     for answer in history:
-        if isinstance(answer, Result) and answer.name == "ask_user" and answer.call_id not in offered:
+        if (
+            isinstance(answer, Result)
+            and answer.name == "ask_user"
+            and answer.call_id not in offered
+        ):
             for quote in read_instruction(text, task.metres_per_pixel).unread:
                 text = text.replace(quote, " ", 1)
             text = f"{text} . {answer.text}"

@@ -13,6 +13,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
+from itertools import pairwise
 
 import numpy as np
 import yaml
@@ -235,7 +236,7 @@ def _clauses(words: Sequence[str]) -> list[tuple[str, str, str, str, str]]:
     ]
     found: list[tuple[str, str, str, str, str]] = []
     sentence = "<"
-    for start, end in zip(bounds, bounds[1:], strict=False):
+    for start, end in pairwise(bounds):
         clause = words[start:end]
         if not clause:
             continue
@@ -264,7 +265,7 @@ def meaning_features(words: Sequence[str], labels: Sequence[str]) -> list[int]:
                 line.append("|")
         mark = len(kept)
         names += [f"{mark}{w}" for w in line]
-        names += [f"{mark}{a} {b}" for a, b in zip(line, line[1:], strict=False)]
+        names += [f"{mark}{a} {b}" for a, b in pairwise(line)]
         names += [f"{mark}{a} {b} {c}" for a, b, c in zip(line, line[1:], line[2:], strict=False)]
         if mark == 2:
             names += [f"<{w[:k]}" for w in line for k in (3, 4, 5) if len(w) > k]

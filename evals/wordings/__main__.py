@@ -1,6 +1,5 @@
 """`python -m formup.evals.wordings`: train the model that reads instructions, and judge it."""
 
-import sys
 from collections import Counter
 from dataclasses import replace
 from importlib import resources
@@ -38,4 +37,4 @@ def _line(name: str, found: Counter[str]) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...agent.first_message import Task
+from ...agent.offline.accounting import read_instruction
 from ...agent.offline.drafting import question_of
-from ...agent.offline.reading import Reading, read_instruction
+from ...agent.offline.reading import Reading
 from ...agent.offline.tagging import LinearModel, lent
 from .sentences import Sentence
 from .train import known_words, train

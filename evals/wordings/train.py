@@ -122,7 +122,7 @@ def _minimum(loss: object, size: int) -> Floats:
 
 
 def known_words(sentences: Sequence[Sentence]) -> dict[str, frozenset[str]]:
-    """Stems of words of commands, each with the meanings that it stood for in two sentences or more.
+    """Stems of words of commands, each with what it stood for in two sentences or more.
 
     A word that stood in commands of many meanings says nothing of them and goes with all.
     """

@@ -46,7 +46,10 @@ GROUPS = {"dozen": 12, "score": 20, "pair": 2, "couple": 2, "gross": 144, "trio"
 """Nouns that count: "three pairs of robots" are six."""
 PARTS = {"half": 2, "third": 3, "quarter": 4, "fifth": 5, "sixth": 6, "eighth": 8, "tenth": 10}
 SIGNS = {"\u00bd": 0.5, "\u00bc": 0.25, "\u00be": 0.75, "\u2153": 1 / 3, "\u2154": 2 / 3}
-DIGITS = r"[0-9]{1,3}(?:[,\u00a0\u2009\u202f'][0-9]{3})+(?:\.[0-9]+)?|[0-9]{1,3}(?: [0-9]{3})+(?![0-9.,])|[0-9]*\.?[0-9]+(?:e[0-9]+)?"
+DIGITS = (
+    r"[0-9]{1,3}(?:[,\u00a0\u2009\u202f'][0-9]{3})+(?:\.[0-9]+)?|"
+    r"[0-9]{1,3}(?: [0-9]{3})+(?![0-9.,])|[0-9]*\.?[0-9]+(?:e[0-9]+)?"
+)
 ATOM = re.compile(
     rf"(?P<digits>(?<![\w.,])(?:{DIGITS})(?![\d]))|(?P<sign>[\u00bd\u00bc\u00be\u2153\u2154])|"
     r"(?P<word>[^\W\d_]+(?:'s)?)|(?P<mark>[-\u2013\u2014\u2212+*\u00d7/\u00b1%,.;:!?()'\"])",
@@ -216,41 +219,51 @@ def _number(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
 
 
 def _cardinal(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
-    """Four hundred and twenty-one; one point five. "One" alone counts only before a noun."""
+    """Four hundred and twenty-one; one point five."""
     total, current, k = 0, 0, at
     if _text(atoms, k) in ("a", "an") and _text(atoms, k + 1) in SCALES:
         current, k = 1, k + 1
     while k < len(atoms):
         word = _text(atoms, k)
-        if word in TENS and current % 100 == 0:
-            current += TENS[word]
-        elif word in SMALL and (current % 10 == 0 if SMALL[word] < 10 else current % 100 == 0):
-            if current and current % 100 == 0 and SMALL[word] == 0:
-                break
-            current += SMALL[word]
-            if current % 100 in range(1, 20) and _text(atoms, k + 1) in (*SMALL, *TENS):
-                k += 1
-                break
-        elif word == "hundred" and current:
-            current *= 100
-        elif word in SCALES and current:
+        if word in SCALES and word != "hundred" and current:
             total, current = total + current * SCALES[word], 0
-        elif (
-            word == "and" and (current % 100 == 0 and (current or total)) and _next_counts(atoms, k)
-        ) or (word == "-" and k > at and _next_counts(atoms, k) and _is_joined(atoms, k)):
-            pass
-        else:
+        elif (more := _grown(current, word)) is not None:
+            current = more
+        elif not _bridges(atoms, k, bool(total) or current % 100 == 0, k > at):
             break
         k += 1
-    if k == at:
+    return None if k == at else _after_point(atoms, float(total + current), k)
+
+
+def _grown(current: int, word: str) -> int | None:
+    """A number below a thousand with one more word to it; None where the word does not fit."""
+    if word == "hundred":
+        return current * 100 if current else None
+    if word in TENS:
+        return current + TENS[word] if current % 100 == 0 else None
+    value = SMALL.get(word)
+    if value is None or (current and value == 0):
         return None
-    value = float(total + current)
-    if _text(atoms, k) == "point" and _text(atoms, k + 1) in SMALL:
-        k, scale = k + 1, 0.1
-        while _text(atoms, k) in SMALL and SMALL[_text(atoms, k)] < 10:
-            value, scale, k = value + SMALL[_text(atoms, k)] * scale, scale / 10, k + 1
-        value = round(value, 9)
-    return value, k
+    fits = current % 10 == 0 if value < 10 else current % 100 == 0
+    return current + value if fits else None
+
+
+def _bridges(atoms: Sequence[_Atom], at: int, whole: bool, begun: bool) -> bool:
+    """Whether "and" or a hyphen joins what follows to the number before it."""
+    if not begun or not _next_counts(atoms, at):
+        return False
+    word = _text(atoms, at)
+    return (word == "and" and whole) or (word == "-" and _is_joined(atoms, at))
+
+
+def _after_point(atoms: Sequence[_Atom], value: float, at: int) -> tuple[float, int]:
+    """The number with its decimals, where "point" and digits in words follow."""
+    if _text(atoms, at) != "point" or _text(atoms, at + 1) not in SMALL:
+        return value, at
+    at, scale = at + 1, 0.1
+    while SMALL.get(_text(atoms, at), 10) < 10:
+        value, scale, at = value + SMALL[_text(atoms, at)] * scale, scale / 10, at + 1
+    return round(value, 9), at
 
 
 def _next_counts(atoms: Sequence[_Atom], at: int) -> bool:

@@ -65,9 +65,7 @@ def doubts(
     ]
 
 
-def _count_doubts(
-    text: str, quantities: Sequence[Quantity], contract: Contract
-) -> Iterator[str]:
+def _count_doubts(text: str, quantities: Sequence[Quantity], contract: Contract) -> Iterator[str]:
     counted = [q.whole for q in quantities if q.whole and ROBOTS.match(text, q.end)]
     found = [n for n in counted if n > 1]  # "one robot at each corner" counts nothing
     if found and contract.robots not in {*found, sum(found)}:

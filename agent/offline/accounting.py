@@ -1,0 +1,220 @@
+"""An instruction in words to the fields of a contract, with an account of every word.
+
+Each word is taken by one rule, refers to a thing, is a known word of the command, is background
+that is repeated to the person, or is left unread: then the planner asks and quotes it.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from .demand_fields import Fields
+from .demands import Item, demands_in, items_of, says_more, sentences, stops_in
+from .drawn_forms import form_in
+from .lexicon import NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
+from .reading import Reading
+from .tagging import tag, tokens, word_classes
+
+SURE_BACKGROUND = 0.5
+SCENIC = 0.4
+"""Share of a sentence's words that are no command from which on all of it is background."""
+PLACES = {
+    "around": ("around", "round", "about"),
+    "inside": ("inside", "in", "on", "within", "over", "across", "onto", "into"),
+    "along": ("beside", "by", "near", "at", "to"),
+}
+"""Words directly before a thing, and where a form is drawn then."""
+CLOSING = {"enclose", "enclosure", "prevent"}
+MAY_CLOSE = 0.2
+"""Least probability of a cage for one of these classes to settle it."""
+ENDS = frozenset(",.;:!?()")
+"""Signs at which a stretch of words that was not understood ends."""
+
+
+def read_instruction(text: str, metres_per_pixel: float | None = None) -> Reading:
+    """Read an instruction in English about a picture of a scale, if it has one."""
+    form, span = form_in(text)
+    words = tokens(text)
+    tagging = tag(words)
+    relation = max(tagging.meaning, key=lambda m: tagging.meaning[m])
+    known = may_command([w.text for w in words], relation)
+    tagging = tag(words, known)
+    items = [_drawn(item, span) for item in items_of(text, words, tagging)]
+    meanings = sorted(tagging.meaning.items(), key=lambda m: -m[1])
+    stops = tuple((kind, " ".join(text[a:b].split())) for kind, a, b in stops_in(items))
+    reading = Reading(meanings, form=form, stops=stops)
+    return _Reader(text, items, reading, metres_per_pixel).read()
+
+
+def _drawn(item: Item, span: tuple[int, int]) -> Item:
+    """The item, or a blank where it is part of the words for a drawn form."""
+    if span[0] <= item.start < span[1]:
+        return Item("<f>", item.start, item.end, "demand", 1.0)
+    return item
+
+
+class _Reader:
+    """Applies the rules to the items of an instruction and accounts for each."""
+
+    def __init__(
+        self, text: str, items: Sequence[Item], reading: Reading, metres_per_pixel: float | None
+    ) -> None:
+        self.text, self.items, self.reading = text, items, reading
+        self.fields = Fields(text, items, reading, metres_per_pixel)
+        self.taken = [item.symbol == "<f>" for item in items]
+        self.classes = [frozenset(c) for c in word_classes([item.symbol for item in items])]
+        self.demands = demands_in(items)
+        self.scenery = self._scenery()
+
+    def read(self) -> Reading:
+        """The reading, with what no rule took."""
+        self._settle_meaning()
+        for demand in self.demands:
+            if not self.fields.apply(demand):
+                self.reading.unread.append(self._quote(demand.first, demand.last))
+            self.taken[demand.first : demand.last] = [True] * (demand.last - demand.first)
+        self._refer()
+        self.reading.place = self._place()
+        self._count_alone()
+        self._account()
+        return self.reading
+
+    def _scenery(self) -> list[bool]:
+        """For each item whether its sentence only sets the scene, beside one that commands."""
+        demanded = {k for d in self.demands for k in range(d.first, d.last)}
+        scenic: list[bool] = []
+        for sentence in sentences(self.items):
+            place = range(len(scenic), len(scenic) + len(sentence))
+            words = [i for i in sentence if i.symbol[0].isalnum() or i.symbol == "<t>"]
+            aside = [i for i in words if i.label in ("background", "thing")]
+            weighs = demanded & {*place} or any(
+                i.quantity or i.symbol in WEIGHTY or "robot" in self.classes[k]
+                for k, i in zip(place, sentence, strict=True)
+            )
+            share = 1.0 if weighs else SCENIC
+            scenic += [bool(words) and len(aside) >= share * len(words)] * len(sentence)
+        return scenic if not all(scenic) else [False] * len(self.items)
+
+    def _settle_meaning(self) -> None:
+        """A form that is named is drawn, and a side that is named takes a row."""
+        reading = self.reading
+        sets = {d.sets for d in self.demands}
+        forced = "cage" if self._closes() else None
+        if reading.form is not None or "form" in sets:
+            forced = "shape"
+        elif self._parts():
+            forced = "between"
+        elif "rings" in sets and reading.relation in ("several", "shape"):
+            forced = next(m for m, _ in reading.meanings if m in ("around", "cage", "along"))
+        elif "groups" in sets and reading.relation in ("several", "around"):
+            forced = "along"
+        if forced and reading.relation != "ask":
+            reading.meanings = [(forced, 1.0), *reading.meanings]
+
+    def _parts(self) -> bool:
+        """Whether the command says between: the arrangement is no other then."""
+        return any(i.symbol == "between" and i.label == "command" for i in self.items) and (
+            dict(self.reading.meanings).get("between", 0) >= MAY_CLOSE
+        )
+
+    def _closes(self) -> bool:
+        """Whether a command for a ring has a word that closes it: a barrier all round."""
+        likely = dict(self.reading.meanings).get("cage", 0)
+        if self.reading.relation == "around" and self._prevents():
+            return True
+        closing = any(
+            classes & CLOSING and not classes & {"surround", "ring"}
+            for classes, item in zip(self.classes, self.items, strict=True)
+            if item.label == "command"
+        )
+        return self.reading.relation == "around" and closing and likely >= MAY_CLOSE
+
+    def _prevents(self) -> bool:
+        """Whether a sentence says that something must not get in or out."""
+        demanded = {k for d in self.demands for k in range(d.first, d.last)}
+        at = 0
+        for sentence in sentences(self.items):
+            place = [k for k in range(at, at + len(sentence)) if k not in demanded]
+            at += len(sentence)
+            negated = any(self.items[k].symbol in NEGATIONS for k in place)
+            if negated and any("prevent" in self.classes[k] for k in place):
+                return True
+        return False
+
+    def _refer(self) -> None:
+        """Phrases for things: the arrangement is about those that no demand took."""
+        for k, item in enumerate(self.items):
+            if item.symbol == "<t>" and not self.taken[k]:
+                phrase = self._quote(k, k + 1)
+                self.taken[k] = True
+                if says_more(phrase):
+                    self.reading.unread.append(phrase)
+                else:
+                    self.reading.things.append(phrase)
+
+    def _place(self) -> str:
+        """What stands before the thing says where a form is drawn."""
+        for k, item in enumerate(self.items):
+            before = self.items[k - 1].symbol if k else ""
+            if item.symbol in ("<t>", "it", "this", "that"):
+                return next((p for p, words in PLACES.items() if before in words), "")
+        return ""
+
+    def _count_alone(self) -> None:
+        """A number that stands alone counts the robots where nothing else does."""
+        free = [k for k, i in enumerate(self.items) if i.symbol == "<n>" and not self.taken[k]]
+        if self.reading.robots is None and not self.reading.odd_count and len(free) == 1:
+            quantity = self.items[free[0]].quantity
+            if quantity is not None and quantity.whole is not None:
+                self.reading.robots = quantity.whole
+                self.taken[free[0]] = True
+
+    def _account(self) -> None:
+        """Sort what nothing took into background and unread."""
+        kinds = [self._kind(k) for k in range(len(self.items))]
+        for first, last in self._runs():
+            within = kinds[first:last]
+            if "unread" in within:
+                self.reading.unread.append(self._quote(first, last))
+                continue
+            aside = [k for k in range(first, last) if kinds[k] == "background"]
+            if aside:
+                self.reading.background.append(self._quote(aside[0], aside[-1] + 1))
+
+    def _runs(self) -> Iterator[tuple[int, int]]:
+        """Runs of words that no rule took, up to the signs and demands about them."""
+        open_ = [not self.taken[k] and item.symbol not in ENDS for k, item in enumerate(self.items)]
+        start = 0
+        while start < len(open_):
+            end = start
+            while end < len(open_) and open_[end]:
+                end += 1
+            if end > start:
+                yield start, end
+            start = max(end, start + 1)
+
+    def _kind(self, k: int) -> str:
+        """Of an item: "" where it is accounted for, else filler, background or unread."""
+        item = self.items[k]
+        if self.taken[k] or not (
+            item.symbol[0].isalnum() or item.symbol in ("<n>", "<l>", "<a>", "<s>", "<c>")
+        ):
+            return ""
+        if self.scenery[k]:
+            return "background"
+        if item.quantity is not None:
+            return "" if self._counts_corners(item) else "unread"
+        if item.label == "background" and item.certainty >= SURE_BACKGROUND:
+            return "background"
+        if weighs(item.symbol, self.classes[k], self.reading.relation):
+            return "unread"
+        if item.symbol in fillers():
+            return "filler"
+        known = goes_with(item.symbol, self.classes[k], self.reading.relation)
+        return "" if known else "unread"
+
+    def _counts_corners(self, item: Item) -> bool:
+        """Four corners, one robot at each."""
+        number = item.quantity and item.quantity.whole
+        return self.reading.relation == "corners" and number in (1, 4, self.reading.robots)
+
+    def _quote(self, first: int, last: int) -> str:
+        return " ".join(self.text[self.items[first].start : self.items[last - 1].end].split())

@@ -1,0 +1,245 @@
+"""Demands of an instruction to fields of the contract, one rule after another."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from .demands import Demand, Item
+from .drawn_forms import Form
+from .lexicon import fillers
+from .reading import Reading
+from .tagging import tokens
+
+FARTHEST = 100_000
+"""Stands for no upper bound of a clearance, px."""
+OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
+OPENS = {side: side for side in ("left", "right", "up", "down")} | {"top": "up", "bottom": "down"}
+DEGREES = {"right": 0, "bottom": 90, "down": 90, "left": 180, "top": 270, "up": 270}
+LEAST_BARE = 5
+"""Numbers without a unit below this, px, are hardly lengths."""
+LENGTHS = ("clearance", "pitch", "min_spacing", "max_gap", "radius", "diameter", "opening")
+
+
+class Fields:
+    """Carries demands over into a reading."""
+
+    def __init__(
+        self, text: str, items: Sequence[Item], reading: Reading, metres_per_pixel: float | None
+    ) -> None:
+        self.text, self.items, self.reading = text, items, reading
+        self.scale = metres_per_pixel
+
+    def apply(self, demand: Demand) -> bool:
+        """Carry a demand over into the reading; False where it cannot be."""
+        if demand.sets in LENGTHS or demand.sets in ("robot_radius", "robot_diameter"):
+            return self._length(demand)
+        return bool(getattr(self, f"_{demand.sets}", lambda _: False)(demand))
+
+    def _set(self, name: str, value: Any) -> bool:
+        """Set a field, unless the words said something else of it before."""
+        group = self.reading.group
+        if group.get(name, value) != value:
+            return False
+        group[name] = value
+        return True
+
+    def _length(self, demand: Demand) -> bool:
+        quantity, relation = demand.quantity, self.reading.relation
+        if quantity is None:
+            return demand.sets == "opening" and self._opening(demand, 0.0)
+        bare = quantity.kind == "number" and self.scale is None and quantity.least >= LEAST_BARE
+        if not bare and quantity.kind == "m" and self.scale is None:
+            self.reading.unscaled.append(quantity.wording)
+            return False
+        if not (bare or quantity.is_length):
+            return False
+        low, high = (quantity.least, quantity.most) if bare else quantity.px(self.scale) or (0, 0)
+        if self._other(demand) is not None or (low <= 0 and demand.sets != "clearance"):
+            return False
+        if demand.sets == "clearance":
+            return relation not in ("between", "centre") and self._clearance(demand, low, high)
+        if demand.sets == "opening":
+            return self._opening(demand, low)
+        if demand.sets.startswith("robot"):
+            self.reading.robot_radius = low / 2 if demand.sets == "robot_diameter" else low
+            return low == high
+        if demand.sets in ("radius", "diameter"):
+            radius = low / 2 if demand.sets == "diameter" else low
+            return relation in ("around", "cage") and low == high and self._set("radius", radius)
+        return self._spaced(demand, low, high)
+
+    def _spaced(self, demand: Demand, low: float, high: float) -> bool:
+        name = demand.sets
+        if name == "pitch" and demand.bound:
+            name = "min_spacing" if demand.bound == "least" else "max_gap"
+        if name == "pitch" and low < high:
+            return self._set("min_spacing", low) and self._set("max_gap", high)
+        return self._set(name, low if name != "max_gap" else high)
+
+    def _clearance(self, demand: Demand, low: float, high: float) -> bool:
+        if low < 0:
+            return False
+        inside = self.reading.relation == "inside"
+        if demand.bound == "most":
+            return self._set("clearance", [0.0, high])
+        if demand.bound == "least" or (inside and low == high):
+            return self._set("clearance", [low, FARTHEST])
+        return self._set("clearance", [low, high if high > low else low + 1])
+
+    def _opening(self, demand: Demand, width: float) -> bool:
+        side = next(iter(demand.sides), None)
+        if self.reading.relation == "shape":
+            opens = OPENS.get(side or "")
+            return not width and opens is not None and self._set("opens", opens)
+        if self.reading.relation not in ("around", "cage"):
+            return False
+        self.reading.meanings = [("around", 1.0), *self.reading.meanings]
+        where = {"up": "top", "down": "bottom"}.get(side or "", side)
+        return self._set("opening", width) and (
+            where is None or self._set("opening_towards", where)
+        )
+
+    def _free_side(self, demand: Demand) -> bool:
+        others = [s for s in OPPOSITE if s != demand.sides[0]]
+        return self.reading.relation in ("around", "cage") and self._only(others)
+
+    def _only_side(self, demand: Demand) -> bool:
+        relation = self.reading.relation
+        if relation == "along":
+            return self._side(demand)
+        return relation == "around" and self._only([demand.sides[0]])
+
+    def _half(self, demand: Demand) -> bool:
+        self.reading.meanings = [("around", 1.0), *self.reading.meanings]
+        return self._only([f"{demand.sides[0]} half"])
+
+    def _only(self, sides: list[str]) -> bool:
+        self.reading.meanings = [("around", 1.0), *self.reading.meanings]
+        return self._set("sides", sides)
+
+    def _heading(self, demand: Demand) -> bool:
+        return self._other(demand) is None and self._set("heading", demand.value)
+
+    def _heading_side(self, demand: Demand) -> bool:
+        return self._set("heading", DEGREES[demand.sides[0]])
+
+    def _heading_angle(self, demand: Demand) -> bool:
+        return demand.quantity is not None and self._set("heading", demand.quantity.least % 360)
+
+    def _form(self, demand: Demand) -> bool:
+        names = {"v": "a V", "u": "a U", "arc": "an arc"}
+        if self.reading.form is not None:
+            return False
+        self.reading.form = Form({"kind": demand.value}, names[demand.value])
+        return True
+
+    def _keep_out(self, demand: Demand) -> bool:
+        other = self._other(demand)
+        if other is None:
+            return self.reading.relation in ("around", "cage", "along", "corners")
+        self.reading.others.append(other)
+        return True
+
+    def _faced(self, demand: Demand) -> bool:
+        other = self._other(demand)
+        if other is None or self.reading.relation != "along" or self.reading.faced:
+            return False
+        self.reading.faced = other
+        return True
+
+    def _other(self, demand: Demand) -> str | None:
+        """The phrase in a demand for a thing that is not the one the arrangement is about."""
+        within = range(demand.first, demand.last)
+        phrases = {k: self._words_of(k) for k, i in enumerate(self.items) if i.symbol == "<t>"}
+        mine = [words for k, words in phrases.items() if k not in within]
+        for k in within:
+            if k in phrases and not any(phrases[k] <= words for words in mine):
+                return self.text[self.items[k].start : self.items[k].end]
+        return None
+
+    def _words_of(self, k: int) -> set[str]:
+        item = self.items[k]
+        words = {w.text for w in tokens(self.text[item.start : item.end]) if w.text.isalpha()}
+        return words - fillers()
+
+    def _groups(self, demand: Demand) -> bool:
+        counts = [q.whole or 0 for q in demand.numbers] or [0, 0]
+        if len(demand.sides) != 2 or len(counts) != 2 or self.reading.shares:
+            return False
+        self.reading.shares = list(zip(demand.sides, counts, strict=True))
+        if all(counts):
+            self._robots_are(sum(counts))
+        return True
+
+    def _rings(self, demand: Demand) -> bool:
+        count = next((q.whole for q in demand.numbers), 2)
+        if count is None or self.reading.rings > 1:
+            return False
+        self.reading.rings = count
+        return self.reading.relation in ("around", "cage", "along")
+
+    def _robots(self, demand: Demand) -> bool:
+        number = next((q for q in demand.numbers if q.kind in ("number", "compound")), None)
+        if number is None:
+            return False
+        if number.whole == 1 and self.reading.relation == "corners":
+            return True
+        if number.whole is None:
+            self.reading.odd_count = self._quote(demand.first, demand.last)
+            return True
+        return self._robots_are(number.whole)
+
+    def _robots_are(self, count: int) -> bool:
+        if self.reading.robots not in (None, count):
+            return False
+        self.reading.robots = count
+        return True
+
+    def _located(self, demand: Demand) -> bool:
+        return self._follows_thing(demand)
+
+    def _all_round(self, demand: Demand) -> bool:
+        return self.reading.relation in ("around", "cage")
+
+    def _abreast(self, demand: Demand) -> bool:
+        return self.reading.relation in ("along", "between")
+
+    def _adverb(self, demand: Demand) -> bool:
+        return True
+
+    def _at_each(self, demand: Demand) -> bool:
+        return self.reading.relation == "corners" and all(q.least in (1, 4) for q in demand.numbers)
+
+    def _one_each(self, demand: Demand) -> bool:
+        return self.reading.relation == "corners" and all(q.least == 1 for q in demand.numbers)
+
+    def _side(self, demand: Demand) -> bool:
+        side = demand.value or demand.sides[0]
+        relation = self.reading.relation
+        if relation == "around" and len(self.reading.meanings) > 1:
+            likely = dict(self.reading.meanings)
+            if likely.get("along", 0) > 0.3:
+                self.reading.meanings = [("along", 1.0), *self.reading.meanings]
+                relation = "along"
+        if relation in ("along", "shape") and self._set("side", side):
+            return True
+        return self._follows_thing(demand)
+
+    def _follows_thing(self, demand: Demand) -> bool:
+        """Whether words say which thing: "the white trailer on the left"."""
+        before = [i.symbol for i in self.items[max(demand.first - 2, 0) : demand.first]]
+        return before[-1:] == ["<t>"] or before == ["<t>", ","]
+
+    def _spacing(self, demand: Demand) -> bool:
+        return self._set("spacing", demand.value)
+
+    def _fit(self, demand: Demand) -> bool:
+        return self._set("fit", demand.value)
+
+    def _closure(self, demand: Demand) -> bool:
+        return self.reading.relation == "cage" and self._set("closure", demand.value)
+
+    def _layout(self, demand: Demand) -> bool:
+        return self.reading.relation == "between" and self._set("layout", demand.value)
+
+    def _quote(self, first: int, last: int) -> str:
+        return " ".join(self.text[self.items[first].start : self.items[last - 1].end].split())
