@@ -14,8 +14,12 @@ from .reading import Reading
 from .tagging import tag, tokens, word_classes
 
 SURE_BACKGROUND = 0.5
-SCENIC = 0.4
+SCENIC, WEIGHTY_SCENIC = 0.4, 0.6
 """Share of a sentence's words that are no command from which on all of it is background."""
+REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
+"""What a reason or purpose begins with."""
+ASKED_CLASSES = frozenset(("gap", "avoid", "far", "near", "side", "face", "each", "motion"))
+"""A reason in which a word of these classes stands may be a demand."""
 PLACES = {
     "around": ("around", "round", "about"),
     "inside": ("inside", "in", "on", "within", "over", "across", "onto", "into"),
@@ -83,13 +87,14 @@ class _Reader:
         scenic: list[bool] = []
         for sentence in sentences(self.items):
             place = range(len(scenic), len(scenic) + len(sentence))
+            numbered = list(zip(place, sentence, strict=True))
             words = [i for i in sentence if i.symbol[0].isalnum() or i.symbol == "<t>"]
             aside = [i for i in words if i.label in ("background", "thing")]
-            weighs = demanded & {*place} or any(
-                i.quantity or i.symbol in WEIGHTY or "robot" in self.classes[k]
-                for k, i in zip(place, sentence, strict=True)
-            )
-            share = 1.0 if weighs else SCENIC
+            share = SCENIC
+            if any(i.symbol in WEIGHTY or "robot" in self.classes[k] for k, i in numbered):
+                share = WEIGHTY_SCENIC
+            if demanded & {*place} or any(i.quantity for i in sentence):
+                share = 1.0
             scenic += [bool(words) and len(aside) >= share * len(words)] * len(sentence)
         return scenic if not all(scenic) else [False] * len(self.items)
 
@@ -172,12 +177,28 @@ class _Reader:
         kinds = [self._kind(k) for k in range(len(self.items))]
         for first, last in self._runs():
             within = kinds[first:last]
+            if "unread" in within and self._gives_reason(first, last):
+                self.reading.background.append(self._quote(first, last))
+                continue
             if "unread" in within:
                 self.reading.unread.append(self._quote(first, last))
                 continue
             aside = [k for k in range(first, last) if kinds[k] == "background"]
             if aside:
                 self.reading.background.append(self._quote(aside[0], aside[-1] + 1))
+
+    def _gives_reason(self, first: int, last: int) -> bool:
+        """Whether a stretch of words is a reason or purpose that demands nothing more."""
+        words = self.items[first:last]
+        if any(i.quantity or i.label == "demand" for i in words):
+            return False
+        caged = self.reading.relation == "cage"
+        weighty = [i for i in words if i.symbol in WEIGHTY]
+        if caged and any(i.symbol in NEGATIONS for i in words):
+            return all(i.symbol in NEGATIONS for i in weighty)
+        if words[0].symbol not in REASONS or weighty:
+            return False
+        return not any(self.classes[k] & ASKED_CLASSES for k in range(first, last))
 
     def _runs(self) -> Iterator[tuple[int, int]]:
         """Runs of words that no rule took, up to the signs and demands about them."""
