@@ -75,6 +75,8 @@ class _Reader:
             if not self.fields.apply(demand):
                 self.reading.unread.append(self._quote(demand.first, demand.last))
             self.taken[demand.first : demand.last] = [True] * (demand.last - demand.first)
+        if self.reading.robots is None and len(self.fields.corners) == 1:
+            self.reading.robots = self.fields.corners[0]
         self._refer()
         self.reading.place = self._place()
         self._count_alone()
@@ -147,8 +149,8 @@ class _Reader:
     def _refer(self) -> None:
         """Phrases for things: the arrangement is about those that no demand took."""
         for k, item in enumerate(self.items):
-            if item.symbol == "<t>" and not self.taken[k]:
-                phrase = self._quote(k, k + 1)
+            if item.symbol == "<t>" and (not self.taken[k] or k in self.fields.mentioned):
+                phrase = self._quote(k, self.fields.reaches.get(k, k + 1))
                 self.taken[k] = True
                 if says_more(phrase):
                     self.reading.unread.append(phrase)
@@ -229,6 +231,8 @@ class _Reader:
             return "unread"
         if item.symbol in fillers():
             return "filler"
+        if "polite" in self.classes[k] and "place" not in self.classes[k]:
+            return "background"
         known = goes_with(item.symbol, self.classes[k], self.reading.relation)
         return "" if known else "unread"
 

@@ -27,6 +27,9 @@ class Fields:
     ) -> None:
         self.text, self.items, self.reading = text, items, reading
         self.scale = metres_per_pixel
+        self.corners: list[int] = []  # how many corners the words name
+        self.mentioned: list[int] = []  # items of demands whose phrases name it
+        self.reaches: dict[int, int] = {}  # of phrases for things that go on: past-the-last item
 
     def apply(self, demand: Demand) -> bool:
         """Carry a demand over into the reading; False where it cannot be."""
@@ -200,6 +203,16 @@ class Fields:
     def _all_round(self, demand: Demand) -> bool:
         return self.reading.relation in ("around", "cage")
 
+    def _all_of(self, demand: Demand) -> bool:
+        if self.reading.relation != "inside":
+            return False
+        self.mentioned += range(demand.first, demand.last)
+        return True
+
+    def _two_things(self, demand: Demand) -> bool:
+        self.mentioned += range(demand.first, demand.last)
+        return self.reading.relation == "between"
+
     def _abreast(self, demand: Demand) -> bool:
         return self.reading.relation in ("along", "between")
 
@@ -207,7 +220,10 @@ class Fields:
         return True
 
     def _at_each(self, demand: Demand) -> bool:
-        return self.reading.relation == "corners" and all(q.least in (1, 4) for q in demand.numbers)
+        if self.reading.relation != "corners" or any(q.whole is None for q in demand.numbers):
+            return False
+        self.corners += [q.whole for q in demand.numbers if q.whole and q.whole > 1]
+        return True
 
     def _one_each(self, demand: Demand) -> bool:
         return self.reading.relation == "corners" and all(q.least == 1 for q in demand.numbers)
@@ -225,9 +241,14 @@ class Fields:
         return self._follows_thing(demand)
 
     def _follows_thing(self, demand: Demand) -> bool:
-        """Whether words say which thing: "the white trailer on the left"."""
-        before = [i.symbol for i in self.items[max(demand.first - 2, 0) : demand.first]]
-        return before[-1:] == ["<t>"] or before == ["<t>", ","]
+        """Whether words say which thing, "the white trailer on the left"; they belong to it then."""
+        at = demand.first - 1
+        if at >= 0 and self.items[at].symbol == ",":
+            at -= 1
+        if at < 0 or self.items[at].symbol != "<t>":
+            return False
+        self.reaches[at] = demand.last
+        return True
 
     def _spacing(self, demand: Demand) -> bool:
         return self._set("spacing", demand.value)

@@ -14,9 +14,11 @@ from typing import Any
 import yaml
 
 from ...tools.formation.quantities import Quantity, quantities_in
-from .tagging import Tagging, Token
+from .tagging import Tagging, Token, word_classes
 
 SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
+ALWAYS = ("a negation", "a cancellation", "something past")
+"""Kinds of stops that also count in words that look like background beside an order."""
 WRAPPED = re.compile(r"\s*\|\s*")
 SENTENCE_ENDS = (".", "!", "?", ";")
 
@@ -87,7 +89,8 @@ def items_of(text: str, words: Sequence[Token], tagging: Tagging) -> tuple[Item,
 def _is_plain(quantity: Quantity, words: Sequence[Token], labels: dict[int, str]) -> bool:
     """Whether it is no part of a phrase for a thing, and no "one" that stands for a noun."""
     inside = [labels[w.start] for w in words if quantity.start <= w.start < quantity.end]
-    if "thing" in inside:
+    following = [w.text for w in words if w.start >= quantity.end][:3]
+    if "thing" in inside and not any("robot" in c for c in word_classes(following)):
         return False
     if quantity.wording.lower() != "one":
         return True
@@ -120,16 +123,17 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
     What is background stops nothing, unless it denies or calls off.
     """
     found: list[tuple[str, int, int]] = []
-    for sentence in sentences(items):
+    parts = sentences(items)
+    for sentence in parts:
         line = _Line(sentence)
-        counted_elsewhere = any(i.quantity for i in items if i not in sentence)
+        asked_only = all(s[-1].symbol == "?" for s in parts)
+        scenic = all(i.label in ("background", "thing") or not i.symbol.isalpha() for i in sentence)
         for kind, pattern in _stops():
-            if kind == "a question" and counted_elsewhere:
-                continue
             for match in pattern.finditer(line.text):
                 first, last = line.items_of(match)
                 meant = any(i.label != "background" for i in sentence[first:last])
-                if meant or kind in ("a negation", "a cancellation"):
+                stops = meant or (kind in ALWAYS and not scenic)
+                if stops and (kind != "a question" or asked_only):
                     found.append((kind, sentence[first].start, sentence[last - 1].end))
     return tuple(found)
 
@@ -183,6 +187,11 @@ class _Rule:
     value: str
     patterns: tuple[re.Pattern[str], ...]
 
+    @property
+    def measures(self) -> bool:
+        """Whether its patterns say which number is the length."""
+        return any("{LENGTH}" in p.pattern or "(?P<l" in p.pattern for p in self.patterns)
+
 
 def _demand(
     rule: _Rule, match: re.Match[str], items: Sequence[Item], first: int, last: int, line: _Line
@@ -201,7 +210,7 @@ def _demand(
         rule.sets,
         rule.value,
         sides,
-        quantity or next(iter(numbers), None),
+        quantity or (None if rule.measures else next(iter(numbers), None)),
         numbers,
         bound,
         first,

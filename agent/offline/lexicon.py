@@ -5,7 +5,7 @@ from functools import cache
 from importlib import resources
 
 from .demands import word_list
-from .tagging import in_use, stem, word_classes
+from .tagging import ANY, in_use, stem, word_classes
 
 CLASSES_OF = {
     "around": ("surround", "ring", "enclose", "enclosure"),
@@ -21,7 +21,7 @@ DEMANDING = frozenset(
     {"gap", "face", "avoid", "wait", "motion", "each", "rest", "far", "near", "side", "figure"}
 )
 """Classes whose words say more than an arrangement: a rule takes them, or they are asked."""
-NEUTRAL = ("place", "robot", "polite")
+NEUTRAL = ("place", "robot")
 """Classes of classes.yaml whose words say an arrangement, or none."""
 WEIGHTY = word_list("weighty")
 """Small words that change who, how many or whether: a rule takes them, or they are asked."""
@@ -57,7 +57,9 @@ def goes_with(word: str, classes: frozenset[str], relation: str) -> bool:
         return True
     meanings = in_use().words.get(stem(word), frozenset())
     others = {c for r, named in CLASSES_OF.items() if r != relation for c in named}
-    return relation in meanings or (bool(meanings) and not classes & (others | DEMANDING))
+    if relation in meanings or (ANY in meanings and not classes & others):
+        return True
+    return bool(meanings) and not classes & (others | DEMANDING)
 
 
 @cache

@@ -227,10 +227,16 @@ def _planned(task: Task, plan: dict[str, Any], history: History) -> str:
 
 
 def _left_aside(task: Task) -> list[str]:
-    """The words that changed nothing, so that the person sees what was not used."""
-    quotes = read_instruction(task.instruction, task.metres_per_pixel).background
-    quoted = ", ".join(f'"{words}"' for words in quotes)
-    return [f"Read as background, which changes nothing: {quoted}."] if quotes else []
+    """The words that only said which thing, and those that changed nothing."""
+    reading = read_instruction(task.instruction, task.metres_per_pixel)
+    said = [f"Read as background, which changes nothing: {_quoted(reading.background)}."]
+    if _target_ids(task) and reading.things:
+        said = [f"Read as words for what was pointed at: {_quoted(reading.things)}.", *said]
+    return said if reading.background else said[:-1]
+
+
+def _quoted(words: list[str]) -> str:
+    return ", ".join(f'"{quote}"' for quote in dict.fromkeys(words))
 
 
 def _taken(history: History) -> list[str]:

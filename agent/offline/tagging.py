@@ -27,6 +27,8 @@ MEANINGS = (
     *("several", "ask"),
 )
 """Arrangements that a command may mean; "ask": none that can simply be carried out."""
+ANY = "any"
+"""Stands in place of meanings for words that stood in commands of most."""
 TAG_BUCKETS, MEANING_BUCKETS = 1 << 16, 1 << 15
 """Features are hashed into so many weights a label."""
 TOKEN = re.compile(r"\d+(?:[.,]\d+)*|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[^\w\s]|_")

@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_matrix
 
 from ...agent.offline.tagging import (
+    ANY,
     LABELS,
     MEANING_BUCKETS,
     MEANINGS,
@@ -135,7 +136,7 @@ def known_words(sentences: Sequence[Sentence]) -> dict[str, frozenset[str]]:
     for word, meanings in counted.items():
         often = [m for m, count in meanings.items() if count > 1]
         if len(meanings) >= GENERAL:
-            often = list(MEANINGS)
+            often.append(ANY)
         if often and word[0].isalpha():
             found[word] = frozenset(often)
     return found

@@ -48,7 +48,7 @@ PARTS = {"half": 2, "third": 3, "quarter": 4, "fifth": 5, "sixth": 6, "eighth": 
 SIGNS = {"\u00bd": 0.5, "\u00bc": 0.25, "\u00be": 0.75, "\u2153": 1 / 3, "\u2154": 2 / 3}
 DIGITS = (
     r"[0-9]{1,3}(?:[,\u00a0\u2009\u202f'][0-9]{3})+(?:\.[0-9]+)?|"
-    r"[0-9]{1,3}(?: [0-9]{3})+(?![0-9.,])|[0-9]*\.?[0-9]+(?:e[0-9]+)?"
+    r"[0-9]{1,3}(?: [0-9]{3})+(?![0-9.,])|[0-9]+,[0-9]{1,2}(?![0-9])|[0-9]*\.?[0-9]+(?:e[0-9]+)?"
 )
 ATOM = re.compile(
     rf"(?P<digits>(?<![\w.,])(?:{DIGITS})(?![\d]))|(?P<sign>[\u00bd\u00bc\u00be\u2153\u2154])|"
@@ -181,11 +181,12 @@ def _share(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
     if part is None or (k == at and name != "half"):
         return None
     share, k = count / part, k + 1
-    k += _text(atoms, k) == "of"
+    joined = _text(atoms, k) == "of"
+    k += joined
     if _text(atoms, k) in ("a", "an"):
         noun = _text(atoms, k + 1)
         return (share * GROUPS[noun], k + 2) if noun in GROUPS else (share, k + 1)
-    whole = _number(atoms, k)
+    whole = _number(atoms, k) if joined else None
     return (share * whole[0], whole[1]) if whole else None
 
 
@@ -209,7 +210,9 @@ def _number(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
     if atom.kind == "sign":
         return SIGNS[atom.text], at + 1
     if atom.kind == "digits":
-        value = float(re.sub(r"[^0-9.e]", "", atom.text))
+        decimal = re.fullmatch(r"[0-9]+,[0-9]{1,2}", atom.text)  # as much of Europe writes it
+        plain = atom.text.replace(",", ".") if decimal else atom.text
+        value = float(re.sub(r"[^0-9.e]", "", plain))
         if _text(atoms, at + 1) == "/" and at + 2 < len(atoms) and atoms[at + 2].kind == "digits":
             below = float(re.sub(r"[^0-9.e]", "", atoms[at + 2].text))
             return (value / below, at + 3) if below else None
