@@ -106,6 +106,8 @@ def _metric(name: str, text: str, metres_per_pixel: float | None) -> float | Non
     found = quantities_in(text.strip())
     if len(found) != 1 or found[0].wording != text.strip() or not found[0].is_length:
         return None
+    if found[0].least < found[0].most:
+        return None
     px = found[0].px(metres_per_pixel)
     if px is None:
         raise InputError(

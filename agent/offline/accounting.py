@@ -162,7 +162,10 @@ class _Reader:
         for k, item in enumerate(self.items):
             before = self.items[k - 1].symbol if k else ""
             if item.symbol in ("<t>", "it", "this", "that"):
-                return next((p for p, words in PLACES.items() if before in words), "")
+                place = next((p for p, words in PLACES.items() if before in words), "")
+                if place and self.reading.form is not None:
+                    self.taken[k - 1] = True
+                return place
         return ""
 
     def _count_alone(self) -> None:

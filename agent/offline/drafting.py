@@ -9,6 +9,8 @@ from .reading import Reading
 
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
+LIKELY_PLACE = 0.3
+"""Least probability of another arrangement for it to say where a form is drawn."""
 NAMES = {
     "around": "around it",
     "cage": "in a closed ring around it",
@@ -87,7 +89,8 @@ def _groups(
         pair = zip((basics, outer), (less, robots - less), strict=True)
         return [_group(reading, g | {"robots": n}) for g, n in pair]
     if relation == "shape":
-        return [basics | {"relation": "shape", "robots": robots} | _drawn(reading, basics, attempt)]
+        drawn = _drawn(reading, basics, attempt)
+        return [basics | {"relation": "shape", "robots": robots} | drawn]
     return [_group(reading, basics | {"robots": robots})]
 
 
@@ -114,8 +117,9 @@ def place_of(reading: Reading, attempt: int) -> str | None:
     side = reading.group.get("side")
     if side is not None:
         return SIDES.get(side)
-    likely = next((m for m, _ in reading.meanings if m in ("around", "inside", "along")), "")
-    place = reading.place or likely
+    other = {m: p for m, p in reading.meanings if m in ("around", "inside", "along")}
+    likely = max(other, key=lambda m: other[m])
+    place = reading.place or (likely if other[likely] >= LIKELY_PLACE else "")
     if place == "around" and reading.form.shape["kind"] in ENCLOSING:
         return "around"
     if place == "inside":
@@ -182,6 +186,8 @@ def _how_many(reading: Reading, robots: int | None) -> str | None:
 def _which_things(task: Task, reading: Reading) -> str | None:
     pointed = list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))
     needed = things_needed(reading)
+    if reading.faced and len(pointed) == needed + 1:
+        return None
     others = [*reading.others, *([reading.faced] if reading.faced else [])]
     if pointed and others:
         return (

@@ -14,7 +14,9 @@ from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
 from .choosing import Step, agrees, calls_in, find, located_reasons
+from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, would_do
+from .reading import Reading
 from .references import described
 
 MAX_LABEL = 100
@@ -66,12 +68,12 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         if robots and ids and would_do(task, reading):
             asked["contract"] = _in_unit(task, contract_of(reading, robots, ids, []))
         return _call("ask_user", asked)
-    ids = _target_ids(task)[: things_needed(reading)]
+    needed = things_needed(reading)
+    ids, others = _target_ids(task)[:needed], _target_ids(task)[needed:]
     prompts = [p for p in task.pointed if p["id"] not in task.targets]
-    others: list[str] = []
     if not ids:
         named = [*reading.others, *([reading.faced] if reading.faced else [])]
-        found = find(described(reading.things), things_needed(reading), history)
+        found = find(_things(task, reading), needed, history)
         if isinstance(found, Step):
             return _call(found.name, found.arguments)
         for phrase in named:
@@ -108,6 +110,11 @@ def _agreed(task: Task, history: History) -> Reply | None:
         contract = contract | {"reading": READING}
     prompts = [p for p in task.pointed if p["id"] not in task.targets]
     return _call("propose_formation", {"contract": contract, "targets": prompts})
+
+
+def _things(task: Task, reading: Reading) -> tuple[Reference, ...]:
+    """What the instruction refers to; where no phrase stood out, whatever in it refers."""
+    return described(reading.things) or described([task.instruction])
 
 
 def _parted(ids: list[str], last: int) -> tuple[list[str], list[str]]:

@@ -34,7 +34,7 @@ WEIGHTY: tuple[tuple[str, str], ...] = (
     (rf"\b(?:along|on|at|down|beside|leave|leaving) (?:the |its )?{SIDE} (?:side|edge|flank)\b",
      "side"),
     (r"\b(?:clear of|keep off|stay off|hands off|keep away from|without touching)\b", "keep_out"),
-    (r"\b(?:each|both|every one) of (?:the|these|those)\b(?! robots| four| \w+ corners| corners)",
+    (r"\b(?:each|both|every one) of (?:the|these|those)\b(?! robots|[^.;,]{0,30}corners)",
      "targets"),
     (r"\b(?:all|everything|anything|everyone) (?:but|except)\b|\bexcept\b", "sides"),
 )  # fmt: skip
