@@ -107,7 +107,7 @@ class Fields:
 
     def _only_side(self, demand: Demand) -> bool:
         relation = self.reading.relation
-        if relation == "along":
+        if relation in ("along", "shape"):
             return self._side(demand)
         return relation == "around" and self._only([demand.sides[0]])
 
@@ -241,7 +241,7 @@ class Fields:
         return self._follows_thing(demand)
 
     def _follows_thing(self, demand: Demand) -> bool:
-        """Whether words say which thing, "the white trailer on the left"; they belong to it then."""
+        """Whether words say which thing, "the van on the left"; they belong to it then."""
         at = demand.first - 1
         if at >= 0 and self.items[at].symbol == ",":
             at -= 1

@@ -15,7 +15,7 @@ CLASSES_OF = {
     "corners": ("corner",),
     "between": ("part",),
     "centre": ("gather", "middle"),
-    "shape": ("form",),
+    "shape": ("form", "surround", "ring"),
 }
 DEMANDING = frozenset(
     {"gap", "face", "avoid", "wait", "motion", "each", "rest", "far", "near", "side", "figure"}
