@@ -12,8 +12,8 @@ from pydantic import BaseModel
 
 BOUNDS = frozenset(
     f"{which}{what}" for which in ("min", "max") for what in ("imum", "Items", "Length")
-) | {"exclusiveMinimum", "additionalProperties", "pattern"}
-"""What a schema says of values that descriptions say as well, or an answer does in good time."""
+) | {"exclusiveMinimum", "additionalProperties", "pattern", "default"}
+"""What a schema says of values that a model need not be told: an answer says what is wrong."""
 
 
 def compact_schema(model: type[BaseModel]) -> dict[str, Any]:
@@ -45,6 +45,8 @@ def _compact(node: Any, once: Mapping[str, Any]) -> Any:
         elif key == "anyOf" and {"type": "null"} in value:
             given = [_compact(choice, once) for choice in value if choice != {"type": "null"}]
             made = given[0] | made if len(given) == 1 else made | {"anyOf": given}
+        elif key == "description":
+            made[key] = " ".join(value.split())
         elif not (key == "title" or (key == "default" and value in (None, [], ""))):
             made[key] = _compact(value, once)
     return made

@@ -10,7 +10,7 @@ import inspect
 import json
 import re
 import threading
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_type_hints
@@ -56,14 +56,26 @@ ToolFunction = Callable[..., Answer | Awaitable[Answer]]
 
 
 @dataclass(frozen=True)
+class FilledBy:
+    """Marks an argument that is of no use without a tool, by its name."""
+
+    tool: str
+
+
+@dataclass(frozen=True)
 class Tool:
-    """A named function a model may call."""
+    """A named function a model may call.
+
+    Attributes:
+        hidden: arguments that models are not offered.
+    """
 
     name: str
     description: str
     kind: Kind
     arguments: type[BaseModel]
     function: ToolFunction
+    hidden: frozenset[str] = frozenset()
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -73,7 +85,18 @@ class Tool:
     @property
     def offered(self) -> dict[str, Any]:
         """The schema as models read it, in fewer words: what it leaves out, `parse` says."""
-        return without_bounds(self.schema)
+        schema = self.schema
+        shown = {k: v for k, v in schema["properties"].items() if k not in self.hidden}
+        return without_bounds(schema | {"properties": shown})
+
+    def beside(self, names: Collection[str]) -> "Tool":
+        """This tool, offered with others alone: what only further ones could fill is hidden."""
+        hidden = (
+            name
+            for name, field in self.arguments.model_fields.items()
+            if any(isinstance(m, FilledBy) and m.tool not in names for m in field.metadata)
+        )
+        return replace(self, hidden=frozenset(hidden))
 
     def parse(self, arguments: Mapping[str, Any]) -> BaseModel:
         """Validated arguments.

@@ -22,7 +22,9 @@ def offered(tools: tuple[Tool, ...], prompt: Prompt | None) -> tuple[Tool, ...]:
     """The tools a prompt wants its model to be told of; those it does not know are kept."""
     if prompt is None or not prompt.tools:
         return tools
-    return tuple(t for t in tools if t.name in prompt.tools or t.name not in STANDARD)
+    chosen = [t for t in tools if t.name in prompt.tools or t.name not in STANDARD]
+    names = {t.name for t in chosen}
+    return tuple(t.beside(names) for t in chosen)
 
 
 class TwoStages:

@@ -1,6 +1,6 @@
 """Tools that commit: propose_formation, deploy, ask_user, report_impossible."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic.json_schema import SkipJsonSchema
@@ -18,7 +18,7 @@ from ..formation.units import contract_in_pixels, length_text, with_metres
 from ..geometry.cages.budget import cut_short, search_budget
 from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
-from ..tool import ToolResult, in_thread, tool
+from ..tool import FilledBy, ToolResult, in_thread, tool
 from ..world import PlanNode, ShownCandidate, Target, World
 from .robots import drive_to, with_robots
 from .seeing import sighting
@@ -40,18 +40,19 @@ async def propose_formation(
     contract: Contract,
     targets: tuple[TargetPrompt, ...] = (),
     positions: tuple[Point, ...] | None = None,
-    samples: tuple[str, ...] | None = None,
+    samples: Annotated[tuple[str, ...] | None, FilledBy("sample_inside")] = None,
+    tell: str | None = None,
 ) -> ToolResult:
-    """State what the instruction demands, and have the robots placed and certified.
-
-    Without positions or samples the robots are placed as the contract says: the usual way.
-    Every violation comes back with numbers; what is not certified cannot be deployed.
+    """State what the instruction demands; robots are placed so, and certified or not, with numbers.
 
     Args:
-        contract: what the instruction demands; its robots add up to Robots, or to the words'.
-        targets: the things meant that are not measured yet.
-        positions: (x, y) of every robot in the order of the groups, px; usually left out.
-        samples: names that sample tools gave (s1, ...), to use as positions instead.
+        contract: its robots add up to Robots, or the words' number. unit: of lengths, where
+            Metres per pixel is told; places are px. keep_out: further ids no robot may touch.
+            reading: only after a doubt, why this is meant.
+        targets: things meant that are not measured yet, or to correct.
+        positions: (x, y) of every robot in order of the groups, to place them yourself.
+        samples: names of samples (s1, ...) to place them at.
+        tell: to the person, where Deploy is false: ends the turn once the plan is certified.
     """
     if positions is not None and samples is not None:
         raise ToolError("propose_formation: give positions or samples, not both.")
@@ -76,10 +77,13 @@ async def propose_formation(
     world = await with_robots(context.at(world), found)
     node = world.plan()
     data = _proposal(world, node.plan) | offered
-    if node.plan.verdict.certified and (advice := _to_see(world, node)):
+    certified, message = node.plan.verdict.certified, None
+    if certified and (advice := _to_see(world, node)):
         data |= {"look_first": advice}
+    elif certified and not context.settings.may_deploy:
+        message = tell
     shown = overlays(context.at(world), map(world.target, node.unseen), node.plan)
-    return ToolResult(data, shown, world=world)
+    return ToolResult(data, shown, world=world, message=message)
 
 
 def _check_against_words(context: Context, contract: Contract) -> None:
@@ -145,12 +149,11 @@ def _unseen(world: World, held: Contract) -> tuple[str, ...]:
 async def deploy(
     context: Context, plan_id: str | None = None, tell: str | None = None
 ) -> ToolResult:
-    """Move the robots to a certified plan; says where they were observed to arrive.
+    """Move the robots to a certified plan; says where they arrived.
 
     Args:
-        plan_id: of a certified plan; left out: the one proposed in this same reply.
-        tell: what to tell the person once all have arrived, which ends the run; left out where
-            more is to be done.
+        plan_id: left out: the one proposed in this reply.
+        tell: to the person once all have arrived; ends the turn.
     """
     if plan_id is None and context.proposed is None:
         known = ", ".join(context.world.plans) or "none yet: propose a formation first"
@@ -201,11 +204,11 @@ def ask_user(
     candidates: tuple[str, ...] = (),
     contract: SkipJsonSchema[Contract | None] = None,
 ) -> ToolResult:
-    """Ask the person when the instruction does not settle what to do; this ends the turn.
+    """Ask the person what the instruction leaves open; ends the turn.
 
     Args:
-        question: one clear question.
-        candidates: ids of numbered things (c3) or targets (t1) to choose from, if there are any.
+        question: one, clear.
+        candidates: ids to choose from (c3, t1).
         contract: that would do, shown to the person; the offline planner's, in no schema.
     """
     found = {c: context.candidate(c) for c in candidates if c.startswith("c")}
@@ -228,12 +231,12 @@ def report_impossible(
     plan_id: str | None = None,
     contract: SkipJsonSchema[Contract | None] = None,
 ) -> ToolResult:
-    """Say that the instruction cannot be carried out, and why; this ends the run.
+    """Say that the instruction cannot be carried out; ends the turn.
 
     Args:
-        reason: why, in one sentence, with the numbers.
-        robots_needed: how many robots would do, where that is the trouble.
-        plan_id: the best plan that was found, certified or not.
+        reason: one sentence with the numbers.
+        robots_needed: how many would do, if that is why.
+        plan_id: the best plan found.
         contract: that would do, as of ask_user.
     """
     if plan_id is not None and plan_id not in context.world.plans:

@@ -29,8 +29,8 @@ def describe_shape(
     """Describe a target's outline: numbered edges, size, axes, corners, holes.
 
     Args:
-        target: target id, such as t1.
-        descriptor: edges (default), edges+vertices, or matrix (a binary raster of the box).
+        target: its id.
+        descriptor: edges by default.
     """
     outline = context.world.target(target).outline
     unit, length, width = outline.long_axis
@@ -58,8 +58,8 @@ def check_point(context: Context, target: str, points: tuple[Point, ...]) -> Too
     """Say of each point whether it is inside, outside or on the edge of a target, and how far.
 
     Args:
-        target: target id, such as t1.
-        points: points (x, y), image pixels, y down.
+        target: its id.
+        points: (x, y) of each.
     """
     outline = context.world.target(target).outline
     places = np.asarray(points, dtype=float).reshape(-1, 2)
@@ -86,11 +86,11 @@ def check_point(context: Context, target: str, points: tuple[Point, ...]) -> Too
 
 @tool("read")
 def measure(context: Context, a: str | Point, b: str | Point) -> ToolResult:
-    """Measure from one thing to another: nearest distance, centre distance and direction.
+    """Measure nearest and centre distance and direction from a to b.
 
     Args:
-        a: target id, or a point (x, y) in image pixels.
-        b: target id, or a point (x, y) in image pixels.
+        a: id or (x, y).
+        b: likewise.
     """
     (shape_a, centre_a), (shape_b, centre_b) = _place(context, a), _place(context, b)
     way = centre_b - centre_a

@@ -54,9 +54,9 @@ def look(
     """See the picture again with what was found, or a part of it closer.
 
     Args:
-        region: x0, y0, x1, y1 of the part to see closer, px.
-        plan_id: a plan whose robots to draw in.
-        candidates: whether to number what stands out; the thing numbered 3 is then c3.
+        region: x0, y0, x1, y1 of the part.
+        plan_id: whose robots to draw.
+        candidates: number what stands out: 3 is then c3.
     """
     picture, world = context.picture, context.world
     plan = None if plan_id is None else world.plan(plan_id).plan

@@ -46,85 +46,41 @@ OUTSIDE: frozenset[str] = frozenset({"around", "cage", "corners", "along"})
 
 
 class Group(Value):
-    """One arrangement."""
+    """One arrangement; lengths only if named.
 
-    relation: Relation = Field(
-        description="around: even ring (surround, guard); cage: closed ring, nothing gets out; "
-        "corners: one at each corner; along: beside one side or chosen edges; inside: spread "
-        "evenly over it (in or on it); between: two targets; centre: gathered at its centre, if "
-        "that is said; shape: a line, or free positions."
-    )
-    targets: tuple[str, ...] = Field(
-        default=(), max_length=2, description="Ids such as t1: two for between, else one."
-    )
-    robots: int = Field(ge=1, le=MAX_ROBOTS, description="How many of the robots.")
-    clearance: Annotated[tuple[Length, Length], numbers(2)] | None = Field(
-        default=None,
-        description="Least and greatest distance from the outline (inside: inwards) to a robot's "
-        "edge, px; only where the person named a length: 15 px away is [15, 15], at least 15 is "
-        "[15, 1000]; on the corners [0, 0].",
-    )
-    fit: Fit = Field(
-        default="normal",
-        description="How close, where no length was named. tight: snug; normal: also for 'just "
-        "off' and 'next to'; wide: well away.",
-    )
-    spacing: Literal["even", "free"] = Field(
-        default="even", description="free: neighbours need not be evenly spaced."
-    )
-    min_spacing: Length | None = Field(
-        default=None, description="Least distance of two robots' centres, px; if named."
-    )
-    max_gap: Length | None = Field(
-        default=None,
-        description="around, cage, along: widest gap between neighbours' edges, px; if named.",
-    )
-    pitch: Length | None = Field(
-        default=None, gt=0, description="Exact distance of neighbours' centres, px; if named."
-    )
-    radius: Length | None = Field(
-        default=None, gt=0, description="around: of the circle to stand on, px; if named."
-    )
-    sides: tuple[RingPart, ...] | None = Field(
-        default=None, min_length=1, description="around: only there."
-    )
-    opening: Length | None = Field(
-        default=None, description="around: least width of a gap to leave, px; 0: not named."
-    )
-    opening_towards: str | Angle | None = Field(
-        default=None, description="left, right, top, bottom, a target id, or degrees."
-    )
-    side: SideName | None = Field(
-        default=None,
-        description="along: which side, as seen in the picture, or its long or short side.",
-    )
-    edges: tuple[Annotated[int, Field(ge=0)], ...] | None = Field(
-        default=None,
-        min_length=1,
-        description="along: edges by number, see describe_shape, instead of a side.",
-    )
-    layout: Literal["line", "divider"] = Field(
-        default="line",
-        description="between: a line that joins them, or a divider that parts them.",
-    )
-    line: Four | None = Field(
-        default=None, description="shape: x0, y0, x1, y1 of a straight line; left out: free."
-    )
-    closure: Literal["ring", "escape-proof"] | None = Field(
-        default=None,
-        description="cage: ring, the default; escape-proof: certified that it cannot get out "
-        "however it moves and turns, evenly spaced or not; only if asked for.",
-    )
-    walls: bool | None = Field(
-        default=None, description="cage, escape-proof: the picture's border is a wall; if said."
-    )
-    facing: str | None = Field(
-        default=None, description="along: the side that faces this target, instead of a side."
-    )
-    shape: ShapeSpec | None = Field(default=None, description="shape: a form drawn by the robots.")
-    heading: str | Angle | None = Field(
-        default=None, description="Robots look: towards, away, a target id, or degrees; if said."
-    )
+    around: even ring (surround, guard); opening: least width of a gap in it (0: any). cage: closed
+    ring ("no gap", "nobody gets in", "must stay put", "cannot be pushed off"); escape-proof, walls
+    (the picture's border is one): only if so said. corners: one at each, also if surrounded "at
+    the corners"; clearance [0, 0]: on them. along: one of side, edges (describe_shape's numbers),
+    facing an id. inside: spread over it (in, on). between: two targets. centre: gathered there.
+    shape: shape, line (x0, y0, x1, y1) or positions. clearance: from the outline (inside: inwards)
+    to robots' edges; 15 px away is [15, 15], at least 15 [15, 1000]; else fit: normal also "next
+    to". min_spacing, pitch (exact): of centres; max_gap: of edges. heading: towards, away, id or
+    degrees; opening_towards: left, right, top, bottom, id or degrees.
+    """
+
+    relation: Relation
+    targets: tuple[str, ...] = Field(default=(), max_length=2)
+    robots: int = Field(ge=1, le=MAX_ROBOTS)
+    clearance: Annotated[tuple[Length, Length], numbers(2)] | None = None
+    fit: Fit = "normal"
+    spacing: Literal["even", "free"] = "even"
+    min_spacing: Length | None = None
+    max_gap: Length | None = None
+    pitch: Length | None = Field(default=None, gt=0)
+    radius: Length | None = Field(default=None, gt=0)
+    sides: tuple[RingPart, ...] | None = Field(default=None, min_length=1)
+    opening: Length | None = None
+    opening_towards: str | Angle | None = None
+    side: SideName | None = None
+    edges: tuple[Annotated[int, Field(ge=0)], ...] | None = Field(default=None, min_length=1)
+    layout: Literal["line", "divider"] = "line"
+    line: Four | None = None
+    closure: Literal["ring", "escape-proof"] | None = None
+    walls: bool | None = None
+    facing: str | None = None
+    shape: ShapeSpec | None = None
+    heading: str | Angle | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -235,24 +191,20 @@ _ONLY_IN = {
 
 
 class Contract(Value):
-    """All groups of a formation; robots are numbered through them in order, from 1."""
+    """All groups of a formation; robots are numbered through them in order, from 1.
+
+    Attributes:
+        robot_radius: 0 is a point.
+        unit: of its lengths, where the picture has a scale; places are px.
+        keep_out: further ids no robot may touch.
+        reading: why this is what is meant, where the words were held against it.
+    """
 
     groups: tuple[Group, ...] = Field(min_length=1, max_length=50)
-    robot_radius: Length = Field(default=0.0, description="Radius of a robot, px; 0 is a point.")
-    unit: Unit | None = Field(
-        default=None,
-        description="m: its lengths are metres, not px (places are px still). If Metres per pixel "
-        "is told, always say which.",
-    )
-    keep_out: tuple[str, ...] = Field(
-        default=(),
-        description="Further targets no robot may touch; other things are not avoided.",
-    )
-    reading: str = Field(
-        default="",
-        max_length=300,
-        description="Only where propose_formation doubts the contract: why it is what is meant.",
-    )
+    robot_radius: Length = 0.0
+    unit: Unit | None = None
+    keep_out: tuple[str, ...] = ()
+    reading: str = Field(default="", max_length=300)
 
     @property
     def robots(self) -> int:

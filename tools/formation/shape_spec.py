@@ -30,25 +30,20 @@ TOWARDS: dict[str, Opens] = {"left": "right", "right": "left", "above": "down", 
 
 
 class ShapeSpec(Value):
-    """What robots draw, and where: in a box, by a target, or through points of their own."""
+    """Through points (line, polyline), in a box (x0, y0, x1, y1), or where by the target.
+
+    angles: of an arc, from and to; opens: the mouth of v, u, arc.
+    """
 
     kind: Kind
-    text: str | None = Field(
-        default=None, max_length=40, description="letters: A-Z, 0-9, blanks; outlined: any ASCII."
-    )
-    points: tuple[Pair, ...] | None = Field(
-        default=None, min_length=2, max_length=500, description="line, polyline: (x, y) in turn."
-    )
-    rows: int | None = Field(default=None, ge=1, description="grid.")
-    corners: int | None = Field(default=None, ge=3, le=100, description="polygon, star: tips.")
-    angles: Pair | None = Field(
-        default=None, description="arc: from, to in degrees, clockwise from the right."
-    )
-    opens: Opens | None = Field(
-        default=None, description="v, u, arc (half circle): its mouth, if said."
-    )
-    box: Four | None = Field(default=None, description="x0, y0, x1, y1 to fit it into; or where.")
-    where: Where | None = Field(default=None, description="By the target.")
+    text: str | None = Field(default=None, max_length=40)
+    points: tuple[Pair, ...] | None = Field(default=None, min_length=2, max_length=500)
+    rows: int | None = Field(default=None, ge=1)
+    corners: int | None = Field(default=None, ge=3, le=100)
+    angles: Pair | None = None
+    opens: Opens | None = None
+    box: Four | None = None
+    where: Where | None = None
 
     @property
     def name(self) -> str:

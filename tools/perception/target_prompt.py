@@ -18,38 +18,22 @@ MIN_SIDE = 2.0
 
 
 class TargetPrompt(BaseModel):
-    """Points at one thing by an outline, a box, points or a candidate."""
+    """By outline (vertices in order; the surest way), box (x0, y0, x1, y1), points or candidate.
+
+    straight: its sides are. points on it, negative ones off it correct an outline or box there,
+    also alone, by the id of one measured.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    id: str = Field(default="t1", pattern=r"^t[0-9]{1,4}$", description="Id to give it")
-    label: str = Field(default="", max_length=200, description="What it is, in a few words")
-    candidate: str | None = Field(
-        default=None,
-        pattern=r"^c[0-9]{1,4}$",
-        description="A numbered candidate: c3",
-    )
-    box: Box | None = Field(default=None, description="x0, y0, x1, y1 close around it")
-    points: tuple[Point, ...] | None = Field(
-        default=None,
-        min_length=1,
-        max_length=MAX_POINTS,
-        description="Points (x, y) on it, px; with an outline or box, or for an id measured from "
-        "an outline before, they correct it there",
-    )
-    negative: tuple[Point, ...] = Field(
-        default=(), max_length=MAX_POINTS, description="Points (x, y) off it, px, in the same way"
-    )
-    outline: tuple[Point, ...] | None = Field(
-        default=None,
-        min_length=3,
-        max_length=30,
-        description="Rough outline, 3 to 30 vertices (x, y) in order, px; the surest way",
-    )
-
-    straight: bool = Field(
-        default=False, description="outline: its sides are straight lines between the vertices"
-    )
+    id: str = Field(default="t1", pattern=r"^t[0-9]{1,4}$")
+    label: str = Field(default="", max_length=200)
+    candidate: str | None = Field(default=None, pattern=r"^c[0-9]{1,4}$")
+    box: Box | None = None
+    points: tuple[Point, ...] | None = Field(default=None, min_length=1, max_length=MAX_POINTS)
+    negative: tuple[Point, ...] = Field(default=(), max_length=MAX_POINTS)
+    outline: tuple[Point, ...] | None = Field(default=None, min_length=3, max_length=30)
+    straight: bool = False
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

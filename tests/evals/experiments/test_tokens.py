@@ -4,7 +4,9 @@ from io import BytesIO
 
 import pytest
 from formup.agent.messages import Call, Reply, Result, User
+from formup.agent.wrappers.two_stages import offered
 from formup.evals.experiments.tokens import Spent, picture_tokens, spent, text_tokens
+from formup.prompts import load_prompt
 from formup.tools.builtin import TOOLS
 from PIL import Image
 
@@ -44,6 +46,21 @@ def test_tools_are_part_of_every_request() -> None:
     assert tools > 2500
     assert spent(twice, "", TOOLS).input == 2 * tools + spent(twice).input
     assert spent(twice, "", TOOLS).output == 2
+
+
+@pytest.mark.parametrize("name", ["former", "context", "planner"])
+def test_what_every_request_begins_with_is_short(name: str) -> None:
+    prompt = load_prompt(name)
+    said = spent((User(text=""), Reply(text="a")), prompt.render(), offered(TOOLS, prompt))
+    assert said.input <= 2000
+
+
+def test_no_model_is_offered_what_only_other_tools_could_fill() -> None:
+    for name, filled in (("former", False), ("repair", True)):
+        tools = offered(TOOLS, load_prompt(name))
+        (propose,) = (tool for tool in tools if tool.name == "propose_formation")
+        assert ("samples" in propose.offered["properties"]) is filled
+        assert "samples" in propose.schema["properties"]
 
 
 def test_a_prompt_in_the_cache_is_paid_a_tenth_of() -> None:

@@ -219,6 +219,19 @@ def test_a_plan_that_is_proposed_again_is_valid_again_and_deployed_by_its_id(beg
     assert work.call("deploy", plan_id=again.data["plan_id"]).data["arrived"]
 
 
+def test_words_for_the_person_end_the_turn_where_nothing_is_to_move(begin: Begin) -> None:
+    work = begin(may_deploy=False)
+    assert propose(work, tell="Six would stand around the box.").message == (
+        "Six would stand around the box."
+    )
+    assert propose(work).message is None
+    assert propose(work, positions=[[10, 10]] * 6, tell="Done.").message is None
+    assert propose(begin(), tell="Done.").message is None
+    unseen = propose(begin(may_deploy=False, clearance=9), tell="Done.")
+    assert unseen.data["certified"]
+    assert unseen.message is None
+
+
 def test_a_distance_the_person_fixed_has_the_outline_shown_first_too(begin: Begin) -> None:
     work = begin(clearance=9)
     made = propose(work)
