@@ -23,6 +23,7 @@ from .formation.units import check_scale
 from .formation.value import Value
 from .geometry.outline import Outline, outline_of
 from .perception.image import Picture
+from .perception.measure import Deviation
 from .perception.target_prompt import Box, Point, TargetPrompt
 
 Ring = tuple[tuple[float, float], ...]
@@ -90,7 +91,8 @@ class Target(Value):
         prompt: what it was found from: point, box, outline or candidate.
         parts: what alpha was made of.
         source: what it was found from, if that was an outline somebody drew.
-        missed: vertices of the rough outline it was found from that lie well outside of `outline`.
+        missed: where the rough outline it was found from reaches out of `outline`, (x, y, by px).
+        added: where `outline` reaches out of that, likewise.
     """
 
     id: str
@@ -100,7 +102,8 @@ class Target(Value):
     outline: OutlineField
     prompt: str
     parts: dict[str, float] = Field(default_factory=dict)
-    missed: tuple[Point, ...] = ()
+    missed: tuple[Deviation, ...] = ()
+    added: tuple[Deviation, ...] = ()
     source: TargetPrompt | None = None
 
 

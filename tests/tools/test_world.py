@@ -28,6 +28,7 @@ Step = Callable[[World], World]
 
 numbers = st.floats(0, 190, allow_subnormal=False)
 points = st.tuples(numbers, numbers)
+deviations = st.tuples(numbers, numbers, numbers)
 names = st.text(max_size=8).filter(lambda text: "\ud800" not in text)
 
 
@@ -60,7 +61,8 @@ targets = st.builds(
     outline=outlines(),
     prompt=st.sampled_from(["box", "outline"]),
     parts=st.dictionaries(st.sampled_from(["edges", "colour"]), st.floats(0, 1)),
-    missed=st.lists(points, max_size=2).map(tuple),
+    missed=st.lists(deviations, max_size=2).map(tuple),
+    added=st.lists(deviations, max_size=2).map(tuple),
     source=st.none() | prompts,
 )
 poses = st.lists(

@@ -1,5 +1,6 @@
 """Tools that commit: propose_formation, deploy, ask_user, report_impossible."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -16,13 +17,20 @@ from ..formation.plan import Plan, make_plan
 from ..formation.site import PlacementError
 from ..formation.units import contract_in_pixels, length_text, with_metres
 from ..geometry.cages.budget import cut_short, search_budget
-from ..geometry.outline import distances
 from ..perception.target_prompt import Point, TargetPrompt
 from ..tool import FilledBy, ToolResult, in_thread, tool
 from ..world import PlanNode, ShownCandidate, Target, World
 from .robots import drive_to, with_robots
 from .seeing import sighting
-from .targets import doubtful, framed, measured_all, overlays, summary
+from .targets import (
+    closer_views,
+    corrections,
+    doubtful,
+    framed,
+    measured_all,
+    summary,
+    well_missed,
+)
 
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
@@ -63,7 +71,10 @@ async def propose_formation(
     def work() -> tuple[World, PlanNode | PlacementError, Plan | None]:
         world = measured_all(context, targets)
         places = positions if samples is None else _sampled(world, samples)
-        return world, *_planned(context.at(world), held, places)
+        try:
+            return world, *_planned(context.at(world), held, places)
+        except ToolError as error:
+            raise error.showing(*closer_views(context.at(world), context.world, targets)) from None
 
     world, found, partial = await in_thread(work)
     offered: dict[str, Any] = {}
@@ -73,16 +84,28 @@ async def propose_formation(
         offered = {"partial": _offer(world.plan().plan), "next": SHOW_PARTIAL}
     if isinstance(found, PlacementError):
         context.observed(world)
-        raise _refusal(found, offered["partial"])
+        shown = closer_views(context.at(world), context.world, targets)
+        raise _refusal(found, offered["partial"]).showing(*shown)
     world = await with_robots(context.at(world), found)
-    node = world.plan()
-    data = _proposal(world, node.plan) | offered
-    certified, message = node.plan.verdict.certified, None
-    if certified and (advice := _to_see(world, node)):
+    return _proposed(context, world, targets, offered, tell)
+
+
+def _proposed(
+    context: Context,
+    world: World,
+    targets: Sequence[TargetPrompt],
+    offered: dict[str, Any],
+    tell: str | None,
+) -> ToolResult:
+    """The answer to a proposal that has come to a plan, the current one of the next world."""
+    node, now, message = world.plan(), context.at(world), None
+    data = _proposal(world, node.plan) | corrections(context.world, world, targets) | offered
+    certified = node.plan.verdict.certified
+    if certified and (advice := _to_see(now, node)):
         data |= {"look_first": advice}
     elif certified and not context.settings.may_deploy:
         message = tell
-    shown = overlays(context.at(world), map(world.target, node.unseen), node.plan)
+    shown = closer_views(now, context.world, targets, node.plan, node.unseen)
     return ToolResult(data, shown, world=world, message=message)
 
 
@@ -160,7 +183,7 @@ async def deploy(
         raise ToolError(f"No plan was made in this reply; name plan_id. Plans: {known}.")
     node = context.world.plan(plan_id or context.proposed)
     _check_may_move(context, node.plan)
-    if plan_id is None and (advice := _to_see(context.world, node)):
+    if plan_id is None and (advice := _to_see(context, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
     arrival, world, moved = await drive_to(context, node)
     worst = int(np.argmax(arrival.residual_px))
@@ -252,17 +275,20 @@ def _offer(plan: Plan) -> dict[str, str]:
     return {"plan_id": plan.id, "sentence": sentence}
 
 
-def _to_see(world: World, node: PlanNode) -> str:
+def _to_see(context: Context, node: PlanNode) -> str:
     """What has to be looked at before a plan nobody has seen is carried out, if anything."""
     if not node.unseen:
         return ""
+    world = context.world
     target, scale = world.target(node.unseen[0]), world.metres_per_pixel
     slack = length_text(_slack(node.plan, target.id), scale, ".0f")
+    call = f'call deploy {{"plan_id": "{node.plan.id}", "tell": "..."}}'
+    follows = call if context.settings.may_deploy else "reply with `tell` as text, without a call"
     return (
         f"{target.id} {_doubt(target, scale)}. If the outline shown follows the thing to "
-        f"within about {slack}, deploy plan_id {node.plan.id} (with tell). "
-        f"Where it does not and yours (dashed) does, propose again with {target.id} and "
-        "`points` on the thing there or `negative` ones off it; else with a closer outline."
+        f"within about {slack}, {follows}. Where it does not and yours (dashed) does, propose "
+        f'again with targets [{{"id": "{target.id}", "points": [[x, y]], "negative": [[x, y]]}}], '
+        "points on the thing there or negative ones off it; else with a closer outline."
     )
 
 
@@ -270,12 +296,10 @@ def _doubt(target: Target, scale: float | None) -> str:
     """Why a target has to be looked at."""
     if not doubtful(target):
         return "has an edge that a named distance is measured from"
-    if not target.missed:
+    if not (missed := well_missed(target)):
         return f"was measured with confidence {target.confidence:.2f}"
-    away = distances(target.outline.filled, np.asarray(target.missed))
-    places = zip(target.missed, away, strict=True)
-    left = ", ".join(f"({x:g}, {y:g}) by {length_text(px, scale, '.0f')}" for (x, y), px in places)
-    return f"as measured leaves out your {left}, which has so much less clearance"
+    left = (f"({x:g}, {y:g}) by {length_text(px, scale, '.0f')}" for x, y, px in missed)
+    return f"as measured leaves out your {', '.join(left)}, which has so much less clearance"
 
 
 def _slack(plan: Plan, name: str) -> float:

@@ -13,7 +13,7 @@ from ..perception.referring.attributes import Candidate
 from ..perception.referring.relations import Query, select
 from ..perception.target_prompt import Box, Point, TargetPrompt, box_problems
 from ..tool import ToolResult, tool, violations
-from .targets import doubtful, framed, measured_all, overlays, summary
+from .targets import closer_views, corrections, framed, measured_all, summary
 
 MOST_SHOWN = 40
 """Candidates that a reply or a picture holds."""
@@ -101,7 +101,8 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
         new = [prompt for prompt in context.world.pointed if prompt.id not in found]
         world = measured_all(context, new)
         targets = [summary(t) for t in world.targets]
-        return ToolResult({"targets": targets, **framed(world)}, world=world)
+        shown = closer_views(context.at(world), context.world, new)
+        return ToolResult({"targets": targets, **framed(world)}, shown, world=world)
     clear = salient_candidates(context.candidates())
     if query is None:
         shown = [sighting(c) for c in clear[:MOST_SHOWN]]
@@ -171,8 +172,9 @@ def segment(
     )
     world = measured_all(context, (prompt,))
     target = world.target(prompt.id)
-    data = {**summary(target), "parts": dict(target.parts), **framed(world)}
-    shown = overlays(context.at(world), (target,) if doubtful(target) else ())
+    changed = corrections(context.world, world, [prompt])
+    data = {**summary(target), "parts": dict(target.parts), **changed, **framed(world)}
+    shown = closer_views(context.at(world), context.world, [prompt])
     return ToolResult(data, shown, world=world)
 
 

@@ -1,14 +1,14 @@
 """Targets for tools: what a prompt points at, measured and shown, or refused as too doubtful."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 from ..context import Context
-from ..draw import draw_view
+from ..draw import draw_view, view_scale
 from ..errors import InputError, ToolError
 from ..formation.plan import Plan
-from ..perception.measure import measure_outline, missed_vertices
+from ..perception.measure import Deviation, measure_outline, unlike_drawn
 from ..perception.segmenters.registry import segmenter_named
 from ..perception.target_prompt import MAX_POINTS, TargetPrompt
 from ..world import Target, World
@@ -16,6 +16,10 @@ from ..world import Target, World
 FRAME = "image pixels, x right, y down"
 CLEAR = 0.7
 """Below this confidence a mask is shown to the model: it may have to correct it."""
+MISSED = 0.06
+"""Rough outlines are off by up to this share of the thing's size."""
+SMALL = 40.0
+"""Things whose shorter side is less, px of the picture or of its view, are shown closer."""
 AROUND = 0.3
 """What is shown of the surroundings of such a thing, as a share of its longer side."""
 
@@ -37,7 +41,12 @@ def summary(target: Target) -> dict[str, Any]:
         "kind": target.outline.kind,
         "corners": len(target.outline.corners),
     }
-    return data | ({"leaves_out_your_vertices": target.missed} if target.missed else {})
+    unlike = {"leaves_out_of_yours": target.missed, "adds_to_yours": target.added}
+    return data | {name: _rounded_parts(parts) for name, parts in unlike.items() if parts}
+
+
+def _rounded_parts(parts: Iterable[Deviation]) -> list[dict[str, int]]:
+    return [dict(zip(("x", "y", "px"), map(round, part), strict=True)) for part in parts]
 
 
 def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
@@ -73,6 +82,7 @@ def _measured(context: Context, prompt: TargetPrompt) -> Target:
         text = f"Insufficient segmentation accuracy. {error} {ADVICE[prompt.how]}"
         threshold = _threshold(context, prompt.how)
         raise ToolError(text, "low_confidence", threshold=threshold) from None
+    missed, added = unlike_drawn(found.outline, prompt, *context.world.picture.size)
     return Target(
         id=prompt.id,
         label=prompt.label or "the thing pointed at",
@@ -81,7 +91,8 @@ def _measured(context: Context, prompt: TargetPrompt) -> Target:
         outline=found.outline,
         prompt=prompt.how,
         parts={name: round(value, 3) for name, value in found.parts.items()},
-        missed=missed_vertices(found.outline, prompt),
+        missed=missed,
+        added=added,
         source=None if prompt.outline is None else prompt,
     )
 
@@ -132,23 +143,78 @@ def _insufficient(confidence: float, threshold: float, how: str) -> ToolError:
     )
 
 
-def overlays(
-    context: Context, targets: Iterable[Target], plan: Plan | None = None
-) -> tuple[bytes, ...]:
-    """Pictures of targets whose masks a model should look at before it trusts them."""
-    return tuple(closer_view(context, target, plan) for target in targets)
-
-
 def doubtful(target: Target) -> bool:
     """Whether a mask has to be looked at before robots are sent there."""
-    return target.confidence < CLEAR or bool(target.missed)
+    return target.confidence < CLEAR or bool(well_missed(target))
 
 
-def closer_view(context: Context, target: Target, plan: Plan | None = None) -> bytes:
-    """The target's outline on a part of the picture, as a JPEG file."""
+def well_missed(target: Target) -> list[Deviation]:
+    """What was drawn and is left out by more than a rough outline is off."""
+    return [part for part in target.missed if part[2] > MISSED * target.outline.size]
+
+
+def corrections(before: World, world: World, prompts: Iterable[TargetPrompt]) -> dict[str, Any]:
+    """What a reply says of outlines that points have corrected: what that has changed."""
+    known = {t.id: t.outline.polygon for t in before.targets}
+    pairs = {
+        p.id: (known[p.id], world.target(p.id).outline.polygon)
+        for p in prompts
+        if p.id in known and (p.points or p.negative)
+    }
+    changed = {
+        name: {"added_px": round((now - then).area), "removed_px": round((then - now).area)}
+        for name, (then, now) in pairs.items()
+    }
+    return {"corrected": changed, "shown": SHOWN} if changed else {}
+
+
+SHOWN = "grey dashes: before; discs and crosses: your points on it and off it"
+
+
+def closer_views(
+    context: Context,
+    before: World,
+    prompts: Sequence[TargetPrompt],
+    plan: Plan | None = None,
+    unseen: Collection[str] = (),
+) -> tuple[bytes, ...]:
+    """Pictures of the outlines that are to be looked at.
+
+    Args:
+        context: with the world as it is now.
+        before: the world before anything was measured.
+        prompts: what was measured: the small, the doubtful, and what points were given for.
+        unseen: ids that are to be looked at in any case.
+    """
+    measured = {p.id: bool(p.points or p.negative) for p in prompts}
+    old = {t.id: t for t in before.targets if measured.get(t.id)}
+    return tuple(
+        closer_view(context, target, plan, old.get(target.id))
+        for target in context.world.targets
+        if target.id in unseen
+        or measured.get(target.id)
+        or (target.id in measured and (doubtful(target) or _is_small(context, target)))
+    )
+
+
+def _is_small(context: Context, target: Target) -> bool:
+    x0, y0, x1, y1 = target.box
+    return min(x1 - x0, y1 - y0) * min(view_scale(context.picture), 1) < SMALL
+
+
+def closer_view(
+    context: Context, target: Target, plan: Plan | None = None, before: Target | None = None
+) -> bytes:
+    """The target's outline on a part of the picture, as a JPEG file.
+
+    Args:
+        before: as it was before it was corrected, dashed.
+    """
     x0, y0, x1, y1 = target.box
     out = AROUND * max(x1 - x0, y1 - y0) + 2
     shown = context.world if plan else context.world.having(targets=(target,))
     region = (x0 - out, y0 - out, x1 + out, y1 + out)
-    drawn = () if target.source is None else target.source.outline or ()
-    return draw_view(context.picture, shown, plan=plan, region=region, drawn=drawn)
+    old = None if before is None else before.outline
+    return draw_view(
+        context.picture, shown, plan=plan, region=region, drawn=target.source, before=old
+    )

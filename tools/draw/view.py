@@ -12,11 +12,13 @@ from io import BytesIO
 import numpy as np
 
 from ..formation.plan import Plan
+from ..geometry.outline import Outline
 from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
-from ..perception.target_prompt import Box, Point
+from ..perception.target_prompt import Box, TargetPrompt
 from ..world import World
-from .canvas import WHITE, Canvas
+from .canvas import CERTIFIED, FINDING, MUTED, WHITE, Canvas
+from .marks import rings
 from .overlay import draw_world
 from .rulers import RULER, draw_rulers
 
@@ -42,7 +44,8 @@ def draw_view(
     plan: Plan | None = None,
     candidates: Sequence[Candidate] = (),
     region: Box | None = None,
-    drawn: Sequence[Point] = (),
+    drawn: TargetPrompt | None = None,
+    before: Outline | None = None,
 ) -> bytes:
     """The photograph with rulers along its right and lower edge, as a JPEG file.
 
@@ -51,7 +54,8 @@ def draw_view(
         plan: its robots are drawn.
         candidates: outlined and numbered, 3 for c3.
         region: x0, y0, x1, y1, a part to look at closer, image pixels; the rulers go with it.
-        drawn: vertices (x, y) of an outline somebody drew, which is dashed; none for none.
+        drawn: an outline somebody drew, dashed, and the points that correct it.
+        before: an outline as it was before they did, in grey dashes.
 
     Raises:
         ToolError: the plan names a target that the world does not have.
@@ -62,9 +66,16 @@ def draw_view(
         picture, origin = _part(picture, region)
         long = CLOSER
     canvas = Canvas(picture, long, 1.0, (0, 0, RULER[2], RULER[3]), origin)
-    if drawn:
-        canvas.dashes([np.asarray([*drawn, drawn[0]], dtype=float)], WHITE, 1.0)
+    if before is not None:
+        canvas.dashes(rings(before.polygon), MUTED, 1.0)
+    if drawn is not None and drawn.outline is not None:
+        canvas.dashes([np.asarray([*drawn.outline, drawn.outline[0]], dtype=float)], WHITE, 1.0)
     draw_world(canvas, world, plan, candidates)
+    if drawn is not None:
+        for point in drawn.points or ():
+            canvas.disc(np.asarray(point), 3.0, CERTIFIED, 1.0)
+        for point in drawn.negative:
+            canvas.cross(np.asarray(point), 5.0, FINDING, 2.0)
     draw_rulers(canvas)
     file = BytesIO()
     canvas.finish().save(file, "JPEG", quality=QUALITY, subsampling=0)

@@ -1,9 +1,12 @@
 """Measures the outline of what a prompt points at, with its confidence, by any segmenter."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
+from shapely.geometry import MultiPoint
+from shapely.geometry.base import BaseGeometry
 
 from ..errors import ToolError
 from ..geometry.outline import Outline, distances
@@ -16,8 +19,14 @@ from .segmenters.grabcut_segmenter import visible_vertices
 from .segmenters.protocol import PromptKind, Segmenter
 from .target_prompt import Point, TargetPrompt
 
-MISSED = 0.06
-"""Rough outlines are off by up to this share of the thing's size."""
+FEW_PX, FEW_SHARE = 4.0, 0.03
+"""Differences from an outline drawn are named beyond so many px, or this share of its size."""
+MOST_NAMED = 3
+"""Parts named of each kind."""
+
+
+Deviation = tuple[float, float, float]
+"""A point x, y, and by how much it lies off an outline, px."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +72,35 @@ def measure_outline(
     return Measured(outline, mask.confidence, mask.parts)
 
 
-def missed_vertices(outline: Outline, prompt: TargetPrompt) -> tuple[Point, ...]:
-    """Vertices drawn that what was measured leaves out by more than a rough outline is off."""
-    drawn = np.asarray(prompt.outline or (), dtype=float).reshape(-1, 2)
-    away = distances(outline.filled, drawn) > MISSED * outline.size
-    return tuple((float(x), float(y)) for x, y in drawn[away])
+def unlike_drawn(
+    outline: Outline, prompt: TargetPrompt, width: int, height: int
+) -> tuple[tuple[Deviation, ...], tuple[Deviation, ...]]:
+    """Where what was measured differs from the outline drawn, in a picture of width x height px.
+
+    Returns:
+        What was drawn and is left out, and what was not drawn and is there, the farthest first;
+        parts that points were given for are meant so. None without an outline drawn.
+    """
+    if prompt.outline is None:
+        return (), ()
+    drawn = shapely.Polygon(prompt.outline) & shapely.box(0, 0, width - 1, height - 1)
+    few = max(FEW_PX, FEW_SHARE * outline.size)
+    missed = _parts_off(drawn, outline.filled, few, prompt.negative)
+    return missed, _parts_off(outline.filled, drawn, few, prompt.points or ())
+
+
+def _parts_off(
+    region: BaseGeometry, other: BaseGeometry, few: float, meant: Sequence[Point]
+) -> tuple[Deviation, ...]:
+    """The farthest point of each part of a region that lies off another by more than a few px."""
+    found: list[Deviation] = []
+    for part in shapely.get_parts(region - other.buffer(few)):
+        corners = shapely.get_coordinates(part)
+        if len(corners) and not part.buffer(few).intersects(MultiPoint(meant)):
+            away = distances(other, corners)
+            k = int(np.argmax(away))
+            found.append((float(corners[k, 0]), float(corners[k, 1]), float(away[k])))
+    return tuple(sorted(found, key=lambda d: -d[2])[:MOST_NAMED])
 
 
 def _prompt_kinds(prompt: TargetPrompt, segmenter: Segmenter) -> set[PromptKind]:

@@ -196,7 +196,8 @@ def test_where_a_distance_is_named_the_outline_is_seen_first(begin: Begin, tmp_p
     held = work.call("deploy", tell="They stand.")
     assert held.message is None
     assert "t1 has an edge that a named distance is measured from" in held.data["why"]
-    assert f"within about 3 px, deploy plan_id {made.data['plan_id']}" in held.data["why"]
+    call = f'call deploy {{"plan_id": "{made.data["plan_id"]}", "tell": "..."}}.'
+    assert f"within about 3 px, {call}" in held.data["why"]
     assert held.data["why"] == f"Look first: {made.data['look_first']}"
     assert work.world.arrivals == {}
     again = begin(world=stored(work.world, tmp_path))
@@ -230,6 +231,23 @@ def test_words_for_the_person_end_the_turn_where_nothing_is_to_move(begin: Begin
     unseen = propose(begin(may_deploy=False, clearance=9), tell="Done.")
     assert unseen.data["certified"]
     assert unseen.message is None
+    assert "deploy" not in unseen.data["look_first"]
+    assert "within about 3 px, reply with `tell` as text" in unseen.data["look_first"]
+
+
+def test_a_small_thing_is_shown_whatever_comes_of_the_proposal(tool_calls: Begin) -> None:
+    pixels = np.full((300, 400, 3), 90, np.uint8)
+    pixels[140:170, 100:200] = (200, 40, 40)
+    work = tool_calls(picture_from_array(pixels))
+    thing = {"id": "t1", "box": [95, 135, 205, 175]}
+    placed = propose(work, targets=[thing])
+    assert (placed.data["certified"], len(placed.images)) == (True, 1)
+    assert "look_first" not in placed.data
+    assert propose(work, robots=5, targets=[]).images == ()
+    with pytest.raises(ToolError) as refused:
+        propose(work, "inside", 5000, targets=[thing])
+    assert len(refused.value.images) == 1
+    assert len(work.call("segment", **thing).images) == 1
 
 
 def test_a_distance_the_person_fixed_has_the_outline_shown_first_too(begin: Begin) -> None:
@@ -253,7 +271,10 @@ def test_points_alone_correct_an_outline_that_was_drawn(begin: Begin, tmp_path: 
     assert "points" in first.data["look_first"]
     mended = propose(work, targets=[{"id": "t1", "points": [[140, 65]]}])
     assert mended.data["targets"][0]["label"] == "the box"
-    assert "leaves_out_your_vertices" not in mended.data["targets"][0]
+    assert "leaves_out_of_yours" not in mended.data["targets"][0]
+    assert mended.data["corrected"]["t1"]["added_px"] > 50
+    assert mended.data["corrected"]["t1"]["removed_px"] == 0
+    assert len(mended.images) == 1
     at_once = propose(begin(), targets=[MENDED])
     assert mended.data["targets"] == at_once.data["targets"]
     cut = propose(work, targets=[{"id": "t1", "negative": [[130, 65]]}])
@@ -267,10 +288,12 @@ def test_what_was_drawn_and_is_left_out_holds_a_deployment_back(begin: Begin) ->
     work = begin()
     outlined = {"id": "t1", "outline": DRAWN}
     made = propose(work, targets=[outlined])
-    assert made.data["targets"][0]["leaves_out_your_vertices"] == ((150.0, 65.0),)
+    (left,) = made.data["targets"][0]["leaves_out_of_yours"]
+    assert (left["x"], left["y"]) == (150, 65)
+    assert left["px"] == pytest.approx(16, abs=2)
     assert len(made.images) == 1
     assert "t1 as measured leaves out your (150, 65) by 1" in work.call("deploy").data["why"]
     assert work.call("deploy", plan_id=made.data["plan_id"]).data["arrived"]
     clear = propose(begin(), targets=[outlined | {"outline": DRAWN[:3] + DRAWN[4:]}])
-    assert "leaves_out_your_vertices" not in clear.data["targets"][0]
+    assert "leaves_out_of_yours" not in clear.data["targets"][0]
     assert clear.images == ()

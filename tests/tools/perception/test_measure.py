@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formup.tools.errors import InputError, ToolError
+from formup.tools.geometry.outline import outline_of
 from formup.tools.perception.detectors.registry import DETECTORS, detector_named
 from formup.tools.perception.image import Picture, picture_from_array
-from formup.tools.perception.measure import measure_outline, missed_vertices
+from formup.tools.perception.measure import measure_outline, unlike_drawn
 from formup.tools.perception.segmenters.registry import SEGMENTERS, segmenter_named
 from formup.tools.perception.target_prompt import TargetPrompt
 from PIL import Image
-from shapely.geometry import box
+from shapely.geometry import Point, box
 
 BOX = (60.0, 40.0, 139.0, 99.0)
 
@@ -117,5 +118,38 @@ def test_vertices_that_the_measured_outline_leaves_out_are_named(lamp: Picture) 
     drawn = ((60, 40), (139, 40), (200, 120), (139, 99), (60, 99))
     prompt = TargetPrompt(outline=drawn)
     found = measure_outline(lamp, prompt, segmenter_named("grabcut"))
-    assert missed_vertices(found.outline, prompt) == ((200.0, 120.0),)
-    assert missed_vertices(found.outline, TargetPrompt(box=BOX)) == ()
+    ((x, y, px),), added = unlike_drawn(found.outline, prompt, *lamp.size)
+    assert (x, y, added) == (200.0, 120.0, ())
+    assert px == pytest.approx(found.outline.filled.distance(Point(200, 120)))
+    assert px > 10
+    assert unlike_drawn(found.outline, TargetPrompt(box=BOX), *lamp.size) == ((), ())
+
+
+@pytest.mark.parametrize(
+    ("drawn", "added"),
+    [
+        ((60, 40, 100, 99), [(139, 39)]),  # half of it
+        ((60, 40, 132, 99), [(139, 7)]),  # a fringe
+        ((60, 40, 136, 99), []),  # as exactly as anybody draws
+        ((-50, 40, 139, 99), []),  # what lies outside of the picture cannot be measured
+    ],
+)
+def test_what_was_measured_beyond_the_outline_drawn_is_named(
+    lamp: Picture, drawn: tuple[float, ...], added: list[tuple[float, float]]
+) -> None:
+    found = unlike_drawn(outline_of(box(*BOX)), TargetPrompt(outline=corners(drawn)), *lamp.size)
+    assert [(x, round(px)) for x, _, px in found[1]] == added
+
+
+def test_parts_that_points_were_given_for_are_meant_so(lamp: Picture) -> None:
+    wide, narrow = corners((60, 40, 200, 99)), corners((60, 40, 100, 99))
+    measured = outline_of(box(*BOX))
+    off = TargetPrompt(outline=wide, negative=((180, 70),))
+    on = TargetPrompt(outline=narrow, points=((120, 70),))
+    assert unlike_drawn(measured, off, *lamp.size) == ((), ())
+    assert unlike_drawn(measured, on, *lamp.size) == ((), ())
+
+
+def corners(x0y0x1y1: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
+    x0, y0, x1, y1 = x0y0x1y1
+    return (x0, y0), (x1, y0), (x1, y1), (x0, y1)
