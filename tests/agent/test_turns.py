@@ -56,6 +56,17 @@ def deciding(request: Request) -> Reply:
     return Reply(text=f"Turn {number} is done.")
 
 
+def test_a_plan_that_is_only_shown_takes_one_reply(picture: Picture) -> None:
+    arguments = proposal("t1", RED) | {"tell": "Six would stand around it."}
+    model = ScriptedModel([Reply(calls=(call("p", "propose_formation", **arguments),))])
+    settings = Settings(robots=6, may_deploy=False)
+    run = Agent(model).run(picture, FIRST, settings=settings)
+    assert (run.report.status, run.report.message) == ("planned", "Six would stand around it.")
+    assert run.report.usage.requests == 1
+    again = Agent(FunctionModel(deciding)).say(run, SECOND, settings=Settings(robots=6))
+    assert again.report.status == "deployed"
+
+
 def agent(**more: Any) -> Agent:
     return Agent(FunctionModel(deciding), **more)
 

@@ -125,8 +125,8 @@ def _threshold(context: Context, how: str) -> float:
 
 ADVICE = {
     "point": "Draw a box close around the thing, or better a rough outline.",
-    "candidate": "Draw a rough outline of 4 to 12 vertices around the thing.",
-    "box": "Draw a rough outline of 4 to 12 vertices around the thing.",
+    "candidate": "Draw a rough outline around the thing.",
+    "box": "Draw a rough outline around the thing.",
     "outline": "Draw the outline closer, or name points that do not belong; if what was found "
     "looks right, the person may allow a lower threshold.",
 }
@@ -168,7 +168,7 @@ def corrections(before: World, world: World, prompts: Iterable[TargetPrompt]) ->
     return {"corrected": changed, "shown": SHOWN} if changed else {}
 
 
-SHOWN = "grey dashes: before; discs and crosses: your points on it and off it"
+SHOWN = "blue dashes: before; discs and crosses: your points on it and off it"
 
 
 def closer_views(

@@ -17,7 +17,7 @@ from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
 from ..perception.target_prompt import Box, TargetPrompt
 from ..world import World
-from .canvas import CERTIFIED, FINDING, MUTED, WHITE, Canvas
+from .canvas import ALLOWED, CERTIFIED, FINDING, WHITE, Canvas
 from .marks import rings
 from .overlay import draw_world
 from .rulers import RULER, draw_rulers
@@ -55,7 +55,7 @@ def draw_view(
         candidates: outlined and numbered, 3 for c3.
         region: x0, y0, x1, y1, a part to look at closer, image pixels; the rulers go with it.
         drawn: an outline somebody drew, dashed, and the points that correct it.
-        before: an outline as it was before they did, in grey dashes.
+        before: an outline as it was before they did, in blue dashes.
 
     Raises:
         ToolError: the plan names a target that the world does not have.
@@ -67,13 +67,13 @@ def draw_view(
         long = CLOSER
     canvas = Canvas(picture, long, 1.0, (0, 0, RULER[2], RULER[3]), origin)
     if before is not None:
-        canvas.dashes(rings(before.polygon), MUTED, 1.0)
+        canvas.dashes(rings(before.polygon), ALLOWED, 1.0)
     if drawn is not None and drawn.outline is not None:
         canvas.dashes([np.asarray([*drawn.outline, drawn.outline[0]], dtype=float)], WHITE, 1.0)
     draw_world(canvas, world, plan, candidates)
     if drawn is not None:
         for point in drawn.points or ():
-            canvas.disc(np.asarray(point), 3.0, CERTIFIED, 1.0)
+            canvas.disc(np.asarray(point), 5.0, CERTIFIED, 1.0)
         for point in drawn.negative:
             canvas.cross(np.asarray(point), 5.0, FINDING, 2.0)
     draw_rulers(canvas)

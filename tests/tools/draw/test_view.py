@@ -11,6 +11,7 @@ from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import make_plan
 from formup.tools.geometry.outline import make_outline
 from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.target_prompt import TargetPrompt
 from formup.tools.world import Target, World
 from numpy.typing import NDArray
 from PIL import Image
@@ -127,6 +128,24 @@ def test_targets_and_robots_are_drawn_where_they_are() -> None:
     for x, y in plan.formation.points.round().astype(int):
         assert changed[y - 3 : y + 4, x - 3 : x + 4].all()
     assert not changed[300:395, 300:500].any()
+
+
+def test_an_outline_drawn_its_points_and_what_it_was_before_are_drawn() -> None:
+    picture, world = bare(400, 300), World.of(bare(400, 300), targets=(box(),))
+    region = (90, 90, 210, 210)
+    corners = ((110, 110), (190, 110), (190, 190), (110, 190))
+    drawn = TargetPrompt(outline=corners, points=((130, 150),), negative=((170, 150),))
+    before = make_outline([(120, 120), (180, 120), (180, 180), (120, 180)])
+    plain = shown(draw_view(picture, world, region=region))
+    view = shown(draw_view(picture, world, region=region, drawn=drawn, before=before))
+    changed = np.abs(view - plain).max(axis=2) > 60
+    scale = 768 / 120
+    for x, y, reach in ((150, 110, 12), (150, 120, 12), (130, 150, 2), (170, 150, 2)):
+        u, v = ((np.array([x, y]) - 90 + 0.5) * scale).astype(int)
+        r = round(reach * scale / 2)
+        assert changed[v - r : v + r, u - r : u + r].any(), (x, y)
+    u, v = ((np.array([150, 150]) - 90) * scale).astype(int)
+    assert not changed[v - 20 : v + 20, u - 20 : u + 20].any()
 
 
 def test_a_plan_about_a_target_that_is_gone_is_refused() -> None:
