@@ -35,7 +35,8 @@ class Fields:
         """Carry a demand over into the reading; False where it cannot be."""
         if demand.sets in LENGTHS or demand.sets in ("robot_radius", "robot_diameter"):
             return self._length(demand)
-        return bool(getattr(self, f"_{demand.sets}", lambda _: False)(demand))
+        rule = getattr(self, f"_{demand.sets}", None)
+        return rule is not None and bool(rule(demand))
 
     def _set(self, name: str, value: Any) -> bool:
         """Set a field, unless the words said something else of it before."""

@@ -87,14 +87,14 @@ def _groups(
             outer["clearance"] = [2 * d for d in basics["clearance"]]
         less = robots * 2 // 5 or 1
         pair = zip((basics, outer), (less, robots - less), strict=True)
-        return [_group(reading, g | {"robots": n}) for g, n in pair]
+        return [_related(reading, g | {"robots": n}) for g, n in pair]
     if relation == "shape":
         drawn = _drawn(reading, basics, attempt)
         return [basics | {"relation": "shape", "robots": robots} | drawn]
-    return [_group(reading, basics | {"robots": robots})]
+    return [_related(reading, basics | {"robots": robots})]
 
 
-def _group(reading: Reading, basics: dict[str, Any]) -> dict[str, Any]:
+def _related(reading: Reading, basics: dict[str, Any]) -> dict[str, Any]:
     group = basics | {"relation": reading.relation}
     if reading.relation == "along" and not {"side", "facing"} & set(group):
         group["side"] = "long"

@@ -7,7 +7,7 @@ It is no language model: n-grams and weights in tagging.npz, made by `make wordi
 
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -119,7 +119,10 @@ class LinearModel:
         likely = marginal.copy()
         likely[marginal[:, DEMAND] < SURE_DEMAND, DEMAND] = 0
         best = likely.argmax(axis=1)
-        return tuple(LABELS[k] for k in best), tuple(marginal[range(len(best)), best].tolist())
+        chosen: list[int] = best.tolist()
+        return tuple(LABELS[k] for k in chosen), tuple(
+            marginal[range(len(chosen)), chosen].tolist()
+        )
 
     def meaning(self, words: Sequence[str], labels: Sequence[str]) -> dict[str, float]:
         """Probabilities of MEANINGS."""
@@ -145,7 +148,7 @@ _lent: ContextVar[LinearModel | None] = ContextVar("lent", default=None)
 
 
 @contextmanager
-def lent(model: LinearModel) -> Iterator[None]:
+def lent(model: LinearModel) -> Generator[None]:
     """Read with another model than the shipped one, to judge it."""
     token = _lent.set(model)
     try:

@@ -1,7 +1,7 @@
 """Train the model that reads instructions, and judge it leaving one author out at a time."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,7 @@ def train(sentences: Sequence[Sentence]) -> LinearModel:
     return LinearModel(emission, transition, command)
 
 
-def _rows(features: Sequence[Sequence[int]], buckets: int) -> csr_matrix:
+def _feature_rows(features: Sequence[Sequence[int]], buckets: int) -> csr_matrix:
     """(N, buckets) counts of features."""
     ends = np.cumsum([0, *(len(f) for f in features)])
     columns = np.concatenate([np.asarray(f) for f in features])
@@ -46,7 +46,7 @@ def _rows(features: Sequence[Sequence[int]], buckets: int) -> csr_matrix:
 
 
 def _train_meanings(sentences: Sequence[Sentence]) -> Floats:
-    rows = _rows(
+    rows = _feature_rows(
         [meaning_features([w.text for w in s.words], s.labels) for s in sentences], MEANING_BUCKETS
     )
     truth = np.eye(len(MEANINGS))[[MEANINGS.index(s.meaning) for s in sentences]]
@@ -65,7 +65,7 @@ def _train_meanings(sentences: Sequence[Sentence]) -> Floats:
 def _train_tags(sentences: Sequence[Sentence]) -> tuple[Floats, Floats]:
     """Emission and transition weights of the conditional random field."""
     lines = [[w.text for w in s.words] for s in sentences]
-    rows = _rows([row for line in lines for row in tag_features(line)], TAG_BUCKETS)
+    rows = _feature_rows([row for line in lines for row in tag_features(line)], TAG_BUCKETS)
     lengths = np.array([len(line) for line in lines])
     truth = np.array([LABELS.index(label) for s in sentences for label in s.labels])
     states = len(LABELS)
@@ -117,9 +117,9 @@ def _expectations(
     return float(norm.sum()), marginal, joint
 
 
-def _minimum(loss: object, size: int) -> Floats:
+def _minimum(loss: Callable[[Floats], tuple[float, Floats]], size: int) -> Floats:
     found = minimize(loss, np.zeros(size), jac=True, method="L-BFGS-B", options={"maxiter": STEPS})
-    return found.x
+    return np.asarray(found.x)
 
 
 def known_words(sentences: Sequence[Sentence]) -> dict[str, frozenset[str]]:
