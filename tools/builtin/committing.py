@@ -51,7 +51,7 @@ async def propose_formation(
     samples: Annotated[tuple[str, ...] | None, FilledBy("sample_inside")] = None,
     tell: str | None = None,
 ) -> ToolResult:
-    """State what the instruction demands; robots are placed so, and certified or not, with numbers.
+    """State what the instruction demands; robots are placed so and certified.
 
     Args:
         contract: its robots add up to Robots, or the words' number. unit: of lengths, where
@@ -104,7 +104,7 @@ def _proposed(
     if certified and (advice := _to_see(now, node)):
         data |= {"look_first": advice}
     elif certified and not context.settings.may_deploy:
-        message = tell
+        message = tell or None
     shown = closer_views(now, context.world, targets, node.plan, node.unseen)
     return ToolResult(data, shown, world=world, message=message)
 

@@ -20,6 +20,7 @@ MISSED = 0.06
 """Rough outlines are off by up to this share of the thing's size."""
 SMALL = 40.0
 """Things whose shorter side is less, px of the picture or of its view, are shown closer."""
+SHOWN = "blue dashes: before; discs and crosses: your points on it and off it"
 AROUND = 0.3
 """What is shown of the surroundings of such a thing, as a share of its longer side."""
 
@@ -166,9 +167,6 @@ def corrections(before: World, world: World, prompts: Iterable[TargetPrompt]) ->
         for name, (then, now) in pairs.items()
     }
     return {"corrected": changed, "shown": SHOWN} if changed else {}
-
-
-SHOWN = "blue dashes: before; discs and crosses: your points on it and off it"
 
 
 def closer_views(
