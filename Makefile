@@ -7,7 +7,7 @@ PEERS := pydantic_ai openai_agents langgraph smolagents
 ROUNDS ?= 80
 SERVERS := transformers litellm ray
 
-.PHONY: demo test test-servers check bench bench-evals bench-loop clean
+.PHONY: wordings demo test test-servers check bench bench-evals bench-loop clean
 
 demo: .venv/.ready
 	@$(BIN)/formup run $(PHOTOS)/cars_two.jpg "Surround the red car at the corners" -n 4 \
@@ -41,6 +41,10 @@ check: .venv/.ready-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest -q tests/test_architecture.py
+
+# Train the model that reads instructions, and judge it leaving one author out at a time.
+wordings: .venv/.ready-dev
+	$(BIN)/python -m formup.evals.wordings
 
 # The tools, placing and checking, who takes which place, cages: each beside the bare library calls.
 bench: .venv/.ready-dev
