@@ -74,14 +74,22 @@ class _Reader:
         for demand in self.demands:
             if not self.fields.apply(demand):
                 self.reading.unread.append(self._quote(demand.first, demand.last))
+            elif demand.sets not in ("keep_out", "faced"):  # what it names is the target
+                self.fields.mentioned += range(demand.first, demand.last)
             self.taken[demand.first : demand.last] = [True] * (demand.last - demand.first)
-        if self.reading.robots is None and len(self.fields.corners) == 1:
-            self.reading.robots = self.fields.corners[0]
+        self._count_corners()
         self._refer()
         self.reading.place = self._place()
         self._count_alone()
         self._account()
         return self.reading
+
+    def _count_corners(self) -> None:
+        """As many robots as the words name corners, where they name no robots."""
+        named = self.fields.corners
+        if self.reading.robots is None and len(named) == 1:
+            self.reading.robots = named[0]
+        self.reading.unread += [f"{n} corners" for n in named if n not in (4, self.reading.robots)]
 
     def _scenery(self) -> list[bool]:
         """For each item whether its sentence only sets the scene, beside one that commands."""

@@ -7,12 +7,16 @@ from .demands import Demand, Item
 from .drawn_forms import Form
 from .lexicon import fillers
 from .reading import Reading
-from .tagging import tokens
+from .tagging import tokens, word_classes
 
 FARTHEST = 100_000
 """Stands for no upper bound of a clearance, px."""
 OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
 OPENS = {side: side for side in ("left", "right", "up", "down")} | {"top": "up", "bottom": "down"}
+COUNTING = frozenset(
+    ("of", "in", "with", "using", "by", "use", "total", "altogether", "strong", "number")
+)
+"""Words about a number of robots that say nothing of their kind."""
 DEGREES = {"right": 0, "bottom": 90, "down": 90, "left": 180, "top": 270, "up": 270}
 LEAST_BARE = 5
 """Numbers without a unit below this, px, are hardly lengths."""
@@ -57,7 +61,10 @@ class Fields:
         if not (bare or quantity.is_length):
             return False
         low, high = (quantity.least, quantity.most) if bare else quantity.px(self.scale) or (0, 0)
-        if self._other(demand) is not None or (low <= 0 and demand.sets != "clearance"):
+        among = [i for i in self.items if i.symbol == "<t>"]
+        if len(among) > 1 and self._other(demand) is not None:
+            return False
+        if low <= 0 and demand.sets != "clearance":
             return False
         if demand.sets == "clearance":
             return relation not in ("between", "centre") and self._clearance(demand, low, high)
@@ -190,7 +197,24 @@ class Fields:
         if number.whole is None:
             self.reading.odd_count = self._quote(demand.first, demand.last)
             return True
+        self._note_kind(demand)
         return self._robots_are(number.whole)
+
+    def _note_kind(self, demand: Demand) -> None:
+        """Words for the kind of robot, which change nothing: "24 small yellow robots"."""
+        named = range(demand.first, demand.last)
+        symbols = [self.items[k].symbol for k in named]
+        kinds = word_classes(symbols)
+        kept = [
+            k
+            for k, symbol, classes in zip(named, symbols, kinds, strict=True)
+            if symbol[0].isalpha()
+            and symbol not in fillers()
+            and not {"robot", "rest"} & {*classes}
+        ]
+        kept = [k for k in kept if self.items[k].symbol not in COUNTING]
+        if kept:
+            self.reading.background.append(self._quote(kept[0], kept[-1] + 1))
 
     def _robots_are(self, count: int) -> bool:
         if self.reading.robots not in (None, count):
@@ -205,13 +229,9 @@ class Fields:
         return self.reading.relation in ("around", "cage")
 
     def _all_of(self, demand: Demand) -> bool:
-        if self.reading.relation != "inside":
-            return False
-        self.mentioned += range(demand.first, demand.last)
-        return True
+        return self.reading.relation == "inside"
 
     def _two_things(self, demand: Demand) -> bool:
-        self.mentioned += range(demand.first, demand.last)
         return self.reading.relation == "between"
 
     def _abreast(self, demand: Demand) -> bool:

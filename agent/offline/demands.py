@@ -19,6 +19,8 @@ from .tagging import Tagging, Token, word_classes
 SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
 ALWAYS = ("a negation", "a cancellation", "something past")
 """Kinds of stops that also count in words that look like background beside an order."""
+OPENING_CONDITIONS = ("unless", "until", "if", "once", "as", "provided")
+"""First words of a sentence that makes all of them conditional."""
 WRAPPED = re.compile(r"\s*\|\s*")
 SENTENCE_ENDS = (".", "!", "?", ";")
 
@@ -132,7 +134,8 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
             for match in pattern.finditer(line.text):
                 first, last = line.items_of(match)
                 meant = any(i.label != "background" for i in sentence[first:last])
-                stops = meant or (kind in ALWAYS and not scenic)
+                opens = first == 0 and sentence[0].symbol in OPENING_CONDITIONS
+                stops = meant or opens or (kind in ALWAYS and not scenic)
                 if stops and (kind != "a question" or asked_only):
                     found.append((kind, sentence[first].start, sentence[last - 1].end))
     return tuple(found)

@@ -26,7 +26,9 @@ UNIT = re.compile(
     r"(?![\w\u00b2\u00b3]|\s*(?:/|per\b))",
     re.IGNORECASE,
 )
-ONE = re.compile(r"\ban?\s+(?=(?:met(?:re|er)|yard|foot|inch|cent|pixel)\w*\b)", re.IGNORECASE)
+ONE = re.compile(
+    r"\ban?\s+(?=(?:(?:centi|deci|milli|kilo)?met(?:re|er)|yard|foot|inch|pixel)\b)", re.IGNORECASE
+)
 SPLIT = re.compile(
     r"\b([0-9]+)\s?m\s?([0-9]{2})\b(?!\s*(?:px|pixels?|c?m|%|robots?)\b)", re.IGNORECASE
 )
