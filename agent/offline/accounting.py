@@ -9,15 +9,17 @@ from collections.abc import Iterator, Sequence
 from .demand_fields import Fields
 from .demands import Item, demands_in, items_of, says_more, sentences, stops_in
 from .drawn_forms import form_in
-from .lexicon import NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
+from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
 from .reading import Reading
 from .tagging import tag, tokens, word_classes
 
 SURE_BACKGROUND = 0.5
-SCENIC, WEIGHTY_SCENIC = 0.4, 0.6
+SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 """Share of a sentence's words that are no command from which on all of it is background."""
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
 """What a reason or purpose begins with."""
+VAGUE = {"nobody", "area"}
+"""Classes with words of every day: a sentence that has no others says no arrangement."""
 ASKED_CLASSES = frozenset(("gap", "avoid", "far", "near", "side", "face", "each", "motion"))
 """A reason in which a word of these classes stands may be a demand."""
 PLACES = {
@@ -97,14 +99,17 @@ class _Reader:
         scenic: list[bool] = []
         for sentence in sentences(self.items):
             place = range(len(scenic), len(scenic) + len(sentence))
-            numbered = list(zip(place, sentence, strict=True))
             words = [i for i in sentence if i.symbol[0].isalnum() or i.symbol == "<t>"]
             aside = [i for i in words if i.label in ("background", "thing")]
-            share = SCENIC
-            if any(i.symbol in WEIGHTY or "robot" in self.classes[k] for k, i in numbered):
-                share = WEIGHTY_SCENIC
+            says = {*CLASSES_OF.get(self.reading.relation, ()), "place", "robot"} - VAGUE
+            weighty = any(i.symbol in WEIGHTY for i in sentence)
+            share = WEIGHTY_SCENIC if weighty else SCENIC
+            if not weighty and not any(self.classes[k] & says for k in place):
+                share = 0.0
             if demanded & {*place} or any(i.quantity for i in sentence):
                 share = 1.0
+            if sentence[-1].symbol == "?" and not any("robot" in self.classes[k] for k in place):
+                share = 0.0
             scenic += [bool(words) and len(aside) >= share * len(words)] * len(sentence)
         return scenic if not all(scenic) else [False] * len(self.items)
 
@@ -203,7 +208,7 @@ class _Reader:
     def _gives_reason(self, first: int, last: int) -> bool:
         """Whether a stretch of words is a reason or purpose that demands nothing more."""
         words = self.items[first:last]
-        if any(i.quantity or i.label == "demand" for i in words):
+        if any(i.quantity for i in words):
             return False
         caged = self.reading.relation == "cage"
         weighty = [i for i in words if i.symbol in WEIGHTY]

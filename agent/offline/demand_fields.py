@@ -237,6 +237,9 @@ class Fields:
     def _abreast(self, demand: Demand) -> bool:
         return self.reading.relation in ("along", "between")
 
+    def _atop(self, demand: Demand) -> bool:
+        return self.reading.relation in ("inside", "centre", "shape")
+
     def _adverb(self, demand: Demand) -> bool:
         return True
 

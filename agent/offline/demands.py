@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from ...tools.formation.quantities import Quantity, quantities_in
-from .tagging import Tagging, Token, word_classes
+from .tagging import Tagging, Token
 
 SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
 ALWAYS = ("a negation", "a cancellation", "something past")
@@ -92,7 +92,7 @@ def _is_plain(quantity: Quantity, words: Sequence[Token], labels: dict[int, str]
     """Whether it is no part of a phrase for a thing, and no "one" that stands for a noun."""
     inside = [labels[w.start] for w in words if quantity.start <= w.start < quantity.end]
     following = [w.text for w in words if w.start >= quantity.end][:3]
-    if "thing" in inside and not any("robot" in c for c in word_classes(following)):
+    if "thing" in inside and not any(_robots().fullmatch(word) for word in following):
         return False
     if quantity.wording.lower() != "one":
         return True
@@ -136,7 +136,9 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
                 meant = any(i.label != "background" for i in sentence[first:last])
                 opens = first == 0 and sentence[0].symbol in OPENING_CONDITIONS
                 stops = meant or opens or (kind in ALWAYS and not scenic)
-                if stops and (kind != "a question" or asked_only):
+                stops = stops and (kind != "a question" or asked_only)
+                orders = len(parts) == 1 or any(i.quantity for i in sentence)
+                if stops and (kind != "something past" or orders):
                     found.append((kind, sentence[first].start, sentence[last - 1].end))
     return tuple(found)
 
@@ -229,6 +231,11 @@ def _side(word: str) -> str:
 def _table() -> dict[str, Any]:
     text = resources.files(__package__ or "").joinpath("demands.yaml").read_text("utf-8")
     return yaml.safe_load(text)
+
+
+@cache
+def _robots() -> re.Pattern[str]:
+    return re.compile(re.sub(WRAPPED, "|", _table()["words"]["ROBOT"]))
 
 
 @cache
