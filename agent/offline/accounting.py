@@ -108,7 +108,8 @@ class _Reader:
                 share = 0.0
             if demanded & {*place} or any(i.quantity for i in sentence):
                 share = 1.0
-            if sentence[-1].symbol == "?" and not any("robot" in self.classes[k] for k in place):
+            ordered = any(d.sets == "robots" and d.first in place for d in self.demands)
+            if sentence[-1].symbol == "?" and not ordered:
                 share = 0.0
             scenic += [bool(words) and len(aside) >= share * len(words)] * len(sentence)
         return scenic if not all(scenic) else [False] * len(self.items)
