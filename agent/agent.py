@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from ..prompts import PromptLibrary
 from ..tools.builtin import TOOLS
+from ..tools.builtin.others import with_keep_outs
 from ..tools.context import Context, Settings
 from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture
@@ -40,6 +41,7 @@ class SayOptions(TypedDict, total=False):
     """What may be given with words; see `Agent.asay`."""
 
     pointed: Sequence[TargetPrompt]
+    keep_out: Sequence[TargetPrompt]
     settings: Settings | None
     show: Show | None
 
@@ -125,6 +127,7 @@ class Agent:
         *,
         pointed: Sequence[TargetPrompt] = (),
         targets: Sequence[Target] = (),
+        keep_out: Sequence[TargetPrompt] = (),
         settings: Settings | None = None,
         trace: Path | None = None,
         show: Show | None = None,
@@ -136,6 +139,8 @@ class Agent:
             instruction: what, in the person's words.
             pointed: the things meant, if the person points.
             targets: the things meant, where they are measured already.
+            keep_out: what no robot may stand on or drive over: boxes and outlines as they are
+                drawn, things at points, candidates.
             settings: what the person fixed.
             trace: a file to write the session to as it goes: it can be resumed and replayed from
                 it, by default in another process.
@@ -146,6 +151,7 @@ class Agent:
         """
         context = Context.of(picture, settings, World.of(picture, targets=tuple(targets)))
         check_turn(context, instruction, pointed)
+        context = context.at(with_keep_outs(context, keep_out))
         log = None
         if trace is not None:
             context.services.artefacts = FolderArtefacts(trace.parent / PICTURES)
@@ -168,6 +174,7 @@ class Agent:
         words: str,
         *,
         pointed: Sequence[TargetPrompt] = (),
+        keep_out: Sequence[TargetPrompt] = (),
         settings: Settings | None = None,
         show: Show | None = None,
     ) -> Run:
@@ -177,6 +184,7 @@ class Agent:
             run: the session as it is; one that waits for an answer drops its question.
             words: what the person says.
             pointed: the things meant, if the person points.
+            keep_out: what no robot may enter from now on, beside what there was.
             settings: what the person fixes from now on; as before if left out, but for the number
                 of robots, their starts and approvals, which hold for one turn.
 
@@ -190,6 +198,7 @@ class Agent:
         context = replace(run.context, world=world, settings=fixed).check()
         pointed = numbered_anew(pointed, world)
         check_turn(context, words, pointed)
+        context = context.at(with_keep_outs(context, keep_out))
         messages = closed(run.outcome.messages, "No result: the person interrupted it, or went on.")
         with closing(_reopened(run, show)) as recorder:
             for message in messages[len(run.outcome.messages) :]:

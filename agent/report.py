@@ -10,11 +10,12 @@ from ..tools.context import Context
 from ..tools.fleet.deploy import Arrival
 from ..tools.formation.checking.verdict import Verdict
 from ..tools.formation.contract import Contract
+from ..tools.formation.encounters import notes_of
 from ..tools.formation.plan import Plan, Shortfall
 from ..tools.formation.units import in_metres, with_metres
 from ..tools.perception.referring.attributes import Candidate
 from ..tools.perception.target_prompt import Box
-from ..tools.world import Target, World, rounded_rings
+from ..tools.world import PlanNode, Target, World, rounded_rings
 from .messages import Call, History, Message, Reply, Result, failed_before, turn_of
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 
@@ -163,6 +164,8 @@ def make_report(
     arrival = arrivals.get(plan.id) if plan else None
     new = plan is not None and world.plans[plan.id] is not began.plans.get(plan.id)
     status, message = _status(outcome, plan, arrival, new=new)
+    if plan is not None and (new or arrival is not None):
+        message = _with_encounters(message, world.plans[plan.id])
     notes = context.picture.notes
     return Report(
         status=status,
@@ -253,6 +256,12 @@ def _with_arrival(outcome: Outcome, arrival: Arrival, text: str) -> str:
     if isinstance(outcome, Answered) or not arrival.arrived:
         return text
     return f"All robots had arrived. {text}"
+
+
+def _with_encounters(text: str, node: PlanNode) -> str:
+    """What is told, with the other things that robots meet where a model has not named them."""
+    said = notes_of(node.encounters)
+    return " ".join([text, *(note for note in said if note not in text)])
 
 
 def _last_words(outcome: Outcome) -> str:

@@ -21,6 +21,9 @@ from .perception.segmenters.registry import segmenter_named
 from .perception.target_prompt import Point
 from .world import World
 
+MOST_FOUND = 64
+"""Pictures whose candidates are remembered."""
+_FOUND: dict[tuple[str, str], tuple[Candidate, ...]] = {}
 Descriptor = Literal["edges", "edges+vertices", "matrix"]
 SAME_PLACE = 1.0
 """How far the box of a candidate may be from where it was shown, px."""
@@ -112,16 +115,15 @@ class Services:
         pictures: those of the conversation, by their hash.
         fleets: the robots in use, by the name of their fleet.
         artefacts: files that events and the world name by their hash.
-        found: what detectors found in pictures, by detector and picture.
+        found: what detectors found in pictures, by detector and picture; shared by all services
+            that are not given their own.
         stopped: fleets that were stopped when they were let go of.
     """
 
     pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
     fleets: dict[str, Fleet] = field(default_factory=dict[str, Fleet])
     artefacts: Artefacts = field(default_factory=MemoryArtefacts)
-    found: dict[tuple[str, str], tuple[Candidate, ...]] = field(
-        default_factory=dict[tuple[str, str], tuple[Candidate, ...]]
-    )
+    found: dict[tuple[str, str], tuple[Candidate, ...]] = field(default_factory=lambda: _FOUND)
 
     stopped: set[str] = field(default_factory=set[str])
 
@@ -205,7 +207,10 @@ class Context:
         """The things the detector finds in the picture; it is searched once."""
         key = self.settings.detector, self.world.picture.sha256
         if key not in self.services.found:
-            self.services.found[key] = detector_named(key[0]).detect(self.picture, None)
+            found = detector_named(key[0]).detect(self.picture, None)
+            for old in [*self.services.found][: 1 - MOST_FOUND]:
+                self.services.found.pop(old, None)
+            self.services.found[key] = found
         return self.services.found[key]
 
     def candidate(self, name: str) -> Candidate:

@@ -17,8 +17,10 @@ from .errors import InputError, ToolError
 from .fleet.deploy import Arrival
 from .fleet.protocol import Pose
 from .formation.contract import Contract
+from .formation.encounters import Encounter, others_than
 from .formation.placement.place import Site
 from .formation.plan import Plan, scene_version
+from .formation.site import Other
 from .formation.units import check_scale
 from .formation.value import Value
 from .geometry.outline import Outline, outline_of
@@ -111,14 +113,17 @@ class KeepOut(Value):
     """A region that robots stay off and drive around.
 
     Attributes:
-        reason: why, in a few words.
+        id: k1, k2, ... if it is hard, else that of a candidate.
+        reason: why, in a few words; of a candidate what it looks like.
         hard: whether a plan that enters it cannot be certified; else it is avoided where possible.
+        confidence: 0 to 1, that it is a thing.
     """
 
     id: str
     outline: OutlineField
     reason: str
     hard: bool = True
+    confidence: float = 1.0
 
 
 class ShownCandidate(Value):
@@ -136,12 +141,14 @@ class PlanNode(Value):
         parent: id of the plan it was made from by an edit.
         edit: the edit, in the terms of the tool that made it.
         unseen: targets whose outlines are to be looked at before robots move.
+        encounters: other things that robots stand on or drive over, as far as is known.
     """
 
     plan: Plan
     parent: str | None = None
     edit: str | None = None
     unseen: tuple[str, ...] = ()
+    encounters: tuple[Encounter, ...] = ()
 
 
 class World(Value):
@@ -258,13 +265,36 @@ class World(Value):
         return node
 
     def site(self, contract: Contract) -> Site:
-        """The outlines a contract refers to and the picture's size.
+        """The outlines a contract refers to, the picture's size, and what else is in it.
 
         Raises:
             ToolError: it names a target that is not there.
         """
-        outlines = {name: self.target(name).outline for name in contract.target_ids}
-        return Site(outlines, *self.picture.size, self.metres_per_pixel)
+        outlines = {name: self.outline(name) for name in contract.target_ids}
+        things = [Other(t.id, t.label, t.outline.filled) for t in self.targets]
+        things += [
+            Other(k.id, k.reason, k.outline.filled, k.confidence)
+            for k in self.keep_out
+            if not k.hard
+        ]
+        others = others_than(contract, outlines, things)
+        return Site(outlines, *self.picture.size, self.metres_per_pixel, others)
+
+    def outline(self, name: str) -> Outline:
+        """The outline of a target, or of a region that no robot may enter.
+
+        Raises:
+            ToolError: there is none.
+        """
+        hard = {k.id: k.outline for k in self.keep_out if k.hard}
+        return hard[name] if name in hard else self.target(name).outline
+
+    def met(self, plan_id: str) -> dict[str, Outline]:
+        """The other things that robots of a plan stand on or drive over, by their ids."""
+        node = self.plans.get(plan_id)
+        names = {e.thing for e in node.encounters} if node is not None else set[str]()
+        things = (*self.targets, *self.keep_out)
+        return {thing.id: thing.outline for thing in things if thing.id in names}
 
     def changes_since(self, before: "World | None") -> dict[str, Any]:
         """What differs from an earlier world, as JSON that `with_changes` reads.

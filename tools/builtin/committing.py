@@ -11,6 +11,7 @@ from ..errors import ToolError
 from ..fleet.deploy import Arrival
 from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
+from ..formation.placement.avoidance import off_others
 from ..formation.placement.caging import CUT_SHORT
 from ..formation.placement.partial import best_partial
 from ..formation.plan import Plan, make_plan
@@ -20,6 +21,7 @@ from ..geometry.cages.budget import cut_short, search_budget
 from ..perception.target_prompt import Point, TargetPrompt
 from ..tool import FilledBy, ToolResult, in_thread, tool
 from ..world import PlanNode, ShownCandidate, Target, World
+from .others import held_off, with_others
 from .robots import drive_to, with_robots
 from .seeing import sighting
 from .targets import (
@@ -66,10 +68,10 @@ async def propose_formation(
         raise ToolError("propose_formation: give positions or samples, not both.")
     stated = contract_in_pixels(contract, context.world.metres_per_pixel)
     _check_against_words(context, stated)
-    held = _held_to(stated, context.settings)
+    held = held_off(_held_to(stated, context.settings), context.world)
 
     def work() -> tuple[World, PlanNode | PlacementError, Plan | None]:
-        world = measured_all(context, targets)
+        world = with_others(context.at(measured_all(context, targets)))
         places = positions if samples is None else _sampled(world, samples)
         try:
             return world, *_planned(context.at(world), held, places)
@@ -147,8 +149,10 @@ def _planned(
                 raise ToolError(f"{error}{CUT_SHORT}", error.kind, **error.facts) from None
             if partial is None:
                 raise
-            return error, partial
+            return error, off_others(partial, site)
         partial = None
+        if places is None:
+            plan = off_others(plan, site)
         if places is None and not plan.verdict.certified:
             partial = best_partial(held, site, world.version, None)
     return PlanNode(plan=plan, unseen=_unseen(world, held)), partial
@@ -164,7 +168,7 @@ def _refusal(error: PlacementError, partial: dict[str, str]) -> ToolError:
 def _unseen(world: World, held: Contract) -> tuple[str, ...]:
     """Targets whose outlines have to be seen before robots move."""
     measured_from = {n for g in held.groups if g.clearance is not None for n in g.targets}
-    named = map(world.target, held.target_ids)
+    named = (t for t in world.targets if t.id in held.target_ids)
     return tuple(t.id for t in named if doubtful(t) or t.id in measured_from)
 
 
@@ -354,7 +358,7 @@ def _proposal(world: World, plan: Plan) -> dict[str, Any]:
         "findings": findings[:MAX_FINDINGS] + ([f"and {more} more findings"] if more > 0 else []),
         "notes": list(verdict.notes),
         "measures": with_metres(verdict.measures, world.metres_per_pixel),
-        "targets": [summary(world.target(t)) for t in contract.target_ids],
+        "targets": [summary(t) for t in world.targets if t.id in contract.target_ids],
         "robots": contract.robots,
         **framed(world),
     }

@@ -1,12 +1,15 @@
 """Robots for plans: which robot takes which place, and the drive there."""
 
 import json
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
+import shapely
 
 from ..context import Context
-from ..errors import ApprovalError, FleetError, StorageError, ToolError
+from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
 from ..fleet.deploy import (
     ARRIVED_DEG,
     MAX_AGE,
@@ -22,10 +25,13 @@ from ..fleet.deploy import (
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
 from ..fleet.registry import FLEETS
 from ..formation.contract import Contract
+from ..formation.encounters import notes_of
 from ..formation.plan import Plan
+from ..formation.site import Other
 from ..motion.motion import obstacles
 from ..tool import in_thread
 from ..world import PlanNode, World
+from .others import met_by
 
 MOST_NAMED = 12
 """Idle robots that a note names."""
@@ -44,8 +50,8 @@ async def with_robots(context: Context, node: PlanNode) -> World:
         return world.with_plan(node)
     try:
         fleet = await _team(context, plan.formation.contract)
-    except FleetSizeError:
-        return world.with_plan(node)  # more than can be driven can still be planned
+    except FleetSizeError:  # more than can be driven can still be planned
+        return world.with_plan(_noted(world, node, [], (), 0.0))
     check_turns(plan, fleet)
     poses, points = await fleet.observe(max_age=MAX_AGE), plan.formation.points
     try:
@@ -53,10 +59,21 @@ async def with_robots(context: Context, node: PlanNode) -> World:
     except FleetSizeError as error:
         raise ToolError(str(error), "too_many_robots") from None
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
-    if notes := _notes(found, poses):
-        verdict = plan.verdict.model_copy(update={"notes": (*plan.verdict.notes, *notes)})
-        plan = plan.model_copy(update={"verdict": verdict})
-    return world.having(robots=poses).with_plan(node.model_copy(update={"plan": plan}))
+    node = node.model_copy(update={"plan": plan})
+    radius = fleet.radius or 0.0
+    node = await in_thread(lambda: _noted(world, node, _notes(found, poses), poses, radius))
+    return world.having(robots=poses).with_plan(node)
+
+
+def _noted(
+    world: World, node: PlanNode, notes: list[str], poses: tuple[Pose, ...], radius: float
+) -> PlanNode:
+    """The plan with notes, and with what its robots stand on and drive over."""
+    plan = node.plan
+    met = met_by(world, plan, poses, radius)
+    more = (*plan.verdict.notes, *notes, *notes_of(met))
+    plan = plan.model_copy(update={"verdict": plan.verdict.model_copy(update={"notes": more})})
+    return node.model_copy(update={"plan": plan, "encounters": met})
 
 
 def _notes(found: Assigned, poses: tuple[Pose, ...]) -> list[str]:
@@ -140,25 +157,34 @@ async def _team(context: Context, contract: Contract) -> Fleet:
     enough = len(world.robots) >= contract.robots if driven else False
     if held is not None and (held.real or enough):
         return held
-    radius = contract.robot_radius
-    fleet = FLEETS.load(settings.fleet)(
-        FleetRequest(
-            size=world.picture.size,
-            robots=contract.robots,
-            known=world.robots if driven or len(world.robots) == contract.robots else (),
-            driven=driven,
-            starts=None if settings.starts is None else np.asarray(settings.starts, dtype=float),
-            solid=obstacles(contract, world.site(contract)),
-            radius=radius,
-            seed=settings.seed,
-        )
+    site, starts = world.site(contract), settings.starts
+    request = FleetRequest(
+        size=world.picture.size,
+        robots=contract.robots,
+        known=world.robots if driven or len(world.robots) == contract.robots else (),
+        driven=driven,
+        starts=None if starts is None else np.asarray(starts, dtype=float),
+        solid=obstacles(contract, site),
+        radius=contract.robot_radius,
+        seed=settings.seed,
     )
+    fleet = _opened(settings.fleet, request, site.others if starts is None else ())
     await context.services.close_fleets()
     if settings.fleet in context.services.stopped:
         context.services.stopped.remove(settings.fleet)
         await fleet.stop()
     fleets[settings.fleet] = fleet
     return fleet
+
+
+def _opened(name: str, request: FleetRequest, others: Sequence[Other]) -> Fleet:
+    """A fleet; robots that are set down stand off other things too where there is room."""
+    load = FLEETS.load(name)
+    if others:
+        solid = shapely.union_all([request.solid, *(thing.region for thing in others)])
+        with suppress(InputError):
+            return load(replace(request, solid=solid))
+    return load(request)
 
 
 def _are_there(poses: tuple[Pose, ...], plan: Plan, arrival: Arrival) -> bool:

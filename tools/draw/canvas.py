@@ -34,6 +34,7 @@ ALLOWED: Colour = (72, 190, 255)
 FORBIDDEN: Colour = (196, 52, 72)
 CERTIFIED: Colour = (0, 122, 90)
 PARTIAL: Colour = (176, 92, 0)
+MET: Colour = (255, 128, 14)
 MARKS: tuple[Colour, ...] = (
     (255, 209, 26),
     (86, 204, 255),

@@ -20,6 +20,7 @@ from .canvas import (
     CERTIFIED,
     FINDING,
     INK,
+    MET,
     MUTED,
     PAPER,
     ROBOT,
@@ -40,7 +41,7 @@ from .captions import (
     left_text,
     make_page,
 )
-from .marks import draw_idle_robots, draw_outline, draw_robots, robot_size
+from .marks import draw_idle_robots, draw_met, draw_outline, draw_robots, robot_size
 from .overlay import idle_robots
 
 SIDE = 640
@@ -67,6 +68,7 @@ STYLE: tuple[Colour, ...] = (
     CERTIFIED,
     FINDING,
     ALLOWED,
+    MET,
 )
 """Colours a palette made from the photograph alone would lose."""
 
@@ -93,7 +95,8 @@ def draw_deployment(
     long = _photo_long_side(picture)
     canvas, lines = make_page(picture, long, UNIT, title, TITLE_LINES, NARROWEST)
     for name in plan.formation.contract.target_ids:
-        draw_outline(canvas, world.target(name).outline)
+        draw_outline(canvas, world.outline(name))
+    draw_met(canvas, world.met(plan.id).values())
     radius = robot_size(canvas, goals)
     _draw_goals(canvas, plan, radius)
     draw_idle_robots(canvas, idle_robots(world, plan), radius)

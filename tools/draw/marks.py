@@ -3,7 +3,7 @@
 Nothing is decided here: places come from the references the checker measures against.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ from .canvas import (
     FORBIDDEN,
     IDLE,
     INK,
+    MET,
     PAPER,
     ROBOT,
     TARGET,
@@ -75,6 +76,13 @@ def draw_outline(canvas: Canvas, outline: Outline, colour: tuple[int, int, int] 
     """The outline and its holes as a light line with dark seams."""
     simple = outline.polygon.simplify(OUTLINE_DETAIL / canvas.page_length(1.0))
     canvas.cased(rings(simple), colour, 2.6)
+
+
+def draw_met(canvas: Canvas, outlines: Iterable[Outline]) -> None:
+    """Other things that robots stand on or drive over."""
+    for outline in outlines:
+        canvas.tint(outline.filled, MET, 0.25)
+        draw_outline(canvas, outline, MET)
 
 
 def draw_guides(canvas: Canvas, contract: Contract, site: Site, points: FloatArray) -> None:

@@ -18,7 +18,7 @@ from ..perception.image import Picture
 from ..perception.referring.attributes import Candidate
 from ..perception.target_prompt import Box
 from ..world import World
-from .canvas import CERTIFIED, FINDING, INK, PARTIAL, Canvas, Colour, Labels
+from .canvas import CERTIFIED, FINDING, INK, MET, PARTIAL, Canvas, Colour, Labels
 from .captions import draw_bars, draw_footer, make_page
 from .escape_path import draw_escape
 from .marks import (
@@ -27,6 +27,7 @@ from .marks import (
     draw_guides,
     draw_headings,
     draw_idle_robots,
+    draw_met,
     draw_outline,
     draw_robots,
     label_openings,
@@ -68,7 +69,8 @@ NEAR = 2.0
 def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.Image:
     """The photograph with the contract, the robots and the verdict.
 
-    Areas where robots' centres may stand are tinted; what a ring leaves open, a side, a line
+    Areas where robots' centres may stand are tinted; other things that robots stand on or drive
+    over are orange, as are rings about who stands there; what a ring leaves open, a side, a line
     and the ways to corners are dashed. Robots with a finding are red with a cross. Where a target
     was found to get out of a cage, its way is shown. Where the scale is known, lengths are given in
     metres too and the footer has a scale bar.
@@ -94,8 +96,11 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
         draw_guides(canvas, contract, site, points)
     if plan.verdict.escape is not None:
         draw_escape(canvas, plan.verdict.escape, site)
-    labels = Labels(canvas.photo)
+    labels, met = Labels(canvas.photo), world.met(plan.id)
+    draw_met(canvas, met.values())
     _draw_robots(canvas, world, plan, labels)
+    for name, outline in met.items():
+        _draw_tag(canvas, name, outline.bounds, MET, labels)
     if drivable:
         label_openings(canvas, contract, site, points, labels)
     draw_bars(canvas, lines)
@@ -168,6 +173,10 @@ def _draw_robots(canvas: Canvas, world: World, plan: Plan, labels: Labels) -> No
     for point in shown.values() if contract.robot_radius > 0 else ():
         canvas.body(point, contract.robot_radius)
     draw_idle_robots(canvas, idle_robots(world, plan), radius)
+    node = world.plans.get(plan.id)
+    for encounter in node.encounters if node is not None and near.all() else ():
+        for robot in encounter.robots if encounter.how != "over" else ():
+            canvas.circle(shown[robot], 1.7 * radius, MET, max(0.3 * radius, 1.2))
     if near.all():
         draw_headings(canvas, points, plan.formation.place_headings, radius)
     draw_robots(canvas, shown, radius, flagged)

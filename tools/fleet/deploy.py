@@ -18,7 +18,8 @@ from ..formation.plan import Plan, Point
 from ..formation.value import Value
 from ..geometry.assignment import assign
 from ..geometry.outline import FloatArray
-from ..motion.motion import obstacles, routes
+from ..motion.avoiding import routes_off
+from ..motion.motion import obstacles
 from .protocol import (
     Fleet,
     FleetBusyError,
@@ -309,14 +310,10 @@ class _Drive:
                 )
 
     def _motion(self) -> Motion:
-        paths = routes(
-            self._points(),
-            self._goals,
-            obstacles(self._contract, self._site),
-            self._radius,
-            self._site.frame(self._radius),
-            idle=points_of(self._idle()),
-        )
+        site, radius = self._site, self._radius
+        solid = obstacles(self._contract, site)
+        idle = points_of(self._idle())
+        paths = routes_off(self._points(), self._goals, solid, site, radius, idle=idle)
         looks = zip(self._robots, self._headings, strict=False)
         headings = {robot: math.radians(angle) for robot, angle in looks if angle is not None}
         return Motion(dict(zip(self._robots, paths, strict=True)), headings)

@@ -196,7 +196,7 @@ class Contract(Value):
     Attributes:
         robot_radius: 0 is a point.
         unit: of its lengths, where the picture has a scale; places are px.
-        keep_out: further ids no robot may touch.
+        keep_out: ids no robot may stand on or drive over; other things are kept off where possible.
         reading: why this is what is meant, where the words were held against it.
     """
 
@@ -205,6 +205,13 @@ class Contract(Value):
     unit: Unit | None = None
     keep_out: tuple[str, ...] = ()
     reading: str = Field(default="", max_length=300)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        both = sorted({t for g in self.groups if g.enters for t in g.targets} & {*self.keep_out})
+        if both:
+            raise ValueError(f"robots are to stand on {both[0]}, which keep_out forbids")
+        return self
 
     @property
     def robots(self) -> int:

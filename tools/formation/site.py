@@ -1,9 +1,11 @@
 """Where positions are judged: the targets' outlines and the picture; what does not fit there."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import shapely
+from shapely.geometry import Polygon
 
 from ..errors import ToolError
 from ..geometry.curves import Frame
@@ -11,18 +13,48 @@ from ..geometry.outline import MIN_AREA, Outline, largest_part, outline_of
 from .contract import Group
 from .units import length_text
 
+SURE = 0.55
+"""What was found with at least this confidence is a thing."""
+BLUR = 0.2
+"""How far off the outline of a thing of no confidence may be, as a share of its size."""
+
+
+@dataclass(frozen=True)
+class Other:
+    """A thing in the picture that a contract does not name: robots keep off it where they can.
+
+    Its region is in px, its confidence from 0 to 1.
+    """
+
+    id: str
+    label: str
+    region: Polygon
+    confidence: float = 1.0
+
+    @property
+    def sure(self) -> bool:
+        """Whether it was found with confidence; else it may be no thing at all."""
+        return self.confidence >= SURE
+
+    @property
+    def blur(self) -> float:
+        """How far off its outline may be, px."""
+        return BLUR * (1 - self.confidence) * math.sqrt(self.region.area)
+
 
 @dataclass(frozen=True)
 class Site:
     """What positions are judged in: the targets' outlines and the picture's size, px.
 
-    With metres per pixel, texts about positions give lengths in metres too.
+    With metres per pixel, texts about positions give lengths in metres too. A certificate does not
+    depend on the others.
     """
 
     outlines: Mapping[str, Outline]
     width: float
     height: float
     metres_per_pixel: float | None = None
+    others: tuple[Other, ...] = ()
 
     @property
     def room(self) -> tuple[float, float]:

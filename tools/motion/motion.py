@@ -20,8 +20,9 @@ from ..formation.placement.place import Site
 from ..geometry.curves import Frame
 from ..geometry.outline import FloatArray, distances
 
-MAX_NODES = 60
-"""Vertices kept of an obstacle: enough for a path within a percent of the shortest."""
+MAX_NODES, EACH_NODES = 60, 8
+"""Vertices kept of obstacles, and of each further part of them: enough for a path within a percent
+of the shortest."""
 BEND_SEGMENTS = 2
 """Segments of a quarter circle around an obstacle's corner."""
 ROOM_SHARES = (0.7, 0.3, 0.03)
@@ -39,7 +40,11 @@ Bodies = NDArray[np.object_]
 
 
 class NoRouteError(FleetError):
-    """A place that no path leads to."""
+    """Places that no path leads to: those of `robots`, indices of starts and goals."""
+
+    def __init__(self, text: str, robots: NDArray[np.intp]) -> None:
+        super().__init__(text)
+        self.robots = robots
 
 
 def obstacles(contract: Contract, site: Site) -> BaseGeometry:
@@ -150,7 +155,10 @@ class _Ground:
                 return paths
             again = np.unique(blocked)
             in_the_way |= np.isin(cluster, cluster[hit])
-            found = self._paths_around(starts[again], goals[again], bodies[in_the_way])
+            try:
+                found = self._paths_around(starts[again], goals[again], bodies[in_the_way])
+            except NoRouteError as error:
+                raise NoRouteError(str(error), again[error.robots]) from None
             for i, path in zip(again, found, strict=True):
                 paths[i] = path
 
@@ -179,7 +187,7 @@ class _Ground:
         if len(left):
             what = "the target and the robots that stay" if len(bodies) else "the target"
             x, y = goals[left[0]]
-            raise NoRouteError(f"There is no way around {what} to place ({x:.0f}, {y:.0f}).")
+            raise NoRouteError(f"There is no way around {what} to place ({x:.0f}, {y:.0f}).", left)
         return paths
 
     def _keeps(self, ends: FloatArray) -> list[float]:
@@ -208,11 +216,11 @@ def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeomet
     """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
     dip = math.cos(math.pi / (4 * BEND_SEGMENTS))
     grown = solid.buffer((1.01 * keep + 0.05) / dip, quad_segs=BEND_SEGMENTS)
-    tolerance = 0.0
+    tolerance, most = 0.0, MAX_NODES + EACH_NODES * (shapely.get_num_geometries(grown) - 1)
     while True:
         coarse = grown.simplify(tolerance).buffer(1.05 * tolerance, join_style="mitre")
         coordinates = shapely.get_coordinates(coarse)
-        if len(coordinates) <= MAX_NODES:
+        if len(coordinates) <= most:
             break
         tolerance = max(1.5 * tolerance, 0.25)
     x0, _, x1, _ = shapely.bounds(bodies).reshape(-1, 4).T

@@ -1,0 +1,191 @@
+"""Other things in a picture: found once, kept off, driven around, and named where they are not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+import pytest
+import shapely
+from formup.tools.builtin.others import with_keep_outs, with_others
+from formup.tools.builtin.robots import read_track
+from formup.tools.context import Context, Services, Settings
+from formup.tools.errors import InputError, ToolError
+from formup.tools.perception.detectors.candidates import StandoutDetector
+from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.target_prompt import TargetPrompt
+from formup.tools.store import plan_file, read_world
+from shapely.geometry import LineString
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ..conftest import ToolCalls
+
+RED = (130, 130, 270, 270)
+NEAR = (292, 160, 332, 240)
+Begin = Callable[..., "ToolCalls"]
+
+
+def picture(*boxes: tuple[int, int, int, int]) -> Picture:
+    """A red square at (130, 130) to (270, 270) and blue boxes, on grey."""
+    pixels = np.full((400, 560, 3), 150, np.uint8)
+    cv2.rectangle(pixels, RED[:2], RED[2:], (200, 40, 40), -1)
+    for box in boxes:
+        cv2.rectangle(pixels, box[:2], box[2:], (40, 40, 200), -1)
+    return picture_from_array(pixels)
+
+
+def group(relation: str, robots: int, *targets: str, **more: Any) -> dict[str, Any]:
+    return {"relation": relation, "targets": targets or ("t1",), "robots": robots, **more}
+
+
+def propose(work: "ToolCalls", *groups: dict[str, Any], **more: Any) -> dict[str, Any]:
+    targets = [{"id": "t1", "label": "red square", "box": (126, 126, 274, 274)}]
+    contract = {"groups": groups, **more}
+    return work.call("propose_formation", contract=contract, targets=targets).data
+
+
+def test_robots_are_placed_and_driven_off_things_that_nobody_named(tool_calls: Begin) -> None:
+    work = tool_calls(picture(NEAR, (20, 20, 60, 60), (300, 330, 400, 370)))
+    assert propose(work, group("around", 8))["notes"] == []
+    work.call("deploy")
+    node = work.world.plan()
+    site = work.world.site(node.plan.formation.contract)
+    solid = shapely.union_all([thing.region for thing in site.others])
+    assert len(site.others) == 3
+    assert solid.distance(shapely.MultiPoint(node.plan.formation.points)) > 4
+    assert node.encounters == ()
+
+
+def test_where_they_cannot_be_robot_and_thing_are_named_and_certified_all_the_same(
+    tool_calls: Begin,
+) -> None:
+    work = tool_calls(picture((290, 60, 330, 340)))
+    data = propose(work, group("along", 3, side="right", clearance=(38, 42)))
+    node = work.world.plan()
+    assert data["certified"]
+    assert [(e.how, len(e.robots)) for e in node.encounters] == [("on", 3)]
+    assert f"on or right beside {node.encounters[0].thing} (blue thing)" in data["notes"][-1]
+
+
+def test_who_stands_at_the_border_is_named(tool_calls: Begin) -> None:
+    work = tool_calls(picture())
+    places = [(0.0, 50.0), (50.0, 50.0)]
+    targets = [{"id": "t1", "box": (126, 126, 274, 274)}]
+    contract = {"groups": [{"relation": "shape", "robots": 2}]}
+    sent = work.call("propose_formation", contract=contract, targets=targets, positions=places)
+    assert any("border" in note and note.startswith("Robot ") for note in sent.data["notes"])
+
+
+def test_another_measured_target_is_such_a_thing_too(tool_calls: Begin) -> None:
+    work = tool_calls(picture(NEAR))
+    work.call("segment", id="t2", label="blue", box=(288, 156, 336, 244))
+    propose(work, group("around", 6))
+    others = work.world.site(work.world.plan().plan.formation.contract).others
+    assert [thing.id for thing in others] == ["t2"]
+
+
+def test_a_picture_is_searched_once_by_all_who_share_what_was_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    searched: list[Picture] = []
+    found = StandoutDetector.detect
+
+    def detect(self: StandoutDetector, picture: Picture, phrase: str | None) -> Any:
+        searched.append(picture)
+        return found(self, picture, phrase)
+
+    monkeypatch.setattr(StandoutDetector, "detect", detect)
+    one, other = picture(NEAR, (5, 5, 40, 40)), picture(NEAR, (5, 5, 40, 41))
+    for shown in (one, one, other):
+        with_others(Context.of(shown))
+    assert [p.sha256 for p in searched] == [one.sha256, other.sha256]
+    with_others(replace(Context.of(one), services=Services({one.sha256: one}, found={})))
+    assert len(searched) == 3
+
+
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        TargetPrompt(box=(280, 140, 340, 260)),
+        TargetPrompt(outline=((280, 140), (340, 140), (340, 260), (280, 260))),
+        TargetPrompt(points=((310, 200),)),
+    ],
+    ids=lambda p: p.how,
+)
+def test_a_hard_keep_out_is_entered_by_neither_places_nor_paths(
+    tool_calls: Begin, prompt: TargetPrompt
+) -> None:
+    work = tool_calls(picture(NEAR), robot_radius=3.0)
+    work.keep(with_keep_outs(work.context, [prompt]))
+    data = propose(work, group("around", 7))
+    assert data["certified"]
+    work.call("deploy")
+    contract = work.world.plan().plan.formation.contract
+    region = work.world.outline("k1").filled
+    assert contract.keep_out == ("k1",)
+    assert region.distance(shapely.MultiPoint(work.world.plan().plan.formation.points)) > 3
+    arrival = work.world.arrivals[data["plan_id"]]
+    assert arrival.track is not None
+    track = read_track(work.context.services.artefacts.get(arrival.track))
+    ways = [LineString(track.points[:, i]) for i in range(track.points.shape[1])]
+    assert min(region.distance(way) for way in ways) > 2
+
+
+def test_a_plan_that_enters_a_keep_out_is_not_certified_and_the_region_changes_the_version(
+    tool_calls: Begin,
+) -> None:
+    work = tool_calls(picture())
+    free = work.world.version
+    work.keep(with_keep_outs(work.context, [TargetPrompt(box=(280, 0, 559, 399))]))
+    assert work.world.version != free
+    data = propose(work, group("along", 4, side="right", clearance=(20, 22)))
+    assert not data["certified"]
+    assert all("k1" in finding for finding in data["findings"])
+
+
+def test_a_keep_out_survives_in_a_plan_file(tool_calls: Begin, tmp_path: "Path") -> None:
+    shown = picture(NEAR)
+    work = tool_calls(shown)
+    work.keep(with_keep_outs(work.context, [TargetPrompt(box=(20, 300, 80, 380))]))
+    plan_id = propose(work, group("around", 5))["plan_id"]
+    (tmp_path / "plan.json").write_bytes(plan_file(work.world, plan_id, "words", shown))
+    again = read_world(tmp_path / "plan.json").world
+    contract = again.plan(plan_id).plan.formation.contract
+    assert contract.keep_out == ("k1",)
+    assert again.outline("k1").bounds == (20, 300, 80, 380)
+    assert [t.id for t in again.site(contract).others] == [
+        t.id for t in work.world.site(contract).others
+    ]
+
+
+@pytest.mark.parametrize(
+    ("prompt", "why"),
+    [
+        (TargetPrompt(box=(900, 900, 950, 950)), "outside the picture"),
+        (TargetPrompt(candidate="c77"), "no candidate"),
+        (TargetPrompt(points=((30, 380),)), "Insufficient segmentation accuracy"),
+    ],
+)
+def test_a_keep_out_that_is_not_there_is_refused(prompt: TargetPrompt, why: str) -> None:
+    context = Context.of(picture(NEAR), Settings(threshold=0.99))
+    with pytest.raises(InputError, match=why):
+        with_keep_outs(context, [prompt])
+
+
+@pytest.mark.parametrize("shape", [None, {"kind": "circle", "where": "on"}])
+def test_keeping_out_of_what_is_to_be_stood_on_is_refused(
+    tool_calls: Begin, shape: dict[str, Any] | None
+) -> None:
+    work = tool_calls(picture())
+    entering = (
+        [group(relation, 3) for relation in ("inside", "centre")]
+        if shape is None
+        else [group("shape", 5, shape=shape)]
+    )
+    for one in entering:
+        with pytest.raises(ToolError, match="t1, which keep_out forbids"):
+            propose(work, one, keep_out=("t1",))
+    assert propose(work, group("around", 5), keep_out=("t1",))["certified"]

@@ -1,0 +1,107 @@
+"""The other things in a picture, and the regions a person wants kept free, in the world."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from ..context import Context
+from ..errors import FleetError, InputError, ToolError
+from ..fleet.protocol import Pose, points_of
+from ..formation.contract import Contract
+from ..formation.encounters import Encounter, encounters_of
+from ..formation.plan import Plan
+from ..geometry.outline import MIN_AREA, FloatArray, Outline, outline_of
+from ..motion.avoiding import routes_off
+from ..motion.motion import obstacles
+from ..perception.target_prompt import TargetPrompt
+from ..world import KeepOut, World
+from .targets import measured_all
+
+FAINT = 0.4
+"""Candidates that are less salient are none."""
+SPECK, GROUND = 2e-4, 0.33
+"""What covers less of the picture may be dirt; what covers more is the ground."""
+DETAIL, DECIMALS = 1.0, 1
+"""By how much the outlines of other things are simplified, and places they are rounded to, px."""
+
+
+def with_others(context: Context) -> World:
+    """The world with what stands out in its picture as things that robots keep off."""
+    world, found = context.world, list[KeepOut]()
+    if any(not k.hard for k in world.keep_out):
+        return world
+    pixels = math.prod(world.picture.size)
+    for c in context.candidates():
+        region, seen = c.outline.filled.simplify(DETAIL), round(c.salience, 3)
+        if seen >= FAINT and max(SPECK * pixels, MIN_AREA) <= region.area <= GROUND * pixels:
+            outline = outline_of(shapely.transform(region, lambda at: at.round(DECIMALS)))
+            thing = {"id": c.id, "reason": c.label, "hard": False, "confidence": seen}
+            found.append(KeepOut.model_validate({"outline": outline, **thing}))
+    return world.having(keep_out=(*world.keep_out, *found))
+
+
+def with_keep_outs(context: Context, prompts: Sequence[TargetPrompt]) -> World:
+    """The world with regions that no robot may enter, k1, k2, ...
+
+    A box or an outline is the region itself; at a point the thing is measured, and a candidate is
+    taken as it was found.
+
+    Raises:
+        InputError: one is not in the picture, or cannot be measured.
+    """
+    world = context.world
+    for prompt in prompts:
+        try:
+            outline = _region(context, prompt)
+        except ToolError as error:
+            raise InputError(f"keep-out: {error}") from None
+        name = f"k{sum(k.hard for k in world.keep_out) + 1}"
+        region = KeepOut(id=name, outline=outline, reason="to be kept free")
+        world = world.having(keep_out=(*world.keep_out, region))
+    return world
+
+
+def _region(context: Context, prompt: TargetPrompt) -> Outline:
+    if problems := prompt.problems(*context.world.picture.size):
+        raise ToolError(" ".join(problems))
+    if prompt.candidate is not None:
+        return context.candidate(prompt.candidate).outline
+    if prompt.box is not None:
+        return outline_of(shapely.box(*prompt.box))
+    if prompt.outline is not None:
+        return outline_of(shapely.Polygon(prompt.outline))
+    return measured_all(context, (prompt,)).target(prompt.id).outline
+
+
+def held_off(contract: Contract, world: World) -> Contract:
+    """The contract with the regions in it that no robot may enter."""
+    hard = (k.id for k in world.keep_out if k.hard)
+    return contract.model_copy(
+        update={"keep_out": tuple(dict.fromkeys((*contract.keep_out, *hard)))}
+    )
+
+
+def met_by(
+    world: World, plan: Plan, poses: Sequence[Pose] = (), radius: float = 0.0
+) -> tuple[Encounter, ...]:
+    """The other things that robots of a plan stand on or, from where they are, drive over.
+
+    Args:
+        poses: of the whole fleet; none where nothing is known of it.
+        radius: of its robots, px.
+    """
+    contract, names = plan.formation.contract, plan.formation.robot_of_place
+    site, radius = world.site(contract), max(radius, contract.robot_radius)
+    at = {pose.id: (pose.x, pose.y) for pose in poses}
+    idle = points_of([pose for pose in poses if pose.id not in set(names)])
+    paths: dict[str, FloatArray] = {}
+    if site.others and at:
+        starts, solid = np.array([at[name] for name in names]), obstacles(contract, site)
+        try:
+            ways = routes_off(starts, plan.formation.points, solid, site, radius, idle=idle)
+            paths = dict(zip(names, ways, strict=True))
+        except FleetError:
+            pass  # a deployment says so
+    return encounters_of(plan, site, paths, radius)

@@ -1,0 +1,101 @@
+"""Paths that also keep off the other things in a picture, as far as there is a way around them.
+
+What a robot starts or is to stand on is not in its way, and what would wall it off is driven over:
+less certain things before certain ones. Frame: image pixels.
+"""
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
+
+from ..formation.encounters import room_of
+from ..formation.site import Other, Site
+from ..geometry.outline import FloatArray, distances
+from .motion import NOBODY, NoRouteError, routes
+
+STANDING = 1.1
+"""A robot whose centre is no further from a thing than so many radii stands on it."""
+ROOM_SHARES = (1.0, 0.3, 0.0)
+"""How much of the room beside things is kept: less where there is no other way."""
+NEAR_END = 0.5
+"""Things grow towards starts and goals by no more than this share of the way."""
+DETAIL = 0.1
+"""By how much they are simplified, as a share of what they grow."""
+
+Indices = NDArray[np.intp]
+
+
+def routes_off(
+    starts: FloatArray,
+    goals: FloatArray,
+    solid: BaseGeometry,
+    site: Site,
+    radius: float,
+    *,
+    idle: FloatArray = NOBODY,
+) -> list[FloatArray]:
+    """Shortest paths as of `routes`, that also keep off the site's other things.
+
+    Raises:
+        NoRouteError: a goal is walled off by obstacles and robots that stay.
+    """
+    paths: dict[int, FloatArray] = {}
+    frame = site.frame(radius)
+
+    def route(robots: Indices, things: Sequence[Other], share: float) -> Indices:
+        """Find paths past things; return the robots that none leads past them."""
+        ends = np.concatenate([starts[robots], goals[robots]])
+        grown = [_with_room(t, share * (room_of(site) + t.blur), ends, radius) for t in things]
+        left = np.array(grown, dtype=object)
+        around, walled = solid, robots[:0]
+        while len(robots):
+            try:
+                ways = routes(starts[robots], goals[robots], around, radius, frame, idle=idle)
+            except NoRouteError as error:
+                if around is solid:
+                    raise
+                walled = np.concatenate([walled, robots[error.robots]])
+                robots = np.delete(robots, error.robots)
+                continue
+            paths.update(zip(robots.tolist(), ways, strict=True))
+            lines = np.array([LineString(way) for way in ways], dtype=object)
+            hit = shapely.distance(left[:, None], lines) <= radius
+            robots, met = robots[hit.any(axis=0)], hit.any(axis=1)
+            around, left = shapely.union_all([around, *left[met]]), left[~met]
+        return walled
+
+    for robots, things in _by_things_stood_on(starts, goals, site.others, radius):
+        for off in (things, [thing for thing in things if thing.sure]):
+            for share in ROOM_SHARES:
+                robots = route(robots, off, share)
+        route(robots, (), 0.0)
+    return [paths[i] for i in range(len(starts))]
+
+
+def _with_room(thing: Other, room: float, ends: FloatArray, radius: float) -> BaseGeometry:
+    """A thing with room around it, px, less where a path ends near."""
+    spare = float(distances(thing.region, ends).min(initial=np.inf)) - radius
+    reach = min(room, NEAR_END * spare)
+    slack = DETAIL * reach
+    return thing.region.simplify(slack).buffer(reach + slack, quad_segs=2)
+
+
+def _by_things_stood_on(
+    starts: FloatArray, goals: FloatArray, others: Sequence[Other], radius: float
+) -> list[tuple[Indices, list[Other]]]:
+    """Robots with the things that each can keep off: it neither starts nor is to stand on them."""
+    groups: defaultdict[bytes, list[int]] = defaultdict(list)
+    ends = np.concatenate([starts, goals])
+    near = [distances(thing.region, ends).reshape(2, -1).min(axis=0) for thing in others]
+    on: NDArray[np.bool_] = np.reshape(near, (-1, len(starts))) <= STANDING * radius + 0.1
+    for robot in range(len(starts)):
+        groups[on[:, robot].tobytes()].append(robot)
+    return [
+        (np.array(same), [t for t, under in zip(others, on[:, same[0]], strict=True) if not under])
+        for same in groups.values()
+    ]
