@@ -173,34 +173,41 @@ def descriptor(text: str) -> Descriptor:
 
 
 def pointed(
-    points: list[str], boxes: list[str], outlines: list[str], candidates: list[str]
+    points: list[str] | None,
+    boxes: list[str] | None,
+    outlines: list[str] | None,
+    candidates: list[str] | None,
+    option: str | None = None,
 ) -> tuple[TargetPrompt, ...]:
     """What was pointed at, as t1, t2, ...: points, then boxes, then outlines, then candidates.
+
+    Args:
+        option: that all of them were given with, where it is one for all.
 
     Raises:
         InputError: not numbers, not as many as are needed, or no id of a candidate.
     """
     found: list[dict[str, object]] = []
-    for text in points:
-        values = _numbers(text, "--point", "X,Y")
+    for text in points or []:
+        values = _numbers(text, option or "--point", "X,Y")
         if len(values) % 2:
             raise InputError(_wrong("--point", text, "X,Y, or X1,Y1,X2,Y2,... for one thing,"))
         found.append({"points": tuple(zip(values[::2], values[1::2], strict=True))})
-    for text in boxes:
-        values = _numbers(text, "--box", "X0,Y0,X1,Y1")
+    for text in boxes or []:
+        values = _numbers(text, option or "--box", "X0,Y0,X1,Y1")
         if len(values) != 4:
             raise InputError(_wrong("--box", text, "X0,Y0,X1,Y1"))
         found.append({"box": tuple(values)})
-    for text in outlines:
-        values = _numbers(text, "--outline", "X1,Y1,X2,Y2,...")
+    for text in outlines or []:
+        values = _numbers(text, option or "--outline", "X1,Y1,X2,Y2,...")
         if len(values) % 2 or not 6 <= len(values) <= 60:
             raise InputError(
-                f"--outline {text!r} has {len(values)} numbers; give 3 to 30 vertices as "
-                "X1,Y1,X2,Y2,..."
+                f"{option or '--outline'} {text!r} has {len(values)} numbers; give 3 to 30 "
+                "vertices as X1,Y1,X2,Y2,..."
             )
         found.append({"outline": tuple(zip(values[::2], values[1::2], strict=True))})
-    for text in candidates:
-        found.append({"candidate": _candidate(text)})
+    for text in candidates or []:
+        found.append({"candidate": _candidate(text, option or "--target")})
     try:
         return tuple(
             TargetPrompt.model_validate({"id": f"t{i}", **prompt})
@@ -208,6 +215,18 @@ def pointed(
         )
     except ValidationError as error:
         raise InputError(violations(error)) from None
+
+
+def kept_out(texts: list[str] | None) -> tuple[TargetPrompt, ...]:
+    """What no robot may enter: a point, a box, an outline or a candidate, by how many numbers.
+
+    Raises:
+        InputError: it is none of these.
+    """
+    ways: tuple[list[str], ...] = ([], [], [], [])
+    for text in texts or []:
+        ways[{2: 0, 4: 1, 1: 3}.get(text.count(",") + 1, 2)].append(text)
+    return pointed(*ways, option="--keep-out")
 
 
 def limits(given: list[str] | None, before: Mapping[str, Any] | None = None) -> Limits:
@@ -292,11 +311,11 @@ def recording(path: Path | None) -> Path | None:
     return path
 
 
-def _candidate(text: str) -> str:
+def _candidate(text: str, option: str) -> str:
     known = re.fullmatch(r"[cC]?([1-9][0-9]{0,3})", text.strip(), re.ASCII)
     if known is None:
         raise InputError(
-            f"--target {text!r} cannot be read; give a candidate's id such as c3, or its number."
+            f"{option} {text!r} cannot be read; give a candidate's id such as c3, or its number."
         )
     return f"c{known[1]}"
 

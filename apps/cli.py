@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..agent.agent import Agent
-from ..agent.limits import Limits
 from ..agent.model import Model
 from ..agent.outcomes import Answered, Paused
-from ..agent.policy import Policy
 from ..agent.session import load_run, prompt_name
 from ..agent.store.folder import log_path, read_events
 from ..agent.wrappers.telemetry import environment_tracer
@@ -68,6 +66,7 @@ def run(
     box: o.Boxes = None,
     outline: o.Outlines = None,
     target: o.Candidates = None,
+    keep_out: o.KeepOuts = None,
     contract: o.ContractFile = None,
     plan_only: o.PlanOnly = False,
     as_json: o.Json = False,
@@ -103,12 +102,11 @@ def run(
         may_deploy=not plan_only,
         numbered=numbered,
     )
-    things = arguments.pointed(point or [], box or [], outline or [], target or [])
-    who, things = decided(contract, things, fixed, model=model, planner=planner)
-    bounds = arguments.limits(limit), arguments.policy(policy)
+    things = arguments.pointed(point, box, outline, target), arguments.kept_out(keep_out)
+    who, given = decided(contract, *things, fixed, model=model, planner=planner)
     picture, keep = load_picture(image), arguments.recording(record)
-    with _agent(who, base_url, planner, prompt, prompts, *bounds) as agent, Folder(out) as home:
-        made = agent.run(picture, instruction, pointed=things, settings=fixed, trace=home.trace)
+    with _agent(*who, base_url, prompt, prompts, limit, policy) as agent, Folder(out) as home:
+        made = agent.run(picture, instruction, trace=home.trace, **given)
         raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
 
 
@@ -173,14 +171,15 @@ def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
 @contextmanager
 def _agent(
     model: str | Model,
-    base_url: str | None,
     planner: str | None,
+    base_url: str | None,
     prompt: str | None,
     prompts: Path | None,
-    limits: Limits,
-    policy: Policy,
+    limit: list[str] | None,
+    policies: list[str] | None,
 ) -> Generator[Agent, None, None]:
     """The agent that was chosen; the offline planner goes without a prompt."""
+    limits, policy = arguments.limits(limit), arguments.policy(policies)
     with _tracer() as tracer:
         agent = Agent(
             model,

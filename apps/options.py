@@ -23,6 +23,14 @@ Candidates = Annotated[
     list[str] | None,
     typer.Option("--target", help="A thing found in the picture, such as c3; repeatable."),
 ]
+KeepOuts = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--keep-out",
+        help="Where no robot may stand or drive: a box or an outline as above, X,Y on a thing, or "
+        "an id such as c3; repeatable.",
+    ),
+]
 ContractFile = Annotated[
     Path | None,
     typer.Option("--contract", help="A contract as JSON, used as it stands; no words are read."),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from ..agent.agent import SayOptions
 from ..agent.offline.stated import StatedContract
 from ..tools.context import Settings
 from ..tools.errors import InputError, ToolError
@@ -15,24 +16,36 @@ from ..tools.store import read_text
 from ..tools.tool import violations
 
 Things = tuple[TargetPrompt, ...]
+Who = tuple[str | StatedContract, str | None]
+"""The model that decides, and its planner."""
 CANDIDATE = re.compile(r'(?<!"text":)(?<!"text": )"(c[1-9][0-9]{0,3})"')
 
 
 def decided(
-    path: Path | None, pointed: Things, settings: Settings, *, model: str, planner: str | None
-) -> tuple[str | StatedContract, Things]:
+    path: Path | None,
+    pointed: Things,
+    kept: Things,
+    settings: Settings,
+    *,
+    model: str,
+    planner: str | None,
+) -> tuple[Who, SayOptions]:
     """Who decides, and about what: the contract of a file if there is one, else the model.
+
+    Args:
+        kept: what no robot may enter; a contract may name it as k1, k2, ...
 
     Raises:
         InputError: the file cannot be read, contradicts what else is given, or names what nothing
             points at.
     """
     if path is None:
-        return model, pointed
+        return (model, planner), SayOptions(pointed=pointed, keep_out=kept, settings=settings)
     if model != "offline" or planner is not None:
         raise InputError("--contract leaves nothing to decide; leave out --model and --planner.")
     contract, things = _read(path, pointed)
-    missing = [n for n in contract.target_ids if n not in {p.id for p in things}]
+    known = {p.id for p in things} | {f"k{i}" for i in range(1, len(kept) + 1)}
+    missing = [n for n in contract.target_ids if n not in known]
     if missing:
         raise InputError(
             f"--contract {path} names {missing[0]!r}, which nothing points at; point at it with "
@@ -51,7 +64,8 @@ def decided(
             f"-n, --clearance and --robot-radius cannot change --contract {path}, which is for "
             f"{contract.robots} robots; leave them out, or write them there."
         )
-    return StatedContract(contract), things
+    given = SayOptions(pointed=things, keep_out=kept, settings=settings)
+    return (StatedContract(contract), None), given
 
 
 def _read(path: Path, pointed: Things) -> tuple[Contract, Things]:

@@ -373,3 +373,17 @@ def test_ctrl_c_stops_at_once_and_leaves_no_half_written_file(tmp_path: Path) ->
     assert not [p for p in (tmp_path / "out").glob("pictures/*") if p.name.startswith(".")]
     traces = [p for p in left if p.name == "trace.jsonl"]
     assert all(json.loads(line) for p in traces for line in p.read_text().splitlines())
+
+
+def test_what_is_kept_out_of_is_in_the_contract_and_nobody_stands_there(tmp_path: Path) -> None:
+    picture = np.full((200, 300, 3), 150, np.uint8)
+    picture[70:130, 120:180] = (200, 40, 40)
+    Image.fromarray(picture).save(tmp_path / "scene.png")
+    words = ("Surround the red square", "-n", 6, "--box", "116,66,184,134", "--plan-only", "--json")
+    bare = report(formup("run", "scene.png", *words, cwd=tmp_path))
+    x, y = bare["positions"][0]
+    kept = f"{x - 4},{y - 4},{x + 4},{y + 4}"
+    done = report(formup("run", "scene.png", *words, "--keep-out", kept, cwd=tmp_path))
+    assert (done["status"], done["contract"]["keep_out"]) == ("planned", ["k1"])
+    places = np.array(done["positions"])
+    assert not (np.abs(places - (x, y)) <= 4).all(axis=1).any()

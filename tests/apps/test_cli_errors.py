@@ -83,6 +83,11 @@ def test_no_number_of_robots(cli: Cli, picture: Path, count: str) -> None:
     ("option", "value", "words"),
     [
         ("--point", "900,60", ("(900, 60)", "outside", "200 x 140")),
+        ("--keep-out", "900,60,950,90", ("keep-out", "outside", "200 x 140")),
+        ("--keep-out", "10,20,30", ("--keep-out '10,20,30'", "3 numbers")),
+        ("--keep-out", "the car", ("--keep-out 'the car'", "c3")),
+        ("--keep-out", "a,b", ("--keep-out 'a,b'", "X,Y")),
+        ("--keep-out", "c99", ("keep-out", "no candidate 'c99'")),
         ("--point", "-1,60", ("(-1, 60)", "outside")),
         ("--point", "nan,60", ("'nan,60'", "X,Y")),
         ("--point", "a,b", ("'a,b'", "X,Y")),
