@@ -100,6 +100,17 @@ def test_a_thing_in_the_picture_is_named_by_its_id(cli: Cli, picture: Path, tmp_
     assert [t["id"] for t in json.loads(out)["targets"]] == ["t1", "t2"]
 
 
+def test_it_may_name_what_is_to_be_kept_free(cli: Cli, picture: Path, tmp_path: Path) -> None:
+    path = written(tmp_path, RING, keep_out=["k1"])
+    words = ("run", picture, "Ring it", *BOX, "--contract", path, "--json", "--plan-only")
+    code, out, _ = cli(*words, "--keep-out", "150,0,190,139")
+    data = json.loads(out)
+    assert (code, data["status"], data["contract"]["keep_out"]) == (0, "planned", ["k1"])
+    assert all(x < 150 for x, _ in data["positions"])
+    code, out, _ = cli(*words)
+    assert (code, "'k1'" in json.loads(out)["message"]) == (2, True)
+
+
 def test_what_cannot_be_met_is_impossible_and_nothing_else_is_tried(
     cli: Cli, picture: Path, tmp_path: Path
 ) -> None:

@@ -125,7 +125,8 @@ class _Search:
         if group.relation not in ON_CURVE and group.line is None:
             return
         old = self._curve(group, None)
-        for share in OFFSETS if group.clearance is not None else OFFSETS[:1]:
+        varies = group.clearance is not None and group.radius is None and not group.solves_clearance
+        for share in OFFSETS if varies else (None,):
             new = self._curve(group, share)
             if len(old.lines) != 1 or len(new.lines) != 1:
                 continue

@@ -1,10 +1,14 @@
 """Places move off other things where the contract allows it, and stay as they are where not."""
 
+from typing import Any
+
 import numpy as np
+import pytest
 import shapely
 from formup.tools.formation.checking.check import certify
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.encounters import room_of
+from formup.tools.formation.headings import headings_of
 from formup.tools.formation.placement.avoidance import off_others
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.formation.site import Other, Site
@@ -71,6 +75,29 @@ def test_a_ring_is_turned_off_things_and_stays_even() -> None:
     before, after = planned(where)
     assert (standing(before, where), standing(after, where, 2.0)) == (3, 0)
     assert float(after.verdict.measures["spacing_ratio"]) > 0.95
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"pitch": 80.0},
+        {"radius": 120.0},
+        {"opening": 90.0, "opening_towards": "left", "clearance": (20, 60)},
+        {"sides": ("top", "right half"), "clearance": (20, 60)},
+        {"heading": "towards"},
+        {"pitch": 80.0, "heading": "t1"},
+    ],
+)
+def test_what_else_a_ring_is_to_be_holds_at_its_new_places(fields: dict[str, Any]) -> None:
+    points = planned(site(), **fields)[0].formation.points
+    where = site(*(shapely.Point(p).buffer(6) for p in points[::2]))
+    before, after = planned(where, **fields)
+    formation = after.formation
+    assert standing(after, where) < standing(before, where)
+    assert (after.verdict.certified, formation.contract) == (True, before.formation.contract)
+    assert formation.headings_deg == headings_of(formation.contract, formation.points, where)
+    assert certify(formation.points, formation.contract, where, formation.headings_deg).certified
+    assert bool(formation.headings_deg) == ("heading" in fields)
 
 
 def walled(*reach: float) -> Site:
