@@ -248,4 +248,4 @@ def test_no_scale_of_a_picture(cli: Cli, picture: Path, scale: str) -> None:
 @pytest.mark.parametrize("option", ["--clearance", "--robot-radius"])
 def test_metric_options_take_a_scale(cli: Cli, picture: Path, option: str) -> None:
     refused(cli("run", picture, *CAR, option, "1.5m"), f"{option} '1.5m'", "--metres-per-pixel")
-    refused(cli("run", picture, *CAR, option, "1.5 feet"), "1.5 feet", "1.5m or 40cm")
+    refused(cli("run", picture, *CAR, option, "1.5 miles"), "1.5 miles", "1.5m or 40cm")

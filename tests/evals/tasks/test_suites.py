@@ -1,6 +1,7 @@
 """Suites: their format, their pictures, and every task of every one against a right answer."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -21,9 +22,9 @@ from formup.evals.tasks.recipes.inscribed import inscribed
 from formup.evals.tasks.recipes.styled import STYLES
 from formup.evals.tasks.rendered_pictures import render
 from formup.evals.tasks.suites import load_suite, schema, seeds_of, shipped, write_suite
-from formup.evals.tasks.task import Drawing, Suite
+from formup.evals.tasks.task import Drawing, Suite, Task
 from formup.tools.errors import InputError
-from formup.tools.formation.named_lengths import named_lengths
+from formup.tools.formation.quantities import Quantity, quantities_in
 from formup.tools.geometry.cages.cages import cage
 from shapely.geometry import Point
 
@@ -36,6 +37,14 @@ LUCKY = 0.02
 STRIDE = 3
 """Of more than 20 tasks every third is tried by the policies; all are held to a right answer."""
 FOLDER = Path(__file__).parents[3] / "evals" / "tasks"
+
+
+def lengths_of(task: Task) -> tuple[list[Quantity], list[Quantity]]:
+    """The lengths that a task's words name: how far across robots are, and the others."""
+    text = task.instruction
+    lengths = [q for q in quantities_in(text) if q.is_length]
+    across = [q for q in lengths if re.match(r" (?:across|wide|in diameter)", text[q.end :])]
+    return across, [q for q in lengths if q not in across]
 
 
 @cache
@@ -131,9 +140,9 @@ def test_the_frontier_has_what_it_says() -> None:
     metric = [task for task in tasks if task.metres_per_pixel]
     assert len(metric) == 16
     for task in metric:
-        lengths = [length.of for length in named_lengths(task.instruction.lower())]
-        assert lengths.count("across") == 1
-        assert {"distance", "apart"} & set(lengths)
+        across, others = lengths_of(task)
+        assert len(across) == 1
+        assert others
         assert "px" not in task.instruction
 
 
@@ -144,17 +153,15 @@ def test_metric_tasks_name_metres_and_are_graded_in_px() -> None:
     assert {task.family for task in metric} == {task.family for task in tasks}
     sized = 0
     for task in metric:
-        lengths = named_lengths(task.instruction.lower())
-        assert lengths
-        assert all(length.unit == "m" for length in lengths)
-        sized += any(length.of == "across" for length in lengths)
+        across, others = lengths_of(task)
+        assert all(length.kind == "m" for length in (*across, *others))
+        assert others
+        sized += bool(across)
         (goal,) = task.goals
         assert not [name for name in goal.success if name.endswith("_m")]
-        for length in lengths:
-            if length.of == "distance" and "band_px" in goal.success:
-                across = [n.px(task.metres_per_pixel) for n in lengths if n.of == "across"]
-                far = length.px(task.metres_per_pixel) + sum(across) / 2
-                assert sum(goal.success["band_px"]) / 2 == pytest.approx(far, abs=0.6)
+        if "band_px" in goal.success:
+            far = (others[0].least + sum(q.least for q in across) / 2) / task.metres_per_pixel
+            assert sum(goal.success["band_px"]) / 2 == pytest.approx(far, abs=0.6)
     assert sized >= 15
 
 
@@ -163,8 +170,7 @@ def test_robots_whose_named_size_is_left_out_stand_too_near() -> None:
         goal = task.goals[0]
         if not task.metres_per_pixel or "band_px" not in goal.success:
             continue
-        across = [n for n in named_lengths(task.instruction.lower()) if n.of == "across"]
-        radius = across[0].px(task.metres_per_pixel) / 2
+        radius = lengths_of(task)[0][0].least / task.metres_per_pixel / 2
         low, high = goal.success["band_px"]
         assert radius > (high - low) / 2
         near = replace(goal, success=goal.success | {"band_px": [low - radius, high - radius]})
