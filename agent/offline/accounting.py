@@ -18,6 +18,10 @@ SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 """Share of a sentence's words that are no command from which on all of it is background."""
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
 """What a reason or purpose begins with."""
+STATING = frozenset(
+    ("is", "are", "was", "were", "has", "have", "had", "could", "might", "will", "it's", "there's")
+)
+"""A sentence with one of these tells something."""
 VAGUE = {"nobody", "area"}
 """Classes with words of every day: a sentence that has no others says no arrangement."""
 ASKED_CLASSES = frozenset(("gap", "avoid", "far", "near", "side", "face", "each", "motion"))
@@ -97,6 +101,7 @@ class _Reader:
         """For each item whether its sentence only sets the scene, beside one that commands."""
         demanded = {k for d in self.demands for k in range(d.first, d.last)}
         scenic: list[bool] = []
+        goes_on = False
         for sentence in sentences(self.items):
             place = range(len(scenic), len(scenic) + len(sentence))
             words = [i for i in sentence if i.symbol[0].isalnum() or i.symbol == "<t>"]
@@ -104,8 +109,12 @@ class _Reader:
             says = {*CLASSES_OF.get(self.reading.relation, ()), "place", "robot"} - VAGUE
             weighty = any(i.symbol in WEIGHTY for i in sentence)
             share = WEIGHTY_SCENIC if weighty else SCENIC
-            if not weighty and not any(self.classes[k] & says for k in place):
+            states = any(i.symbol in STATING for i in sentence)
+            if states and not weighty and not any(self.classes[k] & says for k in place):
                 share = 0.0
+            if goes_on:
+                share = 1.0
+            goes_on = sentence[-1].symbol == ";"
             if demanded & {*place} or any(i.quantity for i in sentence):
                 share = 1.0
             ordered = any(d.sets == "robots" and d.first in place for d in self.demands)

@@ -17,7 +17,7 @@ from ...tools.formation.quantities import Quantity, quantities_in
 from .tagging import Tagging, Token
 
 SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
-ALWAYS = ("a negation", "a cancellation", "something past")
+ALWAYS = ("a negation", "a cancellation", "something past", "another task")
 """Kinds of stops that also count in words that look like background beside an order."""
 OPENING_CONDITIONS = ("unless", "until", "if", "once", "as", "provided")
 """First words of a sentence that makes all of them conditional."""

@@ -7,6 +7,8 @@ from .drawn_forms import Form
 
 SURE = 0.55
 """Least probability of an arrangement that is carried out unasked, fitted on other authors."""
+SURE_RING, SURE_EITHER_RING = 0.45, 0.8
+"""Least probabilities of the likelier kind of ring, and of both, where no other is likely."""
 
 
 @dataclass
@@ -57,4 +59,9 @@ class Reading:
     @property
     def sure(self) -> bool:
         """Whether it is likely enough to be carried out unasked."""
-        return self.meanings[0][1] >= SURE
+        (first, likely), *others = self.meanings
+        if likely >= SURE:
+            return True
+        pair = {first, next((m for m, _ in others if m != first), "")}
+        both = likely + next((p for m, p in others if m != first), 0.0)
+        return pair == {"around", "cage"} and likely >= SURE_RING and both >= SURE_EITHER_RING

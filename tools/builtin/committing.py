@@ -120,9 +120,13 @@ def _check_against_words(context: Context, contract: Contract) -> None:
             f"{contract.robots}.",
             "count",
         )
-    free = settings.clearance is settings.robot_radius is None
-    scale = context.world.metres_per_pixel if free else None  # else lengths are fixed already
-    found = doubts(context.words, contract, counted=asked is not None, scale=scale)
+    found = doubts(
+        context.words,
+        contract,
+        counted=asked is not None,
+        measured=settings.clearance is not None or settings.robot_radius is not None,
+        scale=context.world.metres_per_pixel,
+    )
     if found and not (contract.reading and context.doubted.issuperset(found)):
         doubt = f"A doubt: {'; '.join(found)}."
         raise ToolError(

@@ -109,10 +109,20 @@ def numbers_in(text: str) -> tuple[Number, ...]:
 
 def _expression(atoms: Sequence[_Atom], at: int) -> tuple[Number, int] | None:
     """A number with its sign, and what is added to it or spans a range with it."""
+    read = _joined(atoms, at, bridging=True)
+    if read is not None and _text(atoms, at) == "between" and read[0].least == read[0].most:
+        return (
+            _joined(atoms, at, bridging=False) or read
+        )  # "between a hundred and a hundred and one"
+    return read
+
+
+def _joined(atoms: Sequence[_Atom], at: int, *, bridging: bool) -> tuple[Number, int] | None:
+    """The same; `bridging` is whether "and" may stand within the first number."""
     start = at
     negative = _text(atoms, at) in ("minus", "-", "\u2212") and _begins(atoms, at)
     between = _text(atoms, at) == "between"
-    first = _quantity(atoms, at + (negative or between))
+    first = _quantity(atoms, at + (negative or between), bridging=bridging)
     if first is None:
         return None
     value, at = first
@@ -148,14 +158,16 @@ def _begins(atoms: Sequence[_Atom], at: int) -> bool:
     return close and (at == 0 or atoms[at - 1].end < atoms[at].start)
 
 
-def _quantity(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
+def _quantity(
+    atoms: Sequence[_Atom], at: int, *, bridging: bool = True
+) -> tuple[float, int] | None:
     """A number with its halves, and times the dozens, scores or pairs that it counts."""
     if _text(atoms, at) in ("a", "an") and _text(atoms, at + 1) == "baker's":
         return (13.0, at + 3) if _text(atoms, at + 2) == "dozen" else None
     share = _share(atoms, at)
     if share is not None:
         return share
-    read = _number(atoms, at)
+    read = _number(atoms, at, bridging=bridging)
     if read is None:
         noun = _text(atoms, at + 1)
         if _text(atoms, at) in ("a", "an") and noun in GROUPS and noun != "score":
@@ -203,7 +215,7 @@ def _and_a_half(atoms: Sequence[_Atom], value: float, at: int) -> tuple[float, i
     return value, at
 
 
-def _number(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
+def _number(atoms: Sequence[_Atom], at: int, *, bridging: bool = True) -> tuple[float, int] | None:
     """Digits, a fraction in digits, or a cardinal in words with what follows its point."""
     if at >= len(atoms):
         return None
@@ -219,10 +231,10 @@ def _number(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
             return (value / below, at + 3) if below else None
         scale = SCALES.get(_text(atoms, at + 1))
         return (value * scale, at + 2) if scale else (value, at + 1)
-    return _cardinal(atoms, at)
+    return _cardinal(atoms, at, bridging)
 
 
-def _cardinal(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
+def _cardinal(atoms: Sequence[_Atom], at: int, bridging: bool) -> tuple[float, int] | None:
     """Four hundred and twenty-one; one point five."""
     total, current, k = 0, 0, at
     if _text(atoms, k) in ("a", "an") and _text(atoms, k + 1) in SCALES:
@@ -233,7 +245,7 @@ def _cardinal(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
             total, current = total + current * SCALES[word], 0
         elif (more := _grown(current, word)) is not None:
             current = more
-        elif not _bridges(atoms, k, bool(total) or current % 100 == 0, k > at):
+        elif not _bridges(atoms, k, bridging and (bool(total) or current % 100 == 0), k > at):
             break
         k += 1
     return None if k == at else _after_point(atoms, float(total + current), k)
@@ -242,7 +254,7 @@ def _cardinal(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
 def _grown(current: int, word: str) -> int | None:
     """A number below a thousand with one more word to it; None where the word does not fit."""
     if word == "hundred":
-        return current * 100 if current else None
+        return current * 100 if 0 < current < 100 else None
     if word in TENS:
         return current + TENS[word] if current % 100 == 0 else None
     value = SMALL.get(word)

@@ -55,7 +55,7 @@ def read(words: str, robots: int | None = None) -> tuple[Reading, str | None]:
         ("Spread 9 robots over the courtyard next to the house", "inside"),
         ("spread all over it", "inside"),
         ("Sprinkle seven bots across the lawn", "inside"),
-        pytest.param("stand 3 robots on top of the sweet", "inside", marks=FAULT),
+        pytest.param("stand 3 robots on top of the sweet", "inside"),
         ("Line up 7 robots along the lower side of the roof", "along"),
         pytest.param("five drones to the left of the truck", "along", marks=FAULT),
         ("Put 5 robots on the left side of the car", "along"),

@@ -73,7 +73,7 @@ def is_settled(history: History) -> bool:
     ("words", "relation"),
     [
         ("Surround the biggest coin", "around"),
-        pytest.param("Which of these is the largest coin? Surround it.", "around", marks=FAULT),
+        pytest.param("Which of these is the largest coin? Surround it.", "around"),
         ("The largest coin needs a ring of robots around it", "around"),
         ("Fill the largest coin", "inside"),
         pytest.param("Line up on the largest coin's left side", "along", marks=FAULT),

@@ -106,7 +106,7 @@ def test_what_is_not_carried_out_is_asked_about_and_quoted(words: str, quote: st
         "Should 8 robots ring it?",
         "How many of the 8 robots are around it?",
         "Yesterday 8 robots ringed it",
-        pytest.param("Count the 8 robots around it", marks=FAULT),
+        "Count the 8 robots around it",
         "Take a picture of the 8 robots around it",
         "Hello 8 robots",
         "Move the 8 robots",

@@ -113,13 +113,11 @@ def run(instruction: str, picture: Picture | None = None, **more: Any) -> Report
     [
         ("form a star around it with 15 robots", "around", 15),
         ("10 robots in a triangle around it", "around", 10),
-        pytest.param("spell L with 9 robots right of it", "right", 9, marks=FAULT),
-        pytest.param("a dozen robots in a 3 by 4 grid inside it", "inside", 12, marks=FAULT),
+        pytest.param("spell L with 9 robots right of it", "right", 9),
+        pytest.param("a dozen robots in a 3 by 4 grid inside it", "inside", 12),
         pytest.param("in a 2 by 3 grid beside it", "right", 6, marks=FAULT),
         ("surround it: form a hexagon of 12 robots", "around", 12),
-        pytest.param(
-            "spell 'R2-D2!' in outlined letters below it with 90 robots", "below", 90, marks=FAULT
-        ),
+        pytest.param("spell 'R2-D2!' in outlined letters below it with 90 robots", "below", 90),
     ],
 )
 def test_a_form_is_placed_where_the_words_say(words: str, where: str, count: int) -> None:
@@ -160,13 +158,9 @@ def test_the_side_of_one_thing_that_faces_another() -> None:
 @pytest.mark.parametrize(
     ("words", "wording"),
     [
-        pytest.param(
-            "form a star with 10 robots", "Where are the robots to draw a star?", marks=FAULT
-        ),
+        pytest.param("form a star with 10 robots", "Where are the robots to draw a star?"),
         ("spell A around it with 9 robots", "Where are the robots to draw the letters A?"),
-        pytest.param(
-            "9 robots in a 3 by 4 grid inside it", "takes 12 robots, 9 were named", marks=FAULT
-        ),
+        pytest.param("9 robots in a 3 by 4 grid inside it", "takes 12 robots, 9 were named"),
         ("surround it with 6 robots, all facing the coin", '"all facing the coin"'),
         ("spell hello above it with 20 robots", "form"),
         ("form a heart around it with 20 robots", "form"),

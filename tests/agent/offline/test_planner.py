@@ -31,7 +31,6 @@ def test_more_things_pointed_at_than_the_arrangement_is_about_are_asked_about() 
     assert "t1, t2" in report.message
 
 
-@pytest.mark.xfail(strict=True, reason="a known fault of the reading")
 def test_robots_that_do_not_fit_so_far_apart_are_not_moved() -> None:
     report = run("Fill it with 60 robots, no two closer than 50 px", pointed=[COIN])
     assert report.status == "impossible"

@@ -128,7 +128,6 @@ def test_words_become_a_query(words: str, query: dict[str, Any]) -> None:
         "surround the coin with the eagle on it",
         "surround the top left corner",
         "surround the heart below the ring above the star",
-        "surround the heart I pointed at",
     ],
 )
 def test_words_that_change_who_is_meant_are_refused(words: str) -> None:

@@ -183,7 +183,7 @@ def test_robots_that_are_there_already_are_not_moved(
         work = reopened(work, tmp_path, tool_calls)
     work.moved.clear()
     before = work.world
-    again = work.call("deploy", tell="There.")
+    again = work.call("deploy", plan_id=plan.id, tell="There.")
     assert again.data == first.data | {"already_there": True}
     assert again.message == first.message
     assert work.world == before

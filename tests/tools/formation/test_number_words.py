@@ -91,7 +91,7 @@ def test_a_number_is_one_number(text: str, value: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["4,310, please", "4,310.", pytest.param("4 310, please", marks=FAULT), "4 310 !"]
+    "text", ["4,310, please", "4,310.", pytest.param("4 310, please"), "4 310 !"]
 )
 def test_a_sign_behind_a_number_is_no_part_of_it(text: str) -> None:
     assert read(text) == [(4310, 4310)]

@@ -94,9 +94,9 @@ def test_other_units_make_no_length(text: str) -> None:
         "a circle",
         "half a circle",
         "the metre rule",
-        pytest.param("an inchworm", marks=FAULT),
-        pytest.param("a centre piece", marks=FAULT),
-        pytest.param("a footpath", marks=FAULT),
+        pytest.param("an inchworm"),
+        pytest.param("a centre piece"),
+        pytest.param("a footpath"),
     ],
 )
 def test_words_without_a_number_name_no_quantity(text: str) -> None:

@@ -39,12 +39,18 @@ WEIGHTY: tuple[tuple[str, str], ...] = (
     (r"\b(?:all|everything|anything|everyone) (?:but|except)\b|\bexcept\b", "sides"),
 )  # fmt: skip
 """Words that a contract has to answer, and the part of it that does."""
+ACROSS = re.compile(r"\s*(?:across|wide|in diameter)\b")
 SAME = 0.05
 """Share by which a length of the contract may differ from the one named."""
 
 
 def doubts(
-    instruction: str, contract: Contract, *, counted: bool = False, scale: float | None = None
+    instruction: str,
+    contract: Contract,
+    *,
+    counted: bool = False,
+    measured: bool = False,
+    scale: float | None = None,
 ) -> list[str]:
     """Where a contract says something else than the plain words; each one clause.
 
@@ -52,6 +58,7 @@ def doubts(
         instruction: in the person's words; words of other languages count nothing.
         contract: as a model stated it, in px.
         counted: whether the person gave the number of robots apart from the words.
+        measured: whether the person gave lengths apart from the words.
         scale: metres per pixel; without one only lengths in px are looked for.
     """
     text = " ".join(instruction.split())
@@ -60,7 +67,7 @@ def doubts(
     return [
         *(() if counted else _count_doubts(text, quantities, contract)),
         *_relation_doubts(text, contract),
-        *_length_doubts(quantities, contract, scale),
+        *(() if measured else _length_doubts(text, quantities, contract, scale)),
         *_weight_doubts(text, contract),
     ]
 
@@ -105,7 +112,7 @@ def _answers(contract: Contract, part: str) -> bool:
 
 
 def _length_doubts(
-    quantities: Sequence[Quantity], contract: Contract, scale: float | None
+    text: str, quantities: Sequence[Quantity], contract: Contract, scale: float | None
 ) -> Iterator[str]:
     """Lengths of the words that the contract has not; forms have lengths of their own."""
     if any(group.relation == "shape" for group in contract.groups):
@@ -116,11 +123,13 @@ def _length_doubts(
         named = quantity.px(scale) if quantity.is_length else None
         if named is None or named[0] <= 0:
             continue
-        if not all(any(abs(px - s) <= SAME * px for s in stated) for px in named):
-            yield (
-                f"the instruction names {quantity.wording}, which is no length of the contract"
-                + (f" ({length_text(named[0], scale)})" if quantity.kind == "m" else "")
-            )
+        if across := ACROSS.match(text, quantity.end):
+            if abs(2 * radius - named[0]) > SAME * named[0]:
+                has = length_text(radius, scale)
+                said = f"{quantity.wording}{across[0]}"
+                yield f"the instruction says {said}, but robot_radius is {has}"
+        elif not all(any(abs(px - s) <= SAME * px for s in stated) for px in named):
+            yield (f"the instruction names {quantity.wording}, which is no length of the contract")
 
 
 def _lengths(group: Group) -> Iterator[float]:

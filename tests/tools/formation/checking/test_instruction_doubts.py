@@ -75,7 +75,6 @@ def test_the_number_of_robots(instruction: str, robots: int, doubted: bool) -> N
     assert doubts(instruction, made, counted=True) == []
 
 
-@pytest.mark.xfail(strict=True, reason="a known fault: each of the house's four corners")
 def test_no_photograph_of_the_suite_is_doubted_when_read_rightly() -> None:
     for task in load_suite("photos").tasks:
         rule = task.goals[0].success
