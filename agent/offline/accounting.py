@@ -6,12 +6,12 @@ that is repeated to the person, or is left unread: then the planner asks and quo
 
 from collections.abc import Iterator, Sequence
 
-from .demand_fields import Fields
+from .demand_fields import LENGTHS, Fields
 from .demands import Item, demands_in, items_of, says_more, sentences, stops_in
 from .drawn_forms import form_in
 from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
 from .reading import Reading
-from .tagging import tag, tokens, word_classes
+from .tagging import Tagging, Token, in_use, tag, tokens, word_classes
 
 SURE_BACKGROUND = 0.5
 SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
@@ -48,10 +48,23 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
     known = may_command([w.text for w in words], relation)
     tagging = tag(words, known)
     items = [_drawn(item, span) for item in items_of(text, words, tagging)]
-    meanings = sorted(tagging.meaning.items(), key=lambda m: -m[1])
+    meaning = _meaning(words, tagging, items)
+    meanings = sorted(meaning.items(), key=lambda m: -m[1])
     stops = tuple((kind, " ".join(text[a:b].split())) for kind, a, b in stops_in(items))
     reading = Reading(meanings, form=form, stops=stops)
     return _Reader(text, items, reading, metres_per_pixel).read()
+
+
+def _meaning(words: Sequence[Token], tagging: Tagging, items: Sequence[Item]) -> dict[str, float]:
+    """What the command means, where lengths with the words about them say nothing of it."""
+    lengths = [d for d in demands_in(items) if d.sets in (*LENGTHS, "robot_diameter")]
+    spans = [(items[d.first].start, items[d.last - 1].end) for d in lengths]
+    labels = [
+        "length" if any(a <= word.start < b for a, b in spans) else label
+        for word, label in zip(words, tagging.labels, strict=True)
+    ]
+    bare = in_use().meaning([w.text for w in words], labels)
+    return max(bare, tagging.meaning, key=lambda m: max(m.values()))
 
 
 def _drawn(item: Item, span: tuple[int, int]) -> Item:

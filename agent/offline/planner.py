@@ -60,7 +60,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         return agreed
     reading = read_instruction(_said(task, history), task.metres_per_pixel)
     wording = reading.robots or (reading.form.robots if reading.form else None)
-    robots = task.robots or wording
+    robots = task.robots or wording or _number_answered(history)
     question = question_of(task, reading, robots)
     if question or robots is None:
         asked: dict[str, Any] = {"question": question or "How many robots?"}
@@ -162,10 +162,20 @@ def _said(task: Task, history: History) -> str:
             and answer.name == "ask_user"
             and answer.call_id not in offered
         ):
+            if answer.text.strip().isdecimal():
+                continue  # how many robots
             for quote in read_instruction(text, task.metres_per_pixel).unread:
                 text = text.replace(quote, " ", 1)
             text = f"{text} . {answer.text}"
     return text
+
+
+def _number_answered(history: History) -> int | None:
+    """The number of robots that an answer gives alone."""
+    offered = {c.id for c in calls_in(history) if c.arguments.get("candidates")}
+    asked = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
+    plain = [m.text.strip() for m in asked if m.call_id not in offered]
+    return next((int(t) for t in plain if t.isascii() and t.isdecimal()), None)
 
 
 def _label(wording: str) -> str:
