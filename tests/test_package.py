@@ -67,6 +67,7 @@ def test_wheel_holds_every_package_and_data_file_and_no_tests(tmp_path: Path) ->
     rooms = ("agent", "apps", "evals", "prompts", "tools")
     kept = [n for n in listed if (ROOT / n).is_file() and (n.startswith(rooms) or "/" not in n)]
     data = (".py", ".yaml", ".md", ".json", ".jpg", ".png", ".css", ".js", "CURRENT")
+    data += (".npz", ".txt", ".jsonl")
     wanted = [n for n in kept if n.endswith(data)]
     missing = [n for n in wanted if f"formup/{n}" not in inside and n.startswith(rooms)]
     assert not missing
