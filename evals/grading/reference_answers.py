@@ -56,7 +56,8 @@ def _spread_inside(goal: Goal) -> FloatArray:
 
 def _place_by_contract(goal: Goal, where: str, width: float) -> FloatArray:
     outlines = {"t1": goal.target.outline}
-    site = Site(outlines, *(float(side) for side in goal.size))
+    width_px, height_px = (float(side) for side in goal.size)
+    site = Site(outlines, width_px, height_px)
     contract = with_defaults(
         Contract(groups=(_group_for(goal, where, width),)), outlines, site.room
     )

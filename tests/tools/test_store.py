@@ -26,7 +26,13 @@ Begin = Callable[..., "ToolCalls"]
 @pytest.fixture(scope="module")
 def world() -> World:
     outline = (
-        next(t for t in load_suite("photos").tasks if t.picture.samefile(PHOTO)).things[0].outline
+        next(
+            t
+            for t in load_suite("photos").tasks
+            if isinstance(t.picture, Path) and t.picture.samefile(PHOTO)
+        )
+        .things[0]
+        .outline
     )
     assert len(outline.polygon.interiors) == 2
     target = Target(

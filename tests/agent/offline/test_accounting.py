@@ -155,9 +155,7 @@ LENGTHS = [
     (", spacing 1.5 m", {"pitch": 30}),
     (", at least 35 px apart", {"min_spacing": 35}),
     (", no two closer than 35 px", {"min_spacing": 35}),
-    pytest.param(
-        ", no two robots nearer than 35 px to each other", {"min_spacing": 35}, marks=FAULT
-    ),
+    pytest.param(", no two robots nearer than 35 px to each other", {"min_spacing": 35}),
     (", gaps no wider than 35 px", {"max_gap": 35}),
     (", at least 35 px apart, 20 px from the thing", {"min_spacing": 35, "clearance": [20, 21]}),
     # of the ring, of an opening, of the robots
@@ -344,10 +342,17 @@ def test_background_changes_nothing_and_is_repeated(words: str, background: str)
     assert any(background in quote for quote in reading.background)
 
 
-KINDS = {"side": "along", "cage": "cage", "center": "centre", "line_between": "between"}
-KINDS |= {"boundary": "around"}
-SPLITS = [("photos", "dev"), ("scenes", "dev"), ("many", "dev"), ("frontier", "dev")]
-SPLITS += [("formation-dev", split) for split in ("train", "dev", "test")]
+KINDS = {
+    "side": "along",
+    "cage": "cage",
+    "center": "centre",
+    "line_between": "between",
+    "boundary": "around",
+}
+SPLITS = [
+    *((name, "dev") for name in ("photos", "scenes", "many", "frontier")),
+    *(("formation-dev", split) for split in ("train", "dev", "test")),
+]
 
 
 @pytest.mark.parametrize(("suite", "split"), SPLITS)

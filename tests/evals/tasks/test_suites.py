@@ -160,6 +160,7 @@ def test_metric_tasks_name_metres_and_are_graded_in_px() -> None:
         (goal,) = task.goals
         assert not [name for name in goal.success if name.endswith("_m")]
         if "band_px" in goal.success:
+            assert task.metres_per_pixel is not None
             far = (others[0].least + sum(q.least for q in across) / 2) / task.metres_per_pixel
             assert sum(goal.success["band_px"]) / 2 == pytest.approx(far, abs=0.6)
     assert sized >= 15

@@ -43,12 +43,12 @@ def crossed(path: FloatArray, thing: Other, radius: float = 0.0) -> bool:
 def scattered(rng: np.random.Generator, count: int) -> list[Other]:
     """Round things that leave room between them, at some of the places of a grid."""
     cells = [(x, y) for x in range(110, 600, 105) for y in range(100, 440, 95)]
-    chosen = rng.permutation(len(cells))[:count]
+    chosen: list[int] = rng.permutation(len(cells))[:count].tolist()
     return [
         Other(
             f"c{k}",
             "grey thing",
-            shapely.Point(cells[i]).buffer(rng.uniform(8, 24)),
+            shapely.Point(float(cells[i][0]), float(cells[i][1])).buffer(rng.uniform(8, 24)),
             float(rng.choice([0.45, 1.0])),
         )
         for k, i in enumerate(chosen, start=1)
