@@ -10,7 +10,7 @@ from rich.table import Table
 
 from ..agent.report import Report
 from ..tools.formation.checking.verdict import Measure
-from ..tools.formation.contract import Group
+from ..tools.formation.contract import MIN_SPACING, Group
 from ..tools.formation.units import length_text
 from .terminal import say, styled, under
 
@@ -65,6 +65,8 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     if report.contract is not None and not (report.files or {}).get("contract"):
         for group in report.contract.groups:
             _line(console, "contract", _group(group, _scale(report)))
+        if report.contract.keep_out:
+            _line(console, "", f"kept off: {', '.join(report.contract.keep_out)}")
     if report.verdict is not None:
         _certificate(console, report)
     if report.arrival is not None:
@@ -147,7 +149,34 @@ def _group(group: Group, scale: float | None) -> str:
         words.append("evenly spaced")
     if group.closure:
         words.append("escape-proof" if escape_proof else f"in a closed {group.closure}")
-    return " ".join(word for word in words if word)
+    words += _demands(group, scale)
+    return " ".join(word for word in words if word).replace(" , ", ", ")
+
+
+def _demands(group: Group, scale: float | None) -> list[str]:
+    """What a group demands beside its arrangement and its distance."""
+    said: list[str] = []
+    if group.shape is not None:
+        said.append(f"forming {group.shape.name} ({group.shape.where or 'where it says'})")
+    if group.radius is not None:
+        said.append(f"on a circle of radius {length_text(group.radius, scale)}")
+    if group.pitch is not None:
+        said.append(f"neighbours {length_text(group.pitch, scale)} apart")
+    elif group.min_spacing is not None and group.min_spacing > MIN_SPACING:
+        said.append(f"at least {length_text(group.min_spacing, scale)} apart")
+    if group.max_gap is not None:
+        said.append(f"gaps of at most {length_text(group.max_gap, scale)}")
+    if group.opens:
+        width = f" of at least {length_text(group.opening, scale)}" if group.opening else ""
+        said.append(f"an opening{width} towards {group.opening_towards or 'bottom'}")
+    if group.sides is not None:
+        said.append(f"on its {', '.join(group.sides)} only")
+    if group.facing is not None:
+        said.append(f"on the side that faces {group.facing}")
+    if group.heading is not None:
+        named = isinstance(group.heading, str)
+        said.append(f"heading {group.heading if named else f'{group.heading:g} degrees'}")
+    return [f", {', '.join(said)}"] if said else []
 
 
 def _scale(report: Report) -> float | None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from .demand_fields import LENGTHS, Fields
 from .demands import Item, demands_in, items_of, says_more, sentences, stops_in
 from .drawn_forms import form_in
+from .languages import foreign_language
 from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
 from .reading import Reading
 from .tagging import Tagging, Token, in_use, tag, tokens, word_classes
@@ -51,7 +52,8 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
     meaning = _meaning(words, tagging, items)
     meanings = sorted(meaning.items(), key=lambda m: -m[1])
     stops = tuple((kind, " ".join(text[a:b].split())) for kind, a, b in stops_in(items))
-    reading = Reading(meanings, form=form, stops=stops)
+    language = foreign_language([w.text for w in words]) or ""
+    reading = Reading(meanings, form=form, stops=stops, language=language)
     return _Reader(text, items, reading, metres_per_pixel).read()
 
 
@@ -225,7 +227,7 @@ class _Reader:
                 self.reading.unread.append(self._quote(first, last))
                 continue
             aside = [k for k in range(first, last) if kinds[k] == "background"]
-            if aside:
+            if any(self.items[k].symbol not in fillers() | REASONS for k in aside):
                 self.reading.background.append(self._quote(aside[0], aside[-1] + 1))
 
     def _gives_reason(self, first: int, last: int) -> bool:

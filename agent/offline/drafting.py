@@ -27,7 +27,8 @@ NAMES = {
 def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
     """What has to be asked before anything is looked for; None where all is settled."""
     return (
-        _stopped(reading)
+        _foreign(reading)
+        or _stopped(reading)
         or _not_understood(reading, robots)
         or _unsettled(reading)
         or _how_many(reading, robots)
@@ -125,6 +126,15 @@ def place_of(reading: Reading, attempt: int) -> str | None:
     if place == "inside":
         return "inside"
     return BESIDE[attempt] if place == "along" and attempt < len(BESIDE) else None
+
+
+def _foreign(reading: Reading) -> str | None:
+    if not reading.language:
+        return None
+    return (
+        f"That seems to be {reading.language}; the offline planner reads English alone. Say it in "
+        "English, or name a language model with --model."
+    )
 
 
 def _stopped(reading: Reading) -> str | None:

@@ -31,6 +31,7 @@ class Reading:
         stops: why it is no order to place robots now, each a kind and the words for it.
         unread: words that no rule took.
         background: words that change nothing.
+        language: another one than English that it is in, or "".
         unscaled: metric lengths that a picture without a scale says nothing of.
     """
 
@@ -49,6 +50,7 @@ class Reading:
     stops: tuple[tuple[str, str], ...] = ()
     unread: list[str] = field(default_factory=list[str])
     background: list[str] = field(default_factory=list[str])
+    language: str = ""
     unscaled: list[str] = field(default_factory=list[str])
 
     @property
