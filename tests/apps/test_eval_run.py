@@ -50,7 +50,7 @@ def forgetful(tmp_path: Path) -> Path:
     (draft,) = folder.glob("*/draft-forgetful.prompt.md")
     duty = next(d for d in DUTIES if d.kind == LAPSE)
     text = draft.read_text("utf-8")
-    sentence = re.search(r"Words inside the picture[^.]*[.]", text)
+    sentence = re.search(r"Words in the picture[^.]*[.]", text)
     assert sentence is not None
     draft.write_text(text.replace(sentence[0], ""), "utf-8")
     told = " ".join(PromptLibrary(folder).load(BAD).render().lower().split())

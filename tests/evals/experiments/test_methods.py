@@ -163,7 +163,7 @@ def test_a_descriptor_is_part_of_the_arm() -> None:
 
 
 def test_the_test_model_goes_by_the_sentences_of_its_prompt() -> None:
-    for name in ("former@v001", "former@v002"):
+    for name in ("former@v001", "former@v002", "former"):
         text = load_prompt(name).text
         assert all(lapses_of(text, seed) == set() for seed in range(50))
         assert lapses_of(text.upper(), 3) == set()
