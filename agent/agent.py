@@ -152,6 +152,7 @@ class Agent:
         context = Context.of(picture, settings, World.of(picture, targets=tuple(targets)))
         check_turn(context, instruction, pointed)
         context = context.at(with_keep_outs(context, keep_out))
+        context = replace(context, steps=(context.world,))
         log = None
         if trace is not None:
             context.services.artefacts = FolderArtefacts(trace.parent / PICTURES)
@@ -195,7 +196,7 @@ class Agent:
         fixed = settings or run.context.settings.model_copy(update=once)
         fixed = fixed.model_copy(update={"approved": None})
         world = run.world.having(doubted=None)
-        context = replace(run.context, world=world, settings=fixed).check()
+        context = replace(run.context, world=world, settings=fixed, steps=run.steps).check()
         pointed = numbered_anew(pointed, world)
         check_turn(context, words, pointed)
         context = context.at(with_keep_outs(context, keep_out))

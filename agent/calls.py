@@ -77,7 +77,7 @@ async def answer(
 
 def _plan_made(before: World, after: World) -> str | None:
     """The id of the plan that a call has made the current one."""
-    name = after.current or ""
+    name = next(reversed(after.plans), "")
     return name if after.plans.get(name) is not before.plans.get(name) else None
 
 

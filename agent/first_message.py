@@ -11,7 +11,7 @@ from ..tools.draw import draw_view, view_scale
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
 from ..tools.perception.target_prompt import TargetPrompt
-from ..tools.world import World
+from ..tools.world import World, to_json_values
 from .messages import History, User
 
 MOST_NUMBERED = 40
@@ -32,6 +32,7 @@ class Task:
         targets: ids of targets that were measured before the conversation began.
         deploy: whether robots shall move once the plan is certified.
         metres_per_pixel: of the picture; None where it has no scale.
+        standing: of a later turn, the plan that stands and what led to it, see `standing`.
     """
 
     instruction: str
@@ -40,6 +41,7 @@ class Task:
     targets: tuple[str, ...]
     deploy: bool
     metres_per_pixel: float | None = None
+    standing: dict[str, Any] | None = None
 
 
 def first_message(context: Context, before: History, *, seen: bool) -> User:
@@ -75,8 +77,33 @@ def task_text(context: Context, how: str = "", *, follows: bool = False) -> str:
         "Pointed at": pointed,
         "Targets": [] if follows else [t.id for t in world.targets],
         "Deploy": settings.may_deploy,
+        **({"Standing": standing(context)} if follows else {}),
     }
     return "\n".join(f"{name}: {json.dumps(v, ensure_ascii=False)}" for name, v in lines.items())
+
+
+def standing(context: Context) -> dict[str, Any] | None:
+    """The plan that stands, in short: all that a follow-up can refer to. None where there is none.
+
+    `last` is what made it: the person's words and, if it was a change, the edits; `undo` and `redo`
+    are how many steps there are back and forward.
+    """
+    world = context.world
+    node = world.plans.get(world.current or "")
+    if node is None or world.is_void(node.plan):
+        return None
+    formation = node.plan.formation
+    back = len(context.steps) - 1 - world.undone
+    return {
+        "plan": node.plan.id,
+        "contract": to_json_values(formation.contract),
+        "robots": formation.robots,
+        "deployed": node.plan.id in world.arrivals,
+        "last": {"words": node.words, "edits": json.loads(node.edit or "null")},
+        "things": [{"id": t.id, "label": t.label} for t in world.targets],
+        "undo": max(back, 0),
+        "redo": world.undone,
+    }
 
 
 def read_task(text: str) -> Task:
@@ -97,6 +124,7 @@ def read_task(text: str) -> Task:
         targets=tuple(facts["Targets"]),
         deploy=facts["Deploy"],
         metres_per_pixel=facts.get("Metres per pixel"),
+        standing=facts.get("Standing"),
     )
 
 

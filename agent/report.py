@@ -162,7 +162,10 @@ def make_report(
     arrivals = {n: a for n, a in world.arrivals.items() if began.arrivals.get(n) is not a}
     plan = _plan(outcome, world, arrivals)
     arrival = arrivals.get(plan.id) if plan else None
-    new = plan is not None and world.plans[plan.id] is not began.plans.get(plan.id)
+    new = plan is not None and (
+        world.plans[plan.id] is not began.plans.get(plan.id)
+        or (world.undone != began.undone and plan.id == world.current)
+    )
     status, message = _status(outcome, plan, arrival, new=new)
     if plan is not None and (new or arrival is not None):
         message = _with_encounters(message, world.plans[plan.id])
@@ -191,7 +194,7 @@ def make_report(
 
 def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Plan | None:
     """The plan that waits for a person, else the one deployed last, else the one a report names,
-    else the last proposed; none void.
+    else the one that stands, else the last proposed; none void.
 
     A partial plan is shown only where it is named.
     """
@@ -200,13 +203,13 @@ def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Pl
     if arrivals:
         return world.plans[list(arrivals)[-1]].plan
     given_up = _given_up(outcome.messages)
-    version, named = world.version, given_up and given_up.arguments.get("plan_id")
-    plans = [node.plan for node in world.plans.values()]
-    valid = [p for p in plans if p.formation.scene_version == version]
-    whole = [p for p in valid if p.partial is None]
-    standing = [p for p in whole if p.id == world.current] or whole
-    meant = [p for p in valid if p.id == named] or standing
-    return meant[-1] if meant else None
+    named = given_up and given_up.arguments.get("plan_id")
+    if named in world.plans and not world.is_void(world.plans[named].plan):
+        return world.plans[named].plan
+    if world.current is None and world.undone:
+        return None
+    latest = (world.plans[name].plan for name in (world.current, *reversed(world.plans)) if name)
+    return next((p for p in latest if p.partial is None and not world.is_void(p)), None)
 
 
 def suggested(outcome: Outcome) -> Contract | None:

@@ -57,6 +57,18 @@ class Run:
         """All that is known and decided."""
         return self.outcome.world
 
+    @property
+    def steps(self) -> tuple[World, ...]:
+        """The worlds that undo goes through, up to this turn's."""
+        return stepped(self.context.steps, self.began, self.world)
+
+
+def stepped(steps: tuple[World, ...], began: World, world: World) -> tuple[World, ...]:
+    """The worlds that undo goes through, after a turn; one that took steps back adds none."""
+    if world.undone or world.current in (None, steps[-1].current):
+        return steps
+    return (*steps[: len(steps) - began.undone], world)
+
 
 @dataclass(frozen=True)
 class State:
@@ -66,6 +78,7 @@ class State:
         facts: what the session began with: model, prompts, limits, policy, picture.
         words: of the last turn.
         began: the world when that turn began.
+        steps: the worlds that undo went through then.
         seconds: how long that turn has run, pauses aside.
         end: how it ended; None where it was killed.
     """
@@ -75,6 +88,7 @@ class State:
     words: str
     world: World
     began: World
+    steps: tuple[World, ...]
     messages: History
     seconds: float
     end: Mapping[str, Any] | None
@@ -89,7 +103,7 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     """
     facts = events[0].data
     world = began = World.model_validate({"picture": facts["picture"]["facts"]})
-    settings, words, end = Settings(), "", None
+    settings, words, end, steps = Settings(), "", None, (world,)
     lines: list[Mapping[str, Any]] = []
     seconds = last = 0.0
     for event in _begun(events[1:]):
@@ -98,12 +112,14 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
         last = event.seconds
         if event.kind == "turn":
             settings = Settings.model_validate(event.data["settings"])
+            steps = stepped(steps, began, world)
             words, began = event.data["words"], world
         elif event.kind == "approval" and event.data["plan_id"]:
             settings = settings.model_copy(update={"approved": event.data["plan_id"]})
         elif event.kind == "world":
             world = world.with_changes(event.data["changes"])
         elif event.kind == "message":
+            steps = steps if lines else (world,)
             lines.append(event.data)
         end = event.data if event.kind == "end" else end
         end = None if event.kind in GOES_ON else end
@@ -112,7 +128,7 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     if any(node.plan.id != name for name, node in world.plans.items()):
         raise InputError("Its plans were altered after formup wrote them; make them again.")
     messages = read_messages(lines, artefacts)
-    return State(facts, settings, words, world, began, messages, seconds + last, end)
+    return State(facts, settings, words, world, began, steps, messages, seconds + last, end)
 
 
 def _begun(events: Sequence[Event]) -> Sequence[Event]:
@@ -245,7 +261,7 @@ def load_run(path: str | Path, picture: Picture | None = None) -> Run:
         raise InputError(f"{path} is damaged; it is no whole session that formup wrote.") from None
     services = Services.of(_picture(state.facts["picture"], artefacts, picture))
     services.artefacts = artefacts
-    context = Context(state.world, services, state.settings, state.words).check()
+    context = Context(state.world, services, state.settings, state.words, steps=state.steps).check()
     report = make_report(outcome, context, state.began, model_name(state.facts), state.seconds)
     report = report.model_copy(update={"prompt": prompt, "prompts": prompts})
     return Run(report, outcome, context, state.began, path, len(events))

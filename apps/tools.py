@@ -89,7 +89,7 @@ def call_tool(
 
 def _draw(path: Path, context: Context, world: World) -> Path:
     """The current plan on the picture as a PNG file, or what has been measured."""
-    node, file = world.plans.get(world.current or ""), io.BytesIO()
+    node, file = world.plans.get(next(reversed(world.plans), "")), io.BytesIO()
     drawn = draw_look(context.picture, world)
     if node is not None:
         drawn = draw_plan(context.picture, world, node.plan, f"plan {node.plan.id}")

@@ -24,11 +24,12 @@ Kind = Literal[
     "low_confidence",
     "count",
     "doubt",
+    "edit",
+    "nothing_to_undo",
     "unknown_target",
     "unknown_plan",
     "void_plan",
     "too_many_robots",
-    "doubt",
 ]
 """capacity: more robots than fit (`robots_that_fit`); cage: none that is escape-proof
 (`robots_that_fit`, `robots_needed`); crowded: two groups in each other's way (`groups`, from 1);
@@ -36,7 +37,9 @@ each may have `partial_plan`, the id of a plan certified for less. no_room_besid
 room on that side of a target; low_confidence: no mask that is sure enough (`confidence`,
 `threshold`); count: another number of robots than the person gave; unknown_target, unknown_plan:
 no such id; void_plan: the world has changed since; too_many_robots: more than can be driven;
-doubt: a contract that does not seem to be what the words say (`doubts`, each a clause)."""
+doubt: a contract that does not seem to be what the words say (`doubts`, each a clause); edit: the
+plan after a change is not certified (`findings`, each a sentence); nothing_to_undo: there is no
+step back, or none that was taken back."""
 
 
 class FormupError(Exception):

@@ -139,7 +139,8 @@ class PlanNode(Value):
 
     Attributes:
         parent: id of the plan it was made from by an edit.
-        edit: the edit, in the terms of the tool that made it.
+        edit: the edits that made it, as JSON.
+        words: of the person, which it was made for.
         unseen: targets whose outlines are to be looked at before robots move.
         encounters: other things that robots stand on or drive over, as far as is known.
     """
@@ -147,6 +148,7 @@ class PlanNode(Value):
     plan: Plan
     parent: str | None = None
     edit: str | None = None
+    words: str = ""
     unseen: tuple[str, ...] = ()
     encounters: tuple[Encounter, ...] = ()
 
@@ -161,12 +163,13 @@ class World(Value):
         targets: measured things.
         keep_out: regions robots stay off.
         plans: by id, in the order they were last proposed.
-        current: the id of the plan that edits apply to.
+        current: the id of the plan that stands, certified in full; edits apply to it.
         arrivals: by plan id, what was observed after its last deployment, the latest last.
         robots: last observed pose of each robot; a snapshot, the fleet knows.
         shown: candidates that a question offered.
         samples: positions that sampling tools named, s1, s2, ...
         doubted: what was found last with too little confidence, for a person to look at.
+        undone: how many of the steps that led here were taken back since the last plan was made.
 
     Raises:
         InputError: metres per pixel that no picture has.
@@ -184,6 +187,7 @@ class World(Value):
     shown: tuple[ShownCandidate, ...] = ()
     samples: dict[str, tuple[Point, ...]] = Field(default_factory=dict)
     doubted: Target | None = None
+    undone: int = 0
 
     @field_validator("metres_per_pixel")
     @classmethod
@@ -201,12 +205,20 @@ class World(Value):
         """The world with other parts, which are not validated again."""
         return self.model_copy(update=parts)
 
-    @property
-    def version(self) -> str:
-        """Changes with all that a certificate depends on: picture, scale, targets, keep-outs."""
-        outlines = {t.id: _canonical(t.outline) for t in self.targets}
+    def version_of(self, contract: Contract) -> str:
+        """Hash of what a contract's certificate depends on.
+
+        That is the picture, its scale, the outlines the contract names, and all that no robot may
+        enter. A target that was measured anew changes it for the contracts that name it.
+        """
+        named = frozenset(contract.target_ids)
+        outlines = {t.id: _canonical(t.outline) for t in self.targets if t.id in named}
         outlines |= {f"-{k.id}": _canonical(k.outline) for k in self.keep_out if k.hard}
         return scene_version(self.picture.sha256, outlines, self.metres_per_pixel)
+
+    def is_void(self, plan: Plan) -> bool:
+        """Whether what a plan was certified in has changed since."""
+        return plan.formation.scene_version != self.version_of(plan.formation.contract)
 
     def target(self, name: str) -> Target:
         """The target with an id.
@@ -231,10 +243,32 @@ class World(Value):
         return self.having(samples={**self.samples, name: tuple(points)}), name
 
     def with_plan(self, node: PlanNode) -> "World":
-        """The world with a plan as the current and latest one."""
+        """The world with a plan as the latest one and, if it is certified in full, the current."""
         name = node.plan.id
         others = {n: p for n, p in self.plans.items() if n != name}
-        return self.having(plans={**others, name: node}, current=name)
+        plans = {**others, name: node}
+        if not node.plan.verdict.certified or node.plan.partial is not None:
+            return self.having(plans=plans)
+        return self.having(plans=plans, current=name, undone=0)
+
+    @property
+    def latest(self) -> PlanNode:
+        """The plan proposed last.
+
+        Raises:
+            ToolError: there is none.
+        """
+        return self.plan(next(reversed(self.plans), None))
+
+    def back_at(self, then: "World", undone: int) -> "World":
+        """What was decided as it was then; plans stay known, and robots where they are."""
+        return self.having(
+            targets=then.targets,
+            keep_out=then.keep_out,
+            samples=then.samples,
+            current=then.current,
+            undone=undone,
+        )
 
     def with_arrival(self, plan_id: str, arrival: Arrival) -> "World":
         """The world after a deployment."""
@@ -256,7 +290,7 @@ class World(Value):
             named = "" if plan_id is None else f" {plan_id!r}"
             raise ToolError(f"There is no plan{named}. Plans: {known}.", "unknown_plan")
         node = self.plans[plan_id]
-        if node.plan.formation.scene_version != self.version:
+        if self.is_void(node.plan):
             raise ToolError(
                 f"Plan {plan_id} is void: what it is about was measured again since, or the scale "
                 "is another. Deploy one proposed since, or propose this again as it was.",

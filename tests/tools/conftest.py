@@ -54,7 +54,7 @@ class ToolCalls:
         if result.world is not None:
             self.keep(result.world)
         if tool.kind == "commit":
-            self.context = replace(self.context, proposed=self.world.current)
+            self.context = replace(self.context, proposed=next(reversed(self.world.plans), None))
         return result
 
     def call(self, name: str, **arguments: Any) -> ToolResult:

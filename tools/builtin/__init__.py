@@ -2,6 +2,7 @@
 
 from ..tool import Tool
 from .committing import ask_user, deploy, propose_formation, report_impossible
+from .editing import edit_formation, undo
 from .measuring import check_point, describe_shape, measure
 from .sampling import sample_along_edges, sample_inside, sample_shape
 from .seeing import locate_object, look, segment
@@ -17,6 +18,8 @@ TOOLS: tuple[Tool, ...] = (
     sample_shape,
     measure,
     propose_formation,
+    edit_formation,
+    undo,
     deploy,
     ask_user,
     report_impossible,

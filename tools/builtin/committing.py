@@ -81,9 +81,9 @@ async def propose_formation(
     world, found, partial = await in_thread(work)
     offered: dict[str, Any] = {}
     if partial is not None:
-        less = PlanNode(plan=partial, unseen=_unseen(world, held))
+        less = PlanNode(plan=partial, words=context.words, unseen=_unseen(world, held))
         world = await with_robots(context.at(world), less)
-        offered = {"partial": _offer(world.plan().plan), "next": SHOW_PARTIAL}
+        offered = {"partial": _offer(world.latest.plan), "next": SHOW_PARTIAL}
     if isinstance(found, PlacementError):
         context.observed(world)
         shown = closer_views(context.at(world), context.world, targets)
@@ -100,9 +100,21 @@ def _proposed(
     tell: str | None,
 ) -> ToolResult:
     """The answer to a proposal that has come to a plan, the current one of the next world."""
-    node, now, message = world.plan(), context.at(world), None
-    data = _proposal(world, node.plan) | corrections(context.world, world, targets) | offered
-    certified = node.plan.verdict.certified
+    node = world.latest
+    data = proposal_data(world, node.plan) | corrections(context.world, world, targets) | offered
+    return tell_of(context, world, node, data, targets, tell)
+
+
+def tell_of(
+    context: Context,
+    world: World,
+    node: PlanNode,
+    data: dict[str, Any],
+    targets: Sequence[TargetPrompt],
+    tell: str | None,
+) -> ToolResult:
+    """What a tool that made a plan gives back: what to look at first, or the turn's last word."""
+    now, message, certified = context.at(world), None, node.plan.verdict.certified
     if certified and (advice := _to_see(now, node)):
         data |= {"look_first": advice}
     elif certified and not context.settings.may_deploy:
@@ -143,12 +155,12 @@ def _planned(
 ) -> tuple[PlanNode | PlacementError, Plan | None]:
     """The plan of a contract or why there is none and, if it is not certified, the best partial."""
     world = context.world
-    site = world.site(held)
+    site, version = world.site(held), world.version_of(held)
     with search_budget():
         try:
-            plan = make_plan(held, site, world.version, places)
+            plan = make_plan(held, site, version, places)
         except PlacementError as error:
-            partial = best_partial(held, site, world.version, error)
+            partial = best_partial(held, site, version, error)
             if partial is None and cut_short() and CUT_SHORT not in str(error):
                 raise ToolError(f"{error}{CUT_SHORT}", error.kind, **error.facts) from None
             if partial is None:
@@ -158,8 +170,8 @@ def _planned(
         if places is None:
             plan = off_others(plan, site)
         if places is None and not plan.verdict.certified:
-            partial = best_partial(held, site, world.version, None)
-    return PlanNode(plan=plan, unseen=_unseen(world, held)), partial
+            partial = best_partial(held, site, version, None)
+    return PlanNode(plan=plan, words=context.words, unseen=_unseen(world, held)), partial
 
 
 def _refusal(error: PlacementError, partial: dict[str, str]) -> ToolError:
@@ -352,7 +364,8 @@ def _sampled(world: World, samples: tuple[str, ...]) -> Any:
     return np.concatenate([np.asarray(world.samples[s]) for s in samples] or [np.empty((0, 2))])
 
 
-def _proposal(world: World, plan: Plan) -> dict[str, Any]:
+def proposal_data(world: World, plan: Plan) -> dict[str, Any]:
+    """What a reply says of a plan."""
     verdict, contract = plan.verdict, plan.formation.contract
     findings = [f.sentence for f in verdict.findings]
     more = len(findings) - MAX_FINDINGS

@@ -10,11 +10,13 @@ from shapely.geometry import Point as Place
 from shapely.geometry.base import BaseGeometry
 
 from ..context import Context, Descriptor
+from ..errors import ToolError
 from ..formation.units import with_metres
 from ..geometry.outline import FloatArray, Outline, distances
 from ..perception.target_prompt import Point
 from ..tool import ToolResult, tool
 from .seeing import framed
+from .standing import PLAN, robot_named, standing_data
 
 MATRIX_SIDE = 32
 """Longest side of the binary matrix descriptor, cells."""
@@ -85,13 +87,17 @@ def check_point(context: Context, target: str, points: tuple[Point, ...]) -> Too
 
 
 @tool("read")
-def measure(context: Context, a: str | Point, b: str | Point) -> ToolResult:
-    """Measure nearest and centre distance and direction from a to b.
+def measure(context: Context, a: str | Point, b: str | Point | None = None) -> ToolResult:
+    """Measure nearest and centre distance and direction from a to b; or the plan that stands.
 
     Args:
-        a: id or (x, y).
+        a: id, (x, y), r3 for robot 3; or plan alone: each robot's place and distances, openings.
         b: likewise.
     """
+    if a == PLAN:
+        return ToolResult(standing_data(context))
+    if b is None:
+        raise ToolError("measure: b is missing; only the plan is measured alone.")
     (shape_a, centre_a), (shape_b, centre_b) = _place(context, a), _place(context, b)
     way = centre_b - centre_a
     data = {
@@ -104,6 +110,8 @@ def measure(context: Context, a: str | Point, b: str | Point) -> ToolResult:
 
 
 def _place(context: Context, thing: str | Point) -> tuple[BaseGeometry, FloatArray]:
+    if isinstance(thing, str) and thing[:1] == "r":
+        thing = robot_named(context.world, thing)
     if isinstance(thing, str):
         outline = context.world.target(thing).outline
         return outline.polygon, np.asarray(outline.centre)

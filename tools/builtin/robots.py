@@ -28,6 +28,7 @@ from ..formation.contract import Contract
 from ..formation.encounters import notes_of
 from ..formation.plan import Plan
 from ..formation.site import Other
+from ..geometry.outline import FloatArray
 from ..motion.motion import obstacles
 from ..tool import in_thread
 from ..world import PlanNode, World
@@ -37,8 +38,14 @@ MOST_NAMED = 12
 """Idle robots that a note names."""
 
 
-async def with_robots(context: Context, node: PlanNode) -> World:
-    """The world with a plan as the current one and, if it is certified, robots for its places.
+async def with_robots(
+    context: Context, node: PlanNode, taking: Sequence[str | None] | None = None
+) -> World:
+    """The world with a plan as the latest one and, if it is certified, robots for its places.
+
+    Args:
+        taking: the robot that keeps each place, in the order of the groups, None for one more;
+            left out, the least sum of squared ways decides.
 
     Raises:
         ToolError: a real fleet has too few robots.
@@ -49,13 +56,13 @@ async def with_robots(context: Context, node: PlanNode) -> World:
     if not plan.verdict.certified:
         return world.with_plan(node)
     try:
-        fleet = await _team(context, plan.formation.contract)
+        fleet = await _team(context, plan.formation.contract, taking or ())
     except FleetSizeError:  # more than can be driven can still be planned
         return world.with_plan(_noted(world, node, [], (), 0.0))
     check_turns(plan, fleet)
     poses, points = await fleet.observe(max_age=MAX_AGE), plan.formation.points
     try:
-        found = await in_thread(lambda: assign_robots(poses, points))
+        found = await in_thread(lambda: _assigned(poses, points, taking))
     except FleetSizeError as error:
         raise ToolError(str(error), "too_many_robots") from None
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
@@ -63,6 +70,18 @@ async def with_robots(context: Context, node: PlanNode) -> World:
     radius = fleet.radius or 0.0
     node = await in_thread(lambda: _noted(world, node, _notes(found, poses), poses, radius))
     return world.having(robots=poses).with_plan(node)
+
+
+def _assigned(
+    poses: tuple[Pose, ...], points: FloatArray, taking: Sequence[str | None] | None
+) -> Assigned:
+    """Who takes which place where some have theirs."""
+    if taking is None:
+        return assign_robots(poses, points)
+    new = [i for i, robot in enumerate(taking) if robot is None]
+    free = [pose for pose in poses if pose.id not in taking]
+    more = iter(assign_robots(free, points[new]).robots if new else ())
+    return Assigned(tuple(next(more) if robot is None else robot for robot in taking), None)
 
 
 def _noted(
@@ -86,8 +105,11 @@ def _notes(found: Assigned, poses: tuple[Pose, ...]) -> list[str]:
         )
     idle = [pose.id for pose in poses if pose.id not in set(found.robots)]
     if idle:
+        counted = "1 robot" if len(idle) == 1 else f"{len(idle)} robots"
         shown = ", ".join(idle[:MOST_NAMED]) + (", ..." if len(idle) > MOST_NAMED else "")
-        notes.append(f"Without a place, staying where they are: {len(idle)} robots ({shown}).")
+        notes.append(
+            f"Without a place, staying where they are: {len(idle)} robot{'s' * (len(idle) != 1)} ({shown})."
+        )
     return notes
 
 
@@ -107,7 +129,7 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bo
     """
     plan, world = node.plan, context.world
     try:
-        fleet = await _team(context, plan.formation.contract)
+        fleet = await _team(context, plan.formation.contract, plan.formation.robots)
         if fleet.real and context.settings.approved != plan.id:
             raise ApprovalError(plan.id)
         before = world.arrivals.get(plan.id)
@@ -149,19 +171,21 @@ async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
             context.observed(context.world.having(robots=last))
 
 
-async def _team(context: Context, contract: Contract) -> Fleet:
-    """The robots, as many as a contract wants if they are simulated."""
+async def _team(context: Context, contract: Contract, taking: Sequence[str | None] = ()) -> Fleet:
+    """The robots, as many as a contract wants if they are simulated, those who keep places too."""
     settings, world, fleets = context.settings, context.world, context.services.fleets
     held = fleets.get(settings.fleet)
+    ids = {pose.id for pose in world.robots}
     driven = any(pose.seen > 0 for pose in world.robots)
-    enough = len(world.robots) >= contract.robots if driven else False
-    if held is not None and (held.real or enough):
+    wanted = max(contract.robots, len(ids | {robot for robot in taking if robot}))
+    if held is not None and (held.real or (driven and len(ids) >= wanted)):
         return held
+    stay = driven or not ids.isdisjoint(taking) or len(ids) == contract.robots
     site, starts = world.site(contract), settings.starts
     request = FleetRequest(
         size=world.picture.size,
-        robots=contract.robots,
-        known=world.robots if driven or len(world.robots) == contract.robots else (),
+        robots=wanted if stay else contract.robots,
+        known=world.robots if stay else (),
         driven=driven,
         starts=None if starts is None else np.asarray(starts, dtype=float),
         solid=obstacles(contract, site),

@@ -185,6 +185,6 @@ def _digest(content: Any) -> str:
 def scene_version(
     picture_sha256: str, outlines: Mapping[str, object], metres_per_pixel: float | None = None
 ) -> str:
-    """Hash of what a certificate depends on: the picture, every outline in it, its scale if any."""
+    """Hash of what a certificate depends on: the picture, outlines by id, its scale if any."""
     scale = () if metres_per_pixel is None else (metres_per_pixel,)
     return "s-" + _digest([picture_sha256, dict(outlines), *scale])

@@ -30,6 +30,8 @@ NAMES = [
     "sample_shape",
     "measure",
     "propose_formation",
+    "edit_formation",
+    "undo",
     "deploy",
     "ask_user",
     "report_impossible",

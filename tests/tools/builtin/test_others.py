@@ -12,6 +12,7 @@ from formup.tools.builtin.others import with_keep_outs, with_others
 from formup.tools.builtin.robots import read_track
 from formup.tools.context import Context, Services, Settings
 from formup.tools.errors import InputError, ToolError
+from formup.tools.formation.contract import Contract, Group
 from formup.tools.perception.detectors.candidates import StandoutDetector
 from formup.tools.perception.image import Picture, picture_from_array
 from formup.tools.perception.target_prompt import TargetPrompt
@@ -138,9 +139,10 @@ def test_a_plan_that_enters_a_keep_out_is_not_certified_and_the_region_changes_t
     tool_calls: Begin,
 ) -> None:
     work = tool_calls(picture())
-    free = work.world.version
+    stated = Contract(groups=(Group(relation="shape", line=(9, 9, 99, 9), robots=2),))
+    free = work.world.version_of(stated)
     work.keep(with_keep_outs(work.context, [TargetPrompt(box=(280, 0, 559, 399))]))
-    assert work.world.version != free
+    assert work.world.version_of(stated) != free
     data = propose(work, group("along", 4, side="right", clearance=(20, 22)))
     assert not data["certified"]
     assert all("k1" in finding for finding in data["findings"])

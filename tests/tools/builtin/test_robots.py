@@ -90,7 +90,7 @@ def test_a_proposed_plan_says_which_robot_takes_which_place(
     assert [len(group) for group in made.members] == [n for _, n in groups]
     assert sorted(i for group in made.members for i in group) == list(range(count))
     stated = Contract.model_validate(contract(*groups))
-    placed = make_plan(stated, work.world.site(stated), work.world.version).formation
+    placed = make_plan(stated, work.world.site(stated), work.world.version_of(stated)).formation
     assert (placed.robots, placed.members) == ((), ())
     assert made.points.tolist() == placed.points.tolist()
     assert set(made.positions) == set(placed.positions)
@@ -282,7 +282,7 @@ def test_a_track_file_gives_the_track_back(work: "ToolCalls") -> None:
 def test_a_plan_without_robots_numbers_its_places() -> None:
     world = World.of(PICTURE, targets=(BOX,))
     stated = Contract.model_validate(contract(("around", 5)))
-    plan = make_plan(stated, world.site(stated), world.version)
+    plan = make_plan(stated, world.site(stated), world.version_of(stated))
     assert plan.formation.robot_of_place == ("1", "2", "3", "4", "5")
     assert plan.formation.points.tolist() == [list(p) for p in plan.formation.positions]
     assert world.with_plan(PlanNode(plan=plan)).plan().plan is plan

@@ -61,7 +61,7 @@ def plan_for(made: Made, positions: object = None, **group: object) -> Plan:
     contract = Contract(groups=(Group.model_validate(given),))
     points = None if positions is None else np.asarray(positions, dtype=float)
     world = made[1]
-    return make_plan(contract, world.site(contract), world.version, points)
+    return make_plan(contract, world.site(contract), world.version_of(contract), points)
 
 
 def free_plan(made: Made, positions: object) -> Plan:
@@ -194,7 +194,7 @@ def test_several_groups_with_bodies_and_a_target_to_keep_out_of() -> None:
         robot_radius=4,
         keep_out=("t3",),
     )
-    plan = make_plan(contract, made[1].site(contract), made[1].version)
+    plan = make_plan(contract, made[1].site(contract), made[1].version_of(contract))
     assert draw_plan(*made, plan, "Two jobs").width == 1200
 
 

@@ -121,7 +121,7 @@ def test_targets_and_robots_are_drawn_where_they_are() -> None:
     picture = bare(600, 400)
     world = World.of(picture).with_target(box())
     contract = Contract(groups=(Group(relation="corners", targets=("t1",), robots=4),))
-    plan = make_plan(contract, world.site(contract), world.version)
+    plan = make_plan(contract, world.site(contract), world.version_of(contract))
     plain, view = shown(view_of(picture)), shown(draw_view(picture, world, plan=plan))
     changed = np.abs(plain - view).sum(axis=2) > 60
     assert changed[150, 96:104].any()  # the left edge
@@ -152,6 +152,6 @@ def test_a_plan_about_a_target_that_is_gone_is_refused() -> None:
     picture = bare(600, 400)
     whole = World.of(picture).with_target(box())
     contract = Contract(groups=(Group(relation="around", targets=("t1",), robots=4),))
-    plan = make_plan(contract, whole.site(contract), whole.version)
+    plan = make_plan(contract, whole.site(contract), whole.version_of(contract))
     with pytest.raises(ToolError, match="'t1'"):
         view_of(picture, plan=plan)

@@ -1,0 +1,199 @@
+"""Tools that change the plan that stands: edit_formation and undo.
+
+Whatever an edit does not name stays as it is, and every robot keeps its number.
+"""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..context import Context
+from ..errors import ToolError
+from ..formation.editing.edit_kinds import Edit
+from ..formation.editing.edits import Edited, edited
+from ..formation.plan import Plan
+from ..formation.units import with_metres
+from ..perception.target_prompt import TargetPrompt
+from ..tool import ToolResult, in_thread, tool
+from ..world import PlanNode, World, to_json_values
+from .committing import MAX_FINDINGS, proposal_data, tell_of
+from .others import with_others
+from .robots import with_robots
+from .targets import doubtful, measured_all
+
+MOST_MOVES = 12
+"""Robots of a reply whose ways are listed; of the others the number and the longest."""
+STAYS = 0.05
+"""A robot whose place is nearer than this to the one it had, px, stays."""
+NOT_MOVED = "robots stay where they are until deploy"
+
+
+@tool("commit")
+async def edit_formation(
+    context: Context,
+    edits: tuple[Edit, ...],
+    plan_id: str | None = None,
+    targets: tuple[TargetPrompt, ...] = (),
+    stay: tuple[int, ...] = (),
+    tell: str | None = None,
+) -> ToolResult:
+    """Change the plan that stands; what is not named stays: who stands where, things, lengths.
+
+    Args:
+        edits: in order.
+        plan_id: to change an earlier plan instead.
+        targets: things the edits name that are not measured yet.
+        stay: numbers of robots that are not to move.
+        tell: as of propose_formation.
+    """
+    if not edits:
+        raise ToolError("edit_formation: name at least one edit.")
+    parent = context.world.plan(plan_id)
+
+    def work() -> tuple[World, Edited]:
+        world = with_others(context.at(measured_all(context, targets)))
+        return world, _edited(world, parent.plan, edits, stay)
+
+    world, made = await in_thread(work)
+    contract = made.plan.formation.contract
+    known = set(parent.plan.formation.contract.target_ids)
+    unseen = [t.id for t in world.targets if t.id not in known and doubtful(t)]
+    node = PlanNode(
+        plan=made.plan,
+        parent=parent.plan.id,
+        words=context.words,
+        edit=json.dumps([_edit_facts(edit) for edit in edits], separators=(",", ":")),
+        unseen=tuple(n for n in (*parent.unseen, *unseen) if n in contract.target_ids),
+    )
+    names = parent.plan.formation.robot_of_place
+    taking = [None if was is None else names[was - 1] for was in made.diff.was]
+    world = await with_robots(context.at(world), node, taking)
+    node = world.latest
+    data = {"parent": parent.plan.id, **proposal_data(world, node.plan)}
+    data |= with_metres(moves(parent.plan, node.plan), world.metres_per_pixel)
+    return tell_of(context, world, node, data, targets, tell)
+
+
+def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]) -> Edited:
+    """The certified plan after edits whose numbers are those of robots.
+
+    Raises:
+        ToolError: an edit makes no sense, or what comes of it is not certified: nothing changed.
+    """
+    site, meant = world.site(plan.formation.contract), [_by_place(edit, plan) for edit in edits]
+    made = edited_all(plan, meant, site)
+    verdict = made.plan.verdict
+    if not verdict.certified:
+        findings = [finding.sentence for finding in verdict.findings]
+        more = len(findings) - MAX_FINDINGS
+        text = " ".join([*findings[:MAX_FINDINGS], *([f"And {more} more."] if more > 0 else [])])
+        raise ToolError(
+            f"Nothing was changed: plan {plan.id} stands, because after this {text}",
+            "edit",
+            findings=findings,
+        )
+    return made
+
+
+def _edit_facts(edit: Edit) -> dict[str, Any]:
+    """An edit as JSON, its kind always named."""
+    return {"kind": edit.kind, **to_json_values(edit)}
+
+
+def _by_place(edit: Edit, plan: Plan) -> Edit:
+    """An edit whose robots are numbered by their places, from 1, instead of by their ids."""
+    names = plan.formation.robot_of_place
+
+    def place(number: int) -> int:
+        if str(number) not in names:
+            known = ", ".join(sorted(names, key=lambda name: (len(name), name)))
+            raise ToolError(f"There is no robot {number} in the plan; robots: {known}.")
+        return names.index(str(number)) + 1
+
+    given = {name: getattr(edit, name, None) for name in ("a", "b", "robot", "robots")}
+    places: dict[str, Any] = {}
+    for name, number in given.items():
+        if isinstance(number, tuple):
+            places[name] = tuple(map(place, number))
+        elif number is not None and name != "robots":  # there it is how many
+            places[name] = place(number)
+    return edit.model_copy(update=places)
+
+
+def edited_all(plan: Plan, edits: Sequence[Edit], site: Any) -> Edited:
+    """Temporary."""
+    first, was = plan, list(range(1, len(plan.formation.positions) + 1))
+    made = None
+    for edit in edits:
+        made = edited(plan, edit, site)
+        was = [None if w is None else was[w - 1] for w in made.diff.was]
+        plan = made.plan
+    return made.model_copy(
+        update={"parent": first.id, "diff": made.diff.model_copy(update={"was": tuple(was)})}
+    )
+
+
+def moves(before: Plan, after: Plan) -> dict[str, Any]:
+    """Who has another place than before and how far it is from the old one, by robots' ids."""
+    old = dict(zip(before.formation.robots, before.formation.positions, strict=False))
+    new = dict(zip(after.formation.robots, after.formation.positions, strict=False))
+    ways = {n: float(np.hypot(*np.subtract(new[n], old[n]))) for n in new if n in old}
+    going = sorted((n for n in ways if ways[n] >= STAYS), key=lambda n: -ways[n])
+    listed = [{"robot": n, "px": round(ways[n], 1)} for n in going[:MOST_MOVES]]
+    return {
+        "moves": listed,
+        "moving": len(going),
+        "longest_px": round(max(ways.values(), default=0.0), 1),
+        "staying": len(ways) - len(going),
+        "added": [n for n in new if n not in old],
+        "removed": [n for n in old if n not in new],
+    }
+
+
+@tool("commit")
+def undo(context: Context, steps: int = 1, to: str | None = None) -> ToolResult:
+    """Go back to the plan before; robots do not move by that.
+
+    Args:
+        steps: how many; negative goes forward again.
+        to: first, or the id of a plan of the conversation, instead.
+    """
+    world, line = context.world, _line(context)
+    at = len(line) - 1 - world.undone
+    wanted = at - steps if to is None else _place_of(line, to)
+    if steps == 0 and to is None:
+        raise ToolError("undo: steps is 1 or more to go back, -1 or less to go forward again.")
+    if not 0 <= wanted < len(line):
+        which = "There is nothing to undo" if wanted < 0 else "Nothing was undone"
+        left = at if wanted < 0 else len(line) - 1 - at
+        raise ToolError(f"{which}: {left} of {abs(steps)} steps are there.", "nothing_to_undo")
+    world = world.back_at(line[wanted], len(line) - 1 - wanted)
+    if world.current is None:
+        return ToolResult({"plan_id": None, "robots": NOT_MOVED}, world=world)
+    plan = world.plan().plan
+    before = context.world.plans.get(context.world.current or "")
+    data = proposal_data(world, plan) | (moves(before.plan, plan) if before else {})
+    return ToolResult(data | {"next": NOT_MOVED}, world=world)
+
+
+def _line(context: Context) -> list[World]:
+    """The worlds undo goes through, the one that this turn has changed among them."""
+    world, steps = context.world, list(context.steps)
+    if world.undone == 0 and (not steps or steps[-1].current != world.current):
+        steps.append(world)
+    return steps
+
+
+def _place_of(line: Sequence[World], to: str) -> int:
+    """Where a plan stands in the line of plans.
+
+    Raises:
+        ToolError: it is not there.
+    """
+    for place, world in enumerate(line):
+        if world.current is not None and to in ("first", world.current):
+            return place
+    known = ", ".join(world.current for world in line if world.current) or "none yet"
+    raise ToolError(f"There is no plan {to!r} to go back to; plans: {known}.", "unknown_plan")

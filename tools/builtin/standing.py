@@ -1,0 +1,118 @@
+"""The plan that stands as numbers: places, distances, and whether a ring closes."""
+
+from typing import Any
+
+import numpy as np
+
+from ..context import Context
+from ..errors import ToolError
+from ..formation.checking.surroundings import clearance_of, ring_of
+from ..formation.plan import Plan
+from ..formation.units import with_metres
+from ..geometry.outline import FloatArray
+from ..geometry.sampling import nearest
+from ..world import World
+
+PLAN = "plan"
+"""What `measure` is asked for to be told of the plan that stands."""
+MOST_ROBOTS = 60
+"""Robots a reply lists one by one."""
+
+
+def _place_of_robot(world: World, name: str) -> tuple[float, float] | None:
+    """Where a robot stands, or shall stand where it was never driven; None for no robot's name."""
+    robot = name.removeprefix("r")
+    driven = {pose.id: (pose.x, pose.y) for pose in world.robots if pose.seen > 0}
+    if robot in driven:
+        return driven[robot]
+    node = world.plans.get(world.current or "")
+    if node is None or robot not in node.plan.formation.robots:
+        return None
+    formation = node.plan.formation
+    return formation.positions[formation.robots.index(robot)]
+
+
+def standing_data(context: Context) -> dict[str, Any]:
+    """What `measure` says of the plan that stands."""
+    world = context.world
+    plan = world.plan().plan
+    robots = [
+        row for k in range(len(plan.formation.contract.groups)) for row in _rows(world, plan, k)
+    ]
+    data: dict[str, Any] = {"plan_id": plan.id, "robots": len(robots)}
+    data |= {"deployed": plan.id in world.arrivals, "arrived": _arrived(world, plan)}
+    data |= {"groups": [_group(world, plan, k) for k in range(len(plan.formation.contract.groups))]}
+    rows = sorted(robots, key=lambda row: (len(row["robot"]), row["robot"]))
+    data["each"] = rows[:MOST_ROBOTS]
+    return with_metres(data, world.metres_per_pixel)
+
+
+def _members(plan: Plan, k: int) -> tuple[list[str], FloatArray]:
+    """Ids and places, (n, 2) px, of the robots of a group, counted from 0."""
+    groups = plan.formation.contract.groups
+    first = sum(group.robots for group in groups[:k])
+    mine = slice(first, first + groups[k].robots)
+    return list(plan.formation.robot_of_place[mine]), plan.formation.points[mine]
+
+
+def _rows(world: World, plan: Plan, k: int) -> list[dict[str, Any]]:
+    """Each robot of a group: its place, and how far it is from its thing and its neighbour."""
+    contract, (names, points) = plan.formation.contract, _members(plan, k)
+    group, everybody = contract.groups[k], plan.formation.points
+    apart, other = nearest(everybody, points, min(2, len(everybody)))
+    off = None
+    if group.targets:
+        outline = world.outline(group.targets[0])
+        off = clearance_of(points, outline, group, contract.robot_radius)
+    seen = {pose.id: pose for pose in world.robots if pose.seen > 0}
+    rows: list[dict[str, Any]] = []
+    for i, name in enumerate(names):
+        row: dict[str, Any] = {"robot": name, "place": points[i].round(1).tolist()}
+        if off is not None:
+            row |= {"target": group.targets[0], "target_px": round(float(off[i]), 1)}
+        if len(everybody) > 1:
+            neighbour = plan.formation.robot_of_place[int(other[i, 1])]
+            row |= {"neighbour": neighbour, "neighbour_px": round(float(apart[i, 1]), 1)}
+        if name in seen:
+            row["at"] = [round(seen[name].x, 1), round(seen[name].y, 1)]
+        rows.append(row)
+    return rows
+
+
+def _group(world: World, plan: Plan, k: int) -> dict[str, Any]:
+    """A group's arrangement and, around one thing, how closed it is."""
+    contract, (names, points) = plan.formation.contract, _members(plan, k)
+    group = contract.groups[k]
+    data: dict[str, Any] = {"relation": group.relation, "targets": group.targets}
+    if len(group.targets) != 1 or group.enters:
+        return data
+    ring = ring_of(points, world.outline(group.targets[0]), contract.robot_radius)
+    if ring is None:
+        return data
+    return data | ring.model_dump() | {"between": [names[i] for i in ring.between]}
+
+
+def _arrived(world: World, plan: Plan) -> bool:
+    """Whether the robots were observed at the places of the plan, where they stand last."""
+    arrival = world.arrivals.get(plan.id)
+    if arrival is None or not arrival.arrived:
+        return False
+    seen = {pose.id: (pose.x, pose.y) for pose in world.robots}
+    places = zip(plan.formation.robots, plan.formation.positions, strict=True)
+    off = [np.hypot(*np.subtract(seen.get(name, (np.inf, 0)), place)) for name, place in places]
+    return bool(max(off) <= arrival.tolerance_px)
+
+
+def robot_named(world: World, name: str) -> tuple[float, float]:
+    """Where a robot is, by r and its id, such as r3.
+
+    Raises:
+        ToolError: there is none of that name.
+    """
+    found = _place_of_robot(world, name)
+    if found is None:
+        node = world.plans.get(world.current or "")
+        ids = [pose.id for pose in world.robots] if node is None else node.plan.formation.robots
+        known = ", ".join(f"r{robot}" for robot in ids) or "none yet"
+        raise ToolError(f"There is no robot {name!r}. Robots: {known}.")
+    return found
