@@ -1,41 +1,68 @@
 """The changes of a formation that can be asked for, as values with a `kind`.
 
-One union, so that a conversation can be given its JSON Schema. Lengths are image pixels, robots
-and groups are numbered from 1.
+One union; the JSON Schema that a conversation is given is a flat one, as short as can be. Lengths
+are image pixels; robots are called by their numbers, groups are numbered from 1.
 """
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, WithJsonSchema, model_validator
 
-from ..contract import SideName
+from ..contract import Angle, Length, RingPart, SideName
+from ..shape_spec import Pair
 from ..value import Value
 
 Finite = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)]
 Number = Annotated[int, Field(ge=1, le=10_000)]
+Numbers = Annotated[tuple[Number, ...], Field(min_length=1)]
 
 
-class _GroupEdit(Value):
-    group: int | None = Field(
-        default=None, ge=1, description="Which group of the contract, from 1; all where left out."
-    )
+class _Edit(Value):
+    """Fields of which exactly one is given are `ONE_OF`."""
 
-
-class Offset(_GroupEdit):
-    """Further out from the target, or further in."""
-
-    kind: Literal["out", "in"]
-    px: Positive | None = None
-    factor: Annotated[float, Field(gt=1, le=1000)] | None = Field(
-        default=None, description="Of the distance robots' edges keep: out multiplies, in divides."
-    )
+    ONE_OF: ClassVar[tuple[str, ...]] = ()
 
     @model_validator(mode="after")
     def _one_of_them(self) -> Self:
-        if (self.px is None) == (self.factor is None):
-            raise ValueError("give either px or factor")
+        given = sum(getattr(self, name) is not None for name in self.ONE_OF)
+        if self.ONE_OF and given != 1:
+            raise ValueError(f"give either {' or '.join(self.ONE_OF)}")
         return self
+
+
+class _GroupEdit(_Edit):
+    """Of one group of the contract, from 1; of all it can be meant for where that is left out."""
+
+    group: int | None = Field(default=None, ge=1)
+
+
+class Offset(_GroupEdit):
+    """Further out from the target, or further in.
+
+    A factor is of the distance robots' edges keep: out multiplies, in divides.
+    """
+
+    ONE_OF = ("px", "factor")
+    kind: Literal["out", "in"]
+    px: Positive | None = None
+    factor: Annotated[float, Field(gt=1, le=1000)] | None = None
+
+
+class Distance(_GroupEdit):
+    """Robots' edges exactly so far from the outline."""
+
+    kind: Literal["distance"] = "distance"
+    px: Length
+
+
+class Spacing(_GroupEdit):
+    """Neighbours' centres so far apart, or a multiple of what they are now."""
+
+    ONE_OF = ("px", "factor")
+    kind: Literal["spacing"] = "spacing"
+    px: Positive | None = None
+    factor: Annotated[float, Field(gt=0, le=1000)] | None = None
 
 
 class Rotate(_GroupEdit):
@@ -83,18 +110,20 @@ class Add(_GroupEdit):
 class Remove(_GroupEdit):
     """Fewer robots: those named, or the n last ones of a group; the others close the gaps."""
 
+    ONE_OF = ("n", "robots")
     kind: Literal["remove"] = "remove"
     n: Number | None = None
-    robots: tuple[Number, ...] | None = Field(default=None, min_length=1)
-
-    @model_validator(mode="after")
-    def _one_of_them(self) -> Self:
-        if (self.n is None) == (self.robots is None):
-            raise ValueError("give either n or robots")
-        return self
+    robots: Numbers | None = None
 
 
-class Swap(Value):
+class Count(_GroupEdit):
+    """So many robots in all; as many as close the ring, or as fit with the spacing asked for."""
+
+    kind: Literal["count"] = "count"
+    robots: Number | Literal["needed", "fit"]
+
+
+class Swap(_Edit):
     """Two robots take each other's place."""
 
     kind: Literal["swap"] = "swap"
@@ -109,14 +138,138 @@ class SideOnly(_GroupEdit):
     side: SideName
 
 
-class Skip(Value):
+class Skip(_Edit):
     """Robots leave and their places stay empty."""
 
     kind: Literal["skip"] = "skip"
-    robots: tuple[Number, ...] = Field(min_length=1)
+    robots: Numbers
 
+
+class Sides(_GroupEdit):
+    """The ring on some parts of the way round only, or leaving some free."""
+
+    ONE_OF = ("only", "without")
+    kind: Literal["sides"] = "sides"
+    only: tuple[RingPart, ...] | None = Field(default=None, min_length=1)
+    without: tuple[RingPart, ...] | None = Field(default=None, min_length=1)
+
+
+class Opening(_GroupEdit):
+    """A gap in the ring; what is left out stays as it is. A factor is of the gap that is there."""
+
+    kind: Literal["opening"] = "opening"
+    towards: str | Angle | None = None
+    px: Length | None = None
+    factor: Annotated[float, Field(gt=0, le=1000)] | None = None
+
+
+class Closure(_GroupEdit):
+    """A closed ring all round, one with no such demand, or one that nothing gets out of."""
+
+    kind: Literal["close", "open", "escape-proof"]
+
+
+class Arrange(_GroupEdit):
+    """Another arrangement of the same robots, as fields of a Group; targets left out stay."""
+
+    kind: Literal["arrange"] = "arrange"
+    demands: dict[str, Any]
+
+
+class Target(_GroupEdit):
+    """The same around another thing; for some robots, by count or number, where those are given.
+
+    The others close up unless they are to stay as they stand.
+    """
+
+    kind: Literal["target"] = "target"
+    to: str
+    robots: Number | Numbers | None = None
+    stay: bool = False
+
+
+class Merge(_Edit):
+    """Groups of one relation back into one: around the first one's target, or another."""
+
+    kind: Literal["merge"] = "merge"
+    to: str | None = None
+
+
+class Place(_Edit):
+    """One robot to a point, by so much, or beside a thing; nobody else moves."""
+
+    ONE_OF = ("to", "by", "target")
+    kind: Literal["place"] = "place"
+    robot: Number
+    to: Pair | None = None
+    by: Pair | None = None
+    target: str | None = None
+
+
+class Heading(_GroupEdit):
+    """Which way to look: towards or away from the target, at a thing, degrees; null: any."""
+
+    kind: Literal["heading"] = "heading"
+    to: str | Angle | None = None
+
+
+class KeepOff(_Edit):
+    """Further things that no robot may stand on or drive over."""
+
+    kind: Literal["keep-out"] = "keep-out"
+    ids: tuple[str, ...] = Field(min_length=1)
+
+
+_FIELDS: dict[str, tuple[str, ...]] = {
+    "integer": ("group", "n", "a", "b", "robot"),
+    "number": ("px", "factor", "degrees", "dx", "dy"),
+    "array": ("only", "without", "by", "ids"),
+    "string": ("kind", "axis", "side", "target"),
+    "boolean": ("stay",),
+    "object": ("demands",),
+}
+_OF_ANY_TYPE: tuple[str, ...] = ("robots", "towards", "to")
+EDIT_SCHEMA: dict[str, Any] = {
+    "type": "object",
+    "description": (
+        "Kinds: out, in: px or factor. distance: px from the outline. spacing: px or factor. rotate: "
+        "degrees clockwise. mirror: axis left-right or top-bottom. shift: dx, dy. scale: factor. "
+        "add: n. remove: n or robots (numbers); others close up. count: robots, a number, needed "
+        "(to close the ring) or fit. swap: a, b. skip: robots; places stay empty. side: all to it. "
+        "sides: only or without, as of a ring. opening: towards, px wide or factor. close, open, "
+        "escape-proof. arrange: demands, fields of a group. target: to an id; only robots (a count "
+        "or numbers), the rest stay. merge. place: robot to [x, y], by [dx, dy] or target. heading: "
+        "to. keep-out: ids. group: which, if several."
+    ),
+    "properties": {name: {"type": type_} for type_, names in _FIELDS.items() for name in names}
+    | {name: {} for name in _OF_ANY_TYPE},
+    "required": ["kind"],
+}
+"""The union in short, as models are offered it; the union itself says what does not fit."""
 
 Edit = Annotated[
-    Offset | Rotate | Mirror | Shift | Scale | Add | Remove | Swap | SideOnly | Skip,
+    Offset
+    | Distance
+    | Spacing
+    | Rotate
+    | Mirror
+    | Shift
+    | Scale
+    | Add
+    | Remove
+    | Count
+    | Swap
+    | SideOnly
+    | Skip
+    | Sides
+    | Opening
+    | Closure
+    | Arrange
+    | Target
+    | Merge
+    | Place
+    | Heading
+    | KeepOff,
     Field(discriminator="kind"),
+    WithJsonSchema(EDIT_SCHEMA),
 ]
