@@ -160,7 +160,7 @@ def undo(context: Context, steps: int = 1, to: str | None = None) -> ToolResult:
         steps: how many; negative goes forward again.
         to: first, or the id of a plan of the conversation, instead.
     """
-    world, line = context.world, _line(context)
+    world, line = context.world, _line_of_plans(context)
     at = len(line) - 1 - world.undone
     wanted = at - steps if to is None else _place_of(line, to)
     if steps == 0 and to is None:
@@ -178,7 +178,7 @@ def undo(context: Context, steps: int = 1, to: str | None = None) -> ToolResult:
     return ToolResult(data | {"next": NOT_MOVED}, world=world)
 
 
-def _line(context: Context) -> list[World]:
+def _line_of_plans(context: Context) -> list[World]:
     """The worlds undo goes through, the one that this turn has changed among them."""
     world, steps = context.world, list(context.steps)
     if world.undone == 0 and (not steps or steps[-1].current != world.current):

@@ -107,9 +107,7 @@ def _notes(found: Assigned, poses: tuple[Pose, ...]) -> list[str]:
     if idle:
         counted = "1 robot" if len(idle) == 1 else f"{len(idle)} robots"
         shown = ", ".join(idle[:MOST_NAMED]) + (", ..." if len(idle) > MOST_NAMED else "")
-        notes.append(
-            f"Without a place, staying where they are: {len(idle)} robot{'s' * (len(idle) != 1)} ({shown})."
-        )
+        notes.append(f"Without a place, staying where they are: {counted} ({shown}).")
     return notes
 
 

@@ -37,11 +37,15 @@ def standing_data(context: Context) -> dict[str, Any]:
     world = context.world
     plan = world.plan().plan
     robots = [
-        row for k in range(len(plan.formation.contract.groups)) for row in _rows(world, plan, k)
+        row
+        for k in range(len(plan.formation.contract.groups))
+        for row in _robot_rows(world, plan, k)
     ]
     data: dict[str, Any] = {"plan_id": plan.id, "robots": len(robots)}
     data |= {"deployed": plan.id in world.arrivals, "arrived": _arrived(world, plan)}
-    data |= {"groups": [_group(world, plan, k) for k in range(len(plan.formation.contract.groups))]}
+    data |= {
+        "groups": [_group_facts(world, plan, k) for k in range(len(plan.formation.contract.groups))]
+    }
     rows = sorted(robots, key=lambda row: (len(row["robot"]), row["robot"]))
     data["each"] = rows[:MOST_ROBOTS]
     return with_metres(data, world.metres_per_pixel)
@@ -55,7 +59,7 @@ def _members(plan: Plan, k: int) -> tuple[list[str], FloatArray]:
     return list(plan.formation.robot_of_place[mine]), plan.formation.points[mine]
 
 
-def _rows(world: World, plan: Plan, k: int) -> list[dict[str, Any]]:
+def _robot_rows(world: World, plan: Plan, k: int) -> list[dict[str, Any]]:
     """Each robot of a group: its place, and how far it is from its thing and its neighbour."""
     contract, (names, points) = plan.formation.contract, _members(plan, k)
     group, everybody = contract.groups[k], plan.formation.points
@@ -79,7 +83,7 @@ def _rows(world: World, plan: Plan, k: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _group(world: World, plan: Plan, k: int) -> dict[str, Any]:
+def _group_facts(world: World, plan: Plan, k: int) -> dict[str, Any]:
     """A group's arrangement and, around one thing, how closed it is."""
     contract, (names, points) = plan.formation.contract, _members(plan, k)
     group = contract.groups[k]

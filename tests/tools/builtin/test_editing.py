@@ -121,7 +121,7 @@ def test_the_plan_is_measured_robot_by_robot(work: "ToolCalls") -> None:
     (group,) = work.call("measure", a="plan").data["groups"]
     assert group["closed"] is False
     assert group["robots_to_close"] > 3
-    with pytest.raises(ToolError, match="no robot 'r9'. Robots: r3, r4, r5"):
+    with pytest.raises(ToolError, match=r"no robot 'r9'\. Robots: r3, r4, r5"):
         work.call("measure", a="r9", b="t1")
     with pytest.raises(ToolError, match="b is missing"):
         work.call("measure", a="t1")
