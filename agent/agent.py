@@ -29,7 +29,9 @@ from .providers.registry import model_named
 from .report import Report, make_report
 from .session import LogRecorder, Run, Show, answered_by, picture_facts
 from .session_start import FORMAT
-from .store.folder import PICTURES, FolderArtefacts, FolderLog
+from .store.folder import FolderLog
+from .store.folder_store import FolderSession
+from .store.protocol import StoredSession
 from .wrappers.telemetry import traced_model, traced_run, traced_tool
 from .wrappers.two_stages import offered, prompt_named, staged
 
@@ -50,7 +52,7 @@ class RunOptions(SayOptions, total=False):
     """What may be given with the first words; see `Agent.arun`."""
 
     targets: Sequence[Target]
-    trace: Path | None
+    trace: Path | StoredSession | None
 
 
 class Agent:
@@ -129,7 +131,7 @@ class Agent:
         targets: Sequence[Target] = (),
         keep_out: Sequence[TargetPrompt] = (),
         settings: Settings | None = None,
-        trace: Path | None = None,
+        trace: Path | StoredSession | None = None,
         show: Show | None = None,
     ) -> Run:
         """Carry out one instruction on one picture: a session of one turn, that can go on.
@@ -142,8 +144,8 @@ class Agent:
             keep_out: what no robot may stand on or drive over: boxes and outlines as they are
                 drawn, things at points, candidates.
             settings: what the person fixed.
-            trace: a file to write the session to as it goes: it can be resumed and replayed from
-                it, by default in another process.
+            trace: a file, or a new session of a store, to write to as it goes: it can be resumed
+                and replayed from there, by default in another process.
             show: is given every message as it comes.
 
         Raises:
@@ -152,14 +154,14 @@ class Agent:
         context = Context.of(picture, settings, World.of(picture, targets=tuple(targets)))
         check_turn(context, instruction, pointed)
         context = context.at(with_keep_outs(context, keep_out))
-        context = replace(context, steps=(context.world,))
-        log = None
-        if trace is not None:
-            context.services.artefacts = FolderArtefacts(trace.parent / PICTURES)
-            log = FolderLog(trace, begin=True)
+        context = replace(context, steps=(context.world.step,))
+        log, stored = None, FolderSession(trace) if isinstance(trace, Path) else trace
+        if stored is not None:
+            context.services.artefacts = stored.artefacts
+            log = FolderLog(trace, begin=True) if isinstance(trace, Path) else stored.write(0)
         with closing(LogRecorder(log, context.services.artefacts, None, show)) as recorder:
             recorder.event("session", self._facts(picture, context) if log else {})
-            return await self._turn(context, (), instruction, pointed, recorder, trace)
+            return await self._turn(context, (), instruction, pointed, recorder, stored)
 
     def say(self, run: Run, words: str, **options: Unpack[SayOptions]) -> Run:
         """The next turn of a session; the synchronous door to `asay`.
@@ -204,7 +206,7 @@ class Agent:
         with closing(_reopened(run, show)) as recorder:
             for message in messages[len(run.outcome.messages) :]:
                 recorder.message(message, run.world)
-            return await self._turn(context, messages, words, pointed, recorder, run.trace)
+            return await self._turn(context, messages, words, pointed, recorder, run.stored)
 
     def resume(
         self,
@@ -263,7 +265,7 @@ class Agent:
         words: str,
         pointed: Sequence[TargetPrompt],
         recorder: LogRecorder,
-        trace: Path | None,
+        stored: StoredSession | None,
     ) -> Run:
         """Begin a turn and let the loop work on it."""
         recorder.event("turn", {"words": words, "settings": to_json_values(context.settings)})
@@ -273,7 +275,7 @@ class Agent:
         recorder.message(first, world)
         blank = Report(status="stopped", message="", instruction=words, model=self.model.name)
         left = Cancelled((*messages, first), world)
-        run = Run(blank, left, context, context.world, trace)
+        run = Run(blank, left, context, context.world, stored)
         return await self._go(run, left.messages, recorder)
 
     async def _go(
@@ -309,7 +311,7 @@ class Agent:
                 text = f"{report.message} The log ends before this: {recorder.problem}"
                 report = report.model_copy(update={"message": text})
             describe(outcome, report)
-        return Run(report, outcome, context, left.began, left.trace, recorder.events)
+        return Run(report, outcome, context, left.began, left.stored, recorder.events)
 
     def _facts(self, picture: Picture, context: Context) -> dict[str, Any]:
         """What a log begins with, enough to go on in another process."""
@@ -362,11 +364,12 @@ def _reopened(run: Run, show: Show | None) -> LogRecorder:
     Raises:
         StorageError: another process writes its log, or it has gone on since it was read.
     """
-    log = None if run.trace is None else FolderLog(run.trace)
-    if log is not None and log.last != run.events:
-        log.close()
-        lost = "could not be written to its end" if run.events is None else "has gone on since"
-        raise StorageError(f"The session in {run.trace} {lost}; open it again with load_run.")
+    log = None
+    if run.stored is not None:
+        if run.events is None:
+            lost = "could not be written to its end; open it again with load_run."
+            raise StorageError(f"{run.stored.label} {lost}")
+        log = run.stored.write(run.events)
     return LogRecorder(log, run.context.services.artefacts, run.world, show)
 
 

@@ -190,8 +190,30 @@ def is_repeated(history: Sequence[Message]) -> bool:
 
 def closed(history: History, why: str) -> History:
     """The history with a result for each call that has none, so that any provider takes it."""
-    open_calls = unanswered(history)
-    return (
-        *history,
-        *(Result(call_id=c.id, name=c.name, text=why, error="refused") for c in open_calls),
-    )
+    return (*history, *(_unknown(call, why) for call in unanswered(history)))
+
+
+LOST = "No result: it was broken off before one came, so that what it did is not known."
+
+
+def paired(history: Sequence[Message]) -> History:
+    """The history with each call answered once and at once, as every provider demands.
+
+    Calls that a kill left without a result are given one that says so, but for those at the end,
+    which may yet be answered; results of no call, or of one that is answered, are left out.
+    """
+    made: list[Message] = []
+    waiting: dict[str, Call] = {}
+    for message in history:
+        if isinstance(message, Result):
+            if waiting.pop(message.call_id, None) is None:
+                continue
+        else:
+            made += (_unknown(call, LOST) for call in waiting.values())
+            waiting = {c.id: c for c in message.calls} if isinstance(message, Reply) else {}
+        made.append(message)
+    return tuple(made)
+
+
+def _unknown(call: Call, why: str) -> Result:
+    return Result(call_id=call.id, name=call.name, text=why, error="refused")

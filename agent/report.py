@@ -13,9 +13,10 @@ from ..tools.formation.contract import Contract
 from ..tools.formation.encounters import notes_of
 from ..tools.formation.plan import Plan, Shortfall
 from ..tools.formation.units import in_metres, with_metres
+from ..tools.outline_field import rounded_rings
 from ..tools.perception.referring.attributes import Candidate
 from ..tools.perception.target_prompt import Box
-from ..tools.world import PlanNode, Target, World, rounded_rings
+from ..tools.world import PlanNode, Target, World
 from .messages import Call, History, Message, Reply, Result, failed_before, turn_of
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 

@@ -15,16 +15,18 @@ from pydantic import ValidationError
 from ..tools.context import Artefacts, Context, Services, Settings
 from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture, load_picture, picture_file, picture_from_file
-from ..tools.world import World
+from ..tools.world import Step, World
+from ..tools.world_changes import after_turns, changes_since, with_changes
 from .calls import refused
 from .first_message import check_text
 from .loop import Approval, Recorder
-from .messages import HISTORY, History, Message, Reply, Result, unanswered
+from .messages import HISTORY, History, Message, Reply, Result, paired, unanswered
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .report import Report, make_report
 from .session_start import read_session
-from .store.folder import PICTURES, FolderArtefacts, log_path
-from .store.protocol import Event, EventLog
+from .store.folder import log_path
+from .store.folder_store import FolderSession
+from .store.protocol import Event, EventLog, StoredSession
 
 GOES_ON = ("turn", "resume", "message")
 """Events after which a turn that had ended is under way again."""
@@ -40,7 +42,7 @@ class Run:
         outcome: how it ended, with the messages and the world.
         context: with the world, the settings and the services to go on with.
         began: the world when the turn began.
-        trace: the log, if there is one.
+        stored: where it is written, if it is.
         events: that the log had then; a log that has gone on since is not written by this run.
             None where the log could not be written any more.
     """
@@ -49,8 +51,13 @@ class Run:
     outcome: Outcome
     context: Context
     began: World
-    trace: Path | None = None
+    stored: StoredSession | None = None
     events: int | None = 0
+
+    @property
+    def trace(self) -> Path | None:
+        """The log, where it is a file."""
+        return self.stored.path if isinstance(self.stored, FolderSession) else None
 
     @property
     def world(self) -> World:
@@ -58,16 +65,23 @@ class Run:
         return self.outcome.world
 
     @property
-    def steps(self) -> tuple[World, ...]:
-        """The worlds that undo goes through, up to this turn's."""
-        return stepped(self.context.steps, self.began, self.world)
+    def steps(self) -> tuple[Step, ...]:
+        """The steps that undo goes through, this turn's among them."""
+        world = self.world
+        return stepped(self.context.steps, self.began.undone, world.step, world.undone)
 
 
-def stepped(steps: tuple[World, ...], began: World, world: World) -> tuple[World, ...]:
-    """The worlds that undo goes through, after a turn; one that took steps back adds none."""
-    if world.undone or world.current in (None, steps[-1].current):
+def stepped(steps: tuple[Step, ...], before: int, step: Step, undone: int) -> tuple[Step, ...]:
+    """The steps undo goes through, after a turn; one that took steps back adds none.
+
+    Args:
+        before: how many steps were taken back when the turn began.
+        step: at its end.
+        undone: how many steps were taken back then.
+    """
+    if undone or step.current in (None, steps[-1].current):
         return steps
-    return (*steps[: len(steps) - began.undone], world)
+    return (*steps[: len(steps) - before], step)
 
 
 @dataclass(frozen=True)
@@ -78,7 +92,7 @@ class State:
         facts: what the session began with: model, prompts, limits, policy, picture.
         words: of the last turn.
         began: the world when that turn began.
-        steps: the worlds that undo went through then.
+        steps: those that undo went through then.
         seconds: how long that turn has run, pauses aside.
         end: how it ended; None where it was killed.
     """
@@ -88,7 +102,7 @@ class State:
     words: str
     world: World
     began: World
-    steps: tuple[World, ...]
+    steps: tuple[Step, ...]
     messages: History
     seconds: float
     end: Mapping[str, Any] | None
@@ -102,8 +116,9 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
         ValidationError, KeyError, TypeError, ValueError: they are damaged.
     """
     facts = events[0].data
-    world = began = World.model_validate({"picture": facts["picture"]["facts"]})
-    settings, words, end, steps = Settings(), "", None, (world,)
+    start = World.model_validate({"picture": facts["picture"]["facts"]})
+    turns: list[list[Mapping[str, Any]]] = []
+    settings, words, end = Settings(), "", None
     lines: list[Mapping[str, Any]] = []
     seconds = last = 0.0
     for event in _begun(events[1:]):
@@ -112,23 +127,40 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
         last = event.seconds
         if event.kind == "turn":
             settings = Settings.model_validate(event.data["settings"])
-            steps = stepped(steps, began, world)
-            words, began = event.data["words"], world
+            words = event.data["words"]
+            turns.append([])
         elif event.kind == "approval" and event.data["plan_id"]:
             settings = settings.model_copy(update={"approved": event.data["plan_id"]})
         elif event.kind == "world":
-            world = world.with_changes(event.data["changes"])
+            turns[-1].append(event.data["changes"])
         elif event.kind == "message":
-            steps = steps if lines else (world,)
             lines.append(event.data)
         end = event.data if event.kind == "end" else end
         end = None if event.kind in GOES_ON else end
     if not words:
         raise InputError("It was broken off before anything began; run again.")
+    began, steps = _steps_before(start, turns)
+    world = with_changes(began, *turns[-1])
     if any(node.plan.id != name for name, node in world.plans.items()):
         raise InputError("Its plans were altered after formup wrote them; make them again.")
-    messages = read_messages(lines, artefacts)
+    messages = paired(read_messages(lines, artefacts))
     return State(facts, settings, words, world, began, steps, messages, seconds + last, end)
+
+
+def _steps_before(
+    start: World, turns: Sequence[Sequence[Mapping[str, Any]]]
+) -> tuple[World, tuple[Step, ...]]:
+    """The world when the last turn began, and the steps undo went through then.
+
+    The first step is what was there with the first words, before anything was planned.
+    """
+    said, *rest = turns[0][:1], turns[0][1:], *turns[1:]
+    began, ends = after_turns(start, [said, *rest[:-1]])
+    (first, undone), *later = ends
+    steps = (first,)
+    for step, now in later:
+        steps, undone = stepped(steps, undone, step, now), now
+    return began, steps
 
 
 def _begun(events: Sequence[Event]) -> Sequence[Event]:
@@ -210,7 +242,7 @@ class LogRecorder(Recorder):
 
     def world(self, world: World) -> None:
         """Write what has changed in the world, if anything."""
-        changes = {} if world is self._world else world.changes_since(self._world)
+        changes = {} if world is self._world else changes_since(world, self._world)
         if changes:
             self.event("world", {"changes": changes})
         self._world = world
@@ -236,35 +268,36 @@ class LogRecorder(Recorder):
             self.problem = str(error)
 
 
-def load_run(path: str | Path, picture: Picture | None = None) -> Run:
+def load_run(source: str | Path | StoredSession, picture: Picture | None = None) -> Run:
     """A session from its log, as far as it had come: paused, stopped, or killed in the middle.
 
     Args:
-        path: of the log, or of the folder with a trace.jsonl.
+        source: the path of a log or of the folder with a trace.jsonl, or a session in a store.
         picture: what it works on; None for the one stored beside the log, or else where it lay.
 
     Raises:
         InputError: it cannot be read, or the picture is not the same.
     """
-    path = log_path(Path(path))
-    artefacts = FolderArtefacts(path.parent / PICTURES)
+    stored = FolderSession(log_path(Path(source))) if isinstance(source, str | Path) else source
+    artefacts = stored.artefacts
     try:
-        events = read_session(path)
+        events = read_session(stored)
         state = fold(events, artefacts)
         outcome = _outcome(state)
         prompt, prompts = state.facts["prompt"], tuple(state.facts["prompts"])
     except StorageError:
         raise
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise InputError(f"{stored.label}: {error}") from None
     except (ValidationError, KeyError, TypeError, ValueError, IndexError, AttributeError):
-        raise InputError(f"{path} is damaged; it is no whole session that formup wrote.") from None
+        damaged = f"{stored.label} is damaged; it is no whole session that formup wrote."
+        raise InputError(damaged) from None
     services = Services.of(_picture(state.facts["picture"], artefacts, picture))
     services.artefacts = artefacts
     context = Context(state.world, services, state.settings, state.words, steps=state.steps).check()
     report = make_report(outcome, context, state.began, model_name(state.facts), state.seconds)
     report = report.model_copy(update={"prompt": prompt, "prompts": prompts})
-    return Run(report, outcome, context, state.began, path, len(events))
+    return Run(report, outcome, context, state.began, stored, len(events))
 
 
 def prompt_name(facts: Mapping[str, Any] | None) -> str | None:

@@ -17,7 +17,7 @@ from ..tools.world import PictureFacts
 from .limits import Limits
 from .policy import Decision
 from .store.folder import read_events
-from .store.protocol import Event
+from .store.protocol import Event, StoredSession
 
 FORMAT = "formup-session-1"
 
@@ -53,13 +53,17 @@ class _Start(_Part):
     picture: _StoredPicture
 
 
-def read_session(path: Path) -> Sequence[Event]:
-    """The events of a session's log, of which the first is as formup writes it.
+def read_session(source: Path | StoredSession) -> Sequence[Event]:
+    """The events of a session, of which the first is as formup writes it.
+
+    Args:
+        source: a log, a folder with one, or a session in a store.
 
     Raises:
         StorageError: missing, unreadable, or no log of a session.
     """
-    events = read_events(path)
+    events = read_events(source) if isinstance(source, Path) else source.events()
+    label = source if isinstance(source, Path) else source.label
     problem = f"it is of type {events[0].kind!r}, not 'session'."
     if events[0].kind == "session":
         try:
@@ -67,4 +71,4 @@ def read_session(path: Path) -> Sequence[Event]:
             return events
         except (ValidationError, InputError) as error:
             problem = violations(error) if isinstance(error, ValidationError) else str(error)
-    raise StorageError(f"{path} does not begin with a line that formup wrote: {problem}")
+    raise StorageError(f"{label} does not begin with a line that formup wrote: {problem}")

@@ -69,10 +69,10 @@ def locked_folder(folder: Path) -> Generator[None]:
     """
     path, until = folder / BUSY, time.monotonic() + PATIENCE
     with _as_prompt_errors(folder):
-        busy = _try_lock(path)
+        busy = try_lock(path)
         while busy is None and time.monotonic() < until:
             time.sleep(0.02)
-            busy = _try_lock(path)
+            busy = try_lock(path)
     if busy is None:
         raise PromptError(f"Another process writes in {folder}; try again when it is done.")
     try:
@@ -93,7 +93,7 @@ def _rename_new(written: Path, path: Path) -> None:
         raise
 
 
-def _try_lock(path: Path) -> BinaryIO | None:
+def try_lock(path: Path) -> BinaryIO | None:
     """The file, locked; None while another has it, or has just deleted it."""
     with ExitStack() as stack:
         file = stack.enter_context(path.open("ab"))

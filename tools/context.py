@@ -19,7 +19,7 @@ from .perception.image import Picture
 from .perception.referring.attributes import Candidate
 from .perception.segmenters.registry import segmenter_named
 from .perception.target_prompt import Point
-from .world import World
+from .world import Step, World
 
 MOST_FOUND = 64
 """Pictures whose candidates are remembered."""
@@ -153,7 +153,7 @@ class Context:
         words: what the person said last; the contract is held against it.
         doubted: doubts that the model was told of in this turn, which its `reading` may answer.
         proposed: id of the plan that an earlier call of the same reply made.
-        steps: the worlds between the turns that changed the plan, the first without one.
+        steps: those of the turns that changed the plan, after the one that undo ends at.
         observed: puts a world in place at once, because what it says was observed and holds even
             if the call fails or is cut off: measured things, poses of robots.
         moving: is called with a plan's id before the first motion; raising prevents it.
@@ -165,7 +165,7 @@ class Context:
     words: str = ""
     doubted: frozenset[str] = frozenset()
     proposed: str | None = None
-    steps: tuple[World, ...] = ()
+    steps: tuple[Step, ...] = ()
     observed: Callable[[World], None] = _ignore
     moving: Callable[[str], None] = _ignore
 

@@ -30,6 +30,9 @@ Kind = Literal[
     "unknown_plan",
     "void_plan",
     "too_many_robots",
+    "missing",
+    "busy",
+    "gone_on",
 ]
 """capacity: more robots than fit (`robots_that_fit`); cage: none that is escape-proof
 (`robots_that_fit`, `robots_needed`); crowded: two groups in each other's way (`groups`, from 1);
@@ -39,7 +42,8 @@ room on that side of a target; low_confidence: no mask that is sure enough (`con
 no such id; void_plan: the world has changed since; too_many_robots: more than can be driven;
 doubt: a contract that does not seem to be what the words say (`doubts`, each a clause); edit: the
 plan after a change is not certified (`findings`, each a sentence); nothing_to_undo: there is no
-step back, or none that was taken back."""
+step back, or none that was taken back; missing, busy, gone_on: a session that is not in its store,
+is written by another process, or was written since it was opened."""
 
 
 class FormupError(Exception):

@@ -5,15 +5,13 @@ and logs hold it as its JSON. Frame everywhere: image pixels as the person sees 
 down, pixel centres at whole numbers.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, cast
+from collections.abc import Sequence
+from typing import Any
 
 import shapely
-from pydantic import Field, PlainSerializer, PlainValidator, TypeAdapter, field_validator
-from shapely.errors import ShapelyError
-from shapely.geometry import Polygon
+from pydantic import Field, TypeAdapter, field_validator
 
-from .errors import InputError, ToolError
+from .errors import ToolError
 from .fleet.deploy import Arrival
 from .fleet.protocol import Pose
 from .formation.contract import Contract
@@ -23,49 +21,11 @@ from .formation.plan import Plan, scene_version
 from .formation.site import Other
 from .formation.units import check_scale
 from .formation.value import Value
-from .geometry.outline import Outline, outline_of
+from .geometry.outline import Outline
+from .outline_field import OutlineField
 from .perception.image import Picture
 from .perception.measure import Deviation
 from .perception.target_prompt import Box, Point, TargetPrompt
-
-Ring = tuple[tuple[float, float], ...]
-
-
-def outline_rings(outline: Outline) -> dict[str, Any]:
-    """An outline as JSON: the ring around it and those around its holes, (x, y) px."""
-    polygon = outline.polygon
-    rings = [list(ring.coords[:-1]) for ring in (polygon.exterior, *polygon.interiors)]
-    return {"outline": rings[0]} | ({"holes": rings[1:]} if rings[1:] else {})
-
-
-def rounded_rings(outline: Outline) -> tuple[list[Any], list[Any]]:
-    """The ring around an outline and those around its holes, rounded to what they are known to."""
-    rings = outline_rings(outline)
-    rounded = [
-        [[round(x, 3), round(y, 3)] for x, y in ring]
-        for ring in (rings["outline"], *rings.get("holes", ()))
-    ]
-    return rounded[0], rounded[1:]
-
-
-def _read_outline(value: Any) -> Outline:
-    """An outline, or what `outline_rings` wrote, with its rings exactly as they were."""
-    if isinstance(value, Outline):
-        return value
-    try:
-        if unknown := set(value) - {"outline", "holes"}:
-            raise ValueError(f"it has {min(unknown)!r}, which no outline has")
-        polygon = Polygon(value["outline"], value.get("holes", ()))
-        if not polygon.is_valid:
-            raise ValueError("its rings cross, or are not finite")
-        return outline_of(polygon)
-    except (AttributeError, KeyError, TypeError, ValueError, InputError, ShapelyError) as error:
-        raise ValueError(f"is no outline: {error}") from None
-
-
-OutlineField = Annotated[
-    Outline, PlainValidator(_read_outline), PlainSerializer(outline_rings, when_used="json")
-]
 
 
 class PictureFacts(Value):
@@ -151,6 +111,15 @@ class PlanNode(Value):
     words: str = ""
     unseen: tuple[str, ...] = ()
     encounters: tuple[Encounter, ...] = ()
+
+
+class Step(Value):
+    """What undo restores: all that was decided at the end of a turn."""
+
+    targets: tuple[Target, ...] = ()
+    keep_out: tuple[KeepOut, ...] = ()
+    samples: dict[str, tuple[Point, ...]] = Field(default_factory=dict)
+    current: str | None = None
 
 
 class World(Value):
@@ -260,15 +229,15 @@ class World(Value):
         """
         return self.plan(next(reversed(self.plans), None))
 
-    def back_at(self, then: "World", undone: int) -> "World":
+    @property
+    def step(self) -> Step:
+        """What undo would restore."""
+        return Step.model_construct(**{name: getattr(self, name) for name in Step.model_fields})
+
+    def back_at(self, step: Step, undone: int) -> "World":
         """What was decided as it was then; plans stay known, and robots where they are."""
-        return self.having(
-            targets=then.targets,
-            keep_out=then.keep_out,
-            samples=then.samples,
-            current=then.current,
-            undone=undone,
-        )
+        parts = {name: getattr(step, name) for name in Step.model_fields}
+        return self.having(**parts, undone=undone)
 
     def with_arrival(self, plan_id: str, arrival: Arrival) -> "World":
         """The world after a deployment."""
@@ -330,54 +299,8 @@ class World(Value):
         things = (*self.targets, *self.keep_out)
         return {thing.id: thing.outline for thing in things if thing.id in names}
 
-    def changes_since(self, before: "World | None") -> dict[str, Any]:
-        """What differs from an earlier world, as JSON that `with_changes` reads.
 
-        Of the parts that go by id (targets, plans, ...) only new and other items are written, with
-        the order of all ids; other parts are written whole.
-        """
-        changed: dict[str, Any] = {}
-        for name in type(self).model_fields:
-            now, then = getattr(self, name), getattr(before, name, None)
-            if now is then:
-                continue
-            if name in BY_ID:
-                old, new = _by_id(then), _by_id(now)
-                items = {key: item for key, item in new.items() if old.get(key) is not item}
-                if items or list(old) != list(new):
-                    changed[name] = {"ids": list(new), "items": to_json_values(items)}
-            elif now != then:
-                changed[name] = to_json_values(now)
-        return changed
-
-    def with_changes(self, changes: Mapping[str, Any]) -> "World":
-        """The world after changes that `changes_since` wrote.
-
-        Raises:
-            ValidationError, KeyError, TypeError: it did not write them.
-        """
-        parts: dict[str, Any] = {}
-        for name, value in changes.items():
-            if name in BY_ID:
-                items = _by_id(getattr(self, name)) | dict(value["items"])
-                value = {key: items[key] for key in value["ids"]}
-                if name not in KEYED:
-                    value = tuple(value.values())
-            parts[name] = value
-        read = type(self).model_validate({"picture": self.picture, **parts})
-        return self.model_copy(update={name: getattr(read, name) for name in parts})
-
-
-KEYED = frozenset({"plans", "arrivals", "samples"})
-BY_ID = KEYED | {"targets", "keep_out"}
-"""Parts of the world whose items have ids."""
 _ANYTHING: TypeAdapter[Any] = TypeAdapter(Any)
-
-
-def _by_id(part: Any) -> dict[str, Any]:
-    if isinstance(part, dict):
-        return dict(cast(dict[str, Any], part))
-    return {item.id: item for item in cast(tuple[Any, ...], part or ())}
 
 
 def to_json_values(value: Any) -> Any:

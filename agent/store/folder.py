@@ -1,4 +1,4 @@
-"""A folder as a store: trace.jsonl, one event a line, and pictures/, named by their hashes.
+"""A session in a folder: trace.jsonl, one event a line, and pictures/, named by their hashes.
 
 Every line is written at once, and what a call did to the world before the call's result: a process
 that is killed loses at most what it was doing. Keys and times of day are not in it.
@@ -16,7 +16,7 @@ from pydantic_core import from_json, to_json
 from ...prompts.files import lock
 from ...tools.errors import StorageError
 from ...tools.store import write_whole
-from .protocol import Event, EventKind
+from .protocol import Event, EventKind, busy
 
 NAME = "trace.jsonl"
 PICTURES = "pictures"
@@ -42,9 +42,7 @@ class FolderLog:
             raise StorageError(f"{path} cannot be written: {error.strerror}.") from None
         if not lock(self._file.fileno()):
             self._file.close()
-            raise StorageError(
-                f"{path} is being written by another process; wait for it to end, or stop it."
-            )
+            raise busy(str(path))
         if begin:
             self._file.truncate()
         try:
@@ -72,8 +70,8 @@ class FolderLog:
         """See `EventLog.append`."""
         if kind in ("turn", "resume"):
             self._began = self._clock()
-        facts = {"n": self._next, "type": kind, "seconds": round(self._clock() - self._began, 4)}
-        line = to_json(facts | dict(data)) + b"\n"
+        seconds = round(self._clock() - self._began, 4)
+        line = event_line(Event(self._next, kind, seconds, data))
         try:
             end = self._file.seek(0, os.SEEK_END)
             if self._file.write(line) != len(line):  # the disk filled in the middle of it
@@ -125,6 +123,10 @@ class FolderArtefacts:
         path = self._path(sha256)
         return None if path is None else f"{self.folder.name}/{path.name}"
 
+    def __contains__(self, sha256: str) -> bool:
+        """See `Files.__contains__`."""
+        return self._path(sha256) is not None
+
     def _path(self, sha256: str) -> Path | None:
         return next(self.folder.glob(f"{sha256[:16]}.*"), None)
 
@@ -168,6 +170,12 @@ def _event(line: dict[str, Any]) -> Event:
     if line["type"] not in KINDS or not line["seconds"] >= 0:
         raise ValueError
     return Event(line["n"], line["type"], float(line["seconds"]), data)
+
+
+def event_line(event: Event) -> bytes:
+    """An event as a line of a log."""
+    facts = {"n": event.number, "type": event.kind, "seconds": event.seconds}
+    return to_json(facts | dict(event.data)) + b"\n"
 
 
 def suffix_of(data: bytes) -> str:

@@ -1,12 +1,19 @@
-"""What a conversation is stored in: an append-only log of numbered events.
+"""What conversations are stored in: append-only logs of numbered events, many to a store.
 
 State is folded from the events, so that undo, crashes and replays follow from the log alone. Files
 that events name by their hash lie beside it, as `Artefacts`.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any, Literal, Protocol
+
+from pydantic_core import to_json
+
+from ...tools.context import Artefacts
+from ...tools.errors import InputError, StorageError
 
 EventKind = Literal["session", "turn", "resume", "world", "message", "approval", "moving", "end"]
 """session: who decides, by which prompts, within which limits, and the picture; turn: what the
@@ -54,3 +61,201 @@ class EventLog(Protocol):
     def close(self) -> None:
         """Let go of it."""
         ...
+
+
+class Files(Artefacts, Protocol):
+    """The files of one session."""
+
+    def __contains__(self, sha256: str) -> bool:
+        """Whether there is a file of this hash."""
+        ...
+
+
+class StoredSession(Protocol):
+    """One session where it is stored: read by anyone, written by one at a time."""
+
+    @property
+    def id(self) -> str:
+        """What its store knows it by."""
+        ...
+
+    @property
+    def label(self) -> str:
+        """What errors call it, such as the path of its log."""
+        ...
+
+    @property
+    def artefacts(self) -> Files:
+        """Its files."""
+        ...
+
+    def events(self, after: int = 0) -> tuple[Event, ...]:
+        """The events with greater numbers than that, in order.
+
+        Raises:
+            StorageError: it is not there, or is no whole session that formup wrote.
+        """
+        ...
+
+    def write(self, after: int) -> EventLog:
+        """Its log, to be written on and then closed.
+
+        Args:
+            after: how many events the writer knows of.
+
+        Raises:
+            StorageError: it is not there (`missing`); another process writes it (`busy`), or it
+                has gone on since (`gone_on`): the text says what happened meanwhile.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class SessionFacts:
+    """What a list says of a session.
+
+    Attributes:
+        name: given by a person; may be empty.
+        created: when, ISO 8601 in UTC.
+        turns: how many things were said.
+        words: the last of them.
+        picture: SHA-256 of the picture it began with; None before it has begun.
+    """
+
+    id: str
+    name: str
+    created: str
+    turns: int
+    words: str
+    picture: str | None
+
+
+class Store(Protocol):
+    """Many sessions; safe for several processes at once."""
+
+    def create(
+        self, name: str = "", events: Sequence[Event] = (), files: Sequence[bytes] = ()
+    ) -> StoredSession:
+        """A new session, whole or not at all.
+
+        Args:
+            name: what a person calls it.
+            events: that it begins with, such as those of another.
+            files: that these name.
+
+        Raises:
+            StorageError: it cannot be written.
+        """
+        ...
+
+    def open(self, session: str) -> StoredSession:
+        """The session with an id.
+
+        Raises:
+            StorageError: there is none (`missing`).
+        """
+        ...
+
+    def sessions(self, text: str = "") -> tuple[SessionFacts, ...]:
+        """All sessions whose names or words have that text in them, the newest first."""
+        ...
+
+    def rename(self, session: str, name: str) -> None:
+        """Call a session otherwise.
+
+        Raises:
+            StorageError: there is none (`missing`), or it cannot be written.
+        """
+        ...
+
+    def delete(self, session: str) -> None:
+        """Delete a session with its files.
+
+        Raises:
+            StorageError: there is none (`missing`), or another process writes it (`busy`).
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of what is open."""
+        ...
+
+
+MAX_NAME = 200
+"""Characters of a session's name."""
+_HASH = re.compile(rb'"([0-9a-f]{64})"')
+
+
+def now() -> str:
+    """The time as a session's facts have it."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def checked_name(name: str) -> str:
+    """A session's name, in one line.
+
+    Raises:
+        InputError: too long, or no text.
+    """
+    line = " ".join(name.split())
+    if len(line) > MAX_NAME or not line.isprintable():
+        raise InputError(
+            f"A session's name is one line of up to {MAX_NAME} printable characters; "
+            f"{line[:40]!r} has {len(line)}."
+        )
+    return line
+
+
+def matches(facts: SessionFacts, said: Sequence[str], text: str) -> bool:
+    """Whether a text is in a session's name or in what was said in it, large or small letters."""
+    wanted = text.casefold()
+    return any(wanted in part.casefold() for part in (facts.name, *said))
+
+
+def files_named(events: Sequence[Event], files: Files) -> tuple[bytes, ...]:
+    """The files that events name by their hash.
+
+    Raises:
+        StorageError: one was changed since.
+    """
+    hashes = dict.fromkeys(h.decode() for e in events for h in _HASH.findall(to_json(e.data)))
+    return tuple(files.get(sha256) for sha256 in hashes if sha256 in files)
+
+
+def missing(label: str) -> StorageError:
+    """The error where a session is not in its store."""
+    return StorageError(
+        f"{label} is not there; formup sessions list names those that are.", "missing"
+    )
+
+
+def busy(label: str, meanwhile: Sequence[Event] = ()) -> StorageError:
+    """The error where another process writes a session; with what it has written by now."""
+    happened = f" Meanwhile {_told(meanwhile)}." if meanwhile else ""
+    return StorageError(
+        f"{label} is being written by another process; wait for it to end, or stop it.{happened}",
+        "busy",
+    )
+
+
+def gone_on(label: str, meanwhile: Sequence[Event]) -> StorageError:
+    """The error where a session has gone on elsewhere; with what happened there."""
+    happened = f": {_told(meanwhile)}" if meanwhile else ""
+    return StorageError(
+        f"{label} has gone on since it was opened{happened}. Nothing was written; open it again "
+        "to go on from there.",
+        "gone_on",
+    )
+
+
+def _told(events: Sequence[Event]) -> str:
+    """What was said and how it ended, in a clause; the last few turns of many."""
+    parts: list[str] = []
+    for event in events:
+        if event.kind == "turn":
+            words = str(event.data.get("words", ""))
+            parts.append(f'"{words[:80]}" was said')
+        elif event.kind == "end":
+            parts.append(f"it came to {event.data.get('status')}")
+    shown = parts[-6:] or [f"{len(events)} events were written"]
+    return ", ".join(["...", *shown] if len(parts) > len(shown) else shown)

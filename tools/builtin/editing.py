@@ -17,7 +17,7 @@ from ..formation.plan import Plan
 from ..formation.units import with_metres
 from ..perception.target_prompt import TargetPrompt
 from ..tool import ToolResult, in_thread, tool
-from ..world import PlanNode, World, to_json_values
+from ..world import PlanNode, Step, World, to_json_values
 from .committing import MAX_FINDINGS, proposal_data, tell_of
 from .others import with_others
 from .robots import with_robots
@@ -178,22 +178,22 @@ def undo(context: Context, steps: int = 1, to: str | None = None) -> ToolResult:
     return ToolResult(data | {"next": NOT_MOVED}, world=world)
 
 
-def _line_of_plans(context: Context) -> list[World]:
-    """The worlds undo goes through, the one that this turn has changed among them."""
+def _line_of_plans(context: Context) -> list[Step]:
+    """The steps undo goes through, the one that this turn has made among them."""
     world, steps = context.world, list(context.steps)
     if world.undone == 0 and (not steps or steps[-1].current != world.current):
-        steps.append(world)
+        steps.append(world.step)
     return steps
 
 
-def _place_of(line: Sequence[World], to: str) -> int:
+def _place_of(line: Sequence[Step], to: str) -> int:
     """Where a plan stands in the line of plans.
 
     Raises:
         ToolError: it is not there.
     """
-    for place, world in enumerate(line):
-        if world.current is not None and to in ("first", world.current):
+    for place, step in enumerate(line):
+        if step.current is not None and to in ("first", step.current):
             return place
-    known = ", ".join(world.current for world in line if world.current) or "none yet"
+    known = ", ".join(step.current for step in line if step.current) or "none yet"
     raise ToolError(f"There is no plan {to!r} to go back to; plans: {known}.", "unknown_plan")

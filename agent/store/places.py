@@ -1,0 +1,40 @@
+"""Which store an address means, and where sessions lie by default."""
+
+import os
+import sys
+from pathlib import Path
+
+from .folder_store import FolderStore
+from .protocol import Store
+
+
+def store_at(address: str | Path | None = None) -> Store:
+    """The store at an address.
+
+    Args:
+        address: a folder, `sqlite:///FILE`, or `postgresql://USER:PASSWORD@HOST/DATABASE`; None
+            for the database in the user's data folder.
+
+    Raises:
+        InputError: it is none of them, or needs an extra that is not installed.
+        StorageError: it cannot be used.
+    """
+    if address is None:
+        address = f"sqlite:///{data_folder() / 'sessions.db'}"
+    if "://" not in str(address):
+        return FolderStore(Path(address))
+    from .database import DatabaseStore  # its library takes a while to load
+
+    return DatabaseStore(str(address))
+
+
+def data_folder() -> Path:
+    """The folder for what formup keeps of a user's, by the custom of the system."""
+    home = Path.home()
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData/Local")
+    elif sys.platform == "darwin":
+        base = home / "Library/Application Support"
+    else:
+        base = Path(os.environ.get("XDG_DATA_HOME") or home / ".local/share")
+    return base / "formup"
