@@ -10,6 +10,7 @@ from ..tools.errors import ApprovalError, ArgumentsError, FleetError, ModelError
 from ..tools.tool import Tool
 from ..tools.world import World
 from .calls import BrokenToolError, answer, failed, refused, tool_named
+from .compaction import compacted
 from .limits import DEFAULT_LIMITS, Limits, calls_exhausted, exhausted
 from .messages import (
     Call,
@@ -110,10 +111,11 @@ class Turn:
 
     async def ask(self, messages: History) -> Reply:
         """The model's next reply, whole and in time."""
+        sent = messages if getattr(self.model, "reads_all", False) else compacted(messages)
         clock = asyncio.timeout(self.limits.reply_seconds)
         try:
             async with clock:
-                return await self.model.reply(Request(self.system, messages, self.offered))
+                return await self.model.reply(Request(self.system, sent, self.offered))
         except TimeoutError:
             if not clock.expired():
                 raise

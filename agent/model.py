@@ -17,7 +17,10 @@ class Request:
 
 
 class Model(Protocol):
-    """Anything that answers a request with one complete reply."""
+    """Anything that answers a request with one complete reply.
+
+    One whose `reads_all` is true is sent all of a long conversation; see `compaction`.
+    """
 
     @property
     def name(self) -> str:

@@ -28,6 +28,7 @@ class OfflinePlanner:
     """Rules that call the tools: propose, deploy, say what was observed."""
 
     name = "offline"
+    reads_all = True
 
     async def reply(self, request: Request) -> Reply:
         """The next step for a conversation that began with a task message."""

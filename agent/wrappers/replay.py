@@ -26,6 +26,8 @@ class ReplayModel:
         InputError: no trace can be read there.
     """
 
+    reads_all = True
+
     def __init__(self, path: Path) -> None:
         start, *events = read_session(path)
         self._path = path

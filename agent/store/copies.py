@@ -1,0 +1,37 @@
+"""Copies of sessions: forks at a turn, which leave the original as it is."""
+
+from collections.abc import Sequence
+
+from ...tools.errors import InputError
+from .protocol import Event, Store, StoredSession, files_named
+
+
+def fork(
+    store: Store, source: StoredSession, turn: int | None = None, name: str = ""
+) -> StoredSession:
+    """A new session that begins with the turns of another.
+
+    Args:
+        store: where it is made.
+        source: whose turns; not written to.
+        turn: the last one taken, from 1; None for all there are.
+        name: what a person calls it.
+
+    Raises:
+        InputError: there is no such turn, or it cannot be read or written.
+    """
+    events = source.events()
+    events = events if turn is None else up_to_turn(events, turn)
+    return store.create(name, events, files_named(events, source.artefacts))
+
+
+def up_to_turn(events: Sequence[Event], turn: int) -> tuple[Event, ...]:
+    """The events of the first so many turns.
+
+    Raises:
+        InputError: there are fewer.
+    """
+    starts = [place for place, event in enumerate(events) if event.kind == "turn"]
+    if not 1 <= turn <= len(starts):
+        raise InputError(f"There is no turn {turn}; the session has turns 1 to {len(starts)}.")
+    return tuple(events[: [*starts, len(events)][turn]])
