@@ -4,8 +4,10 @@ A turn is what the person says until the loop has answered, paused or stopped. W
 written down before anything follows from it, so that the log opens again after a kill.
 """
 
+import gc
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -141,7 +143,8 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
         raise InputError("It was broken off before anything began; run again.")
     began, steps = _steps_before(start, turns)
     world = with_changes(began, *turns[-1])
-    if any(node.plan.id != name for name, node in world.plans.items()):
+    latest = [name for name in (world.current, *list(world.plans)[-1:]) if name]
+    if any(world.plans[name].plan.id != name for name in latest):  # others as they are used
         raise InputError("Its plans were altered after formup wrote them; make them again.")
     messages = paired(read_messages(lines, artefacts))
     return State(facts, settings, words, world, began, steps, messages, seconds + last, end)
@@ -268,6 +271,19 @@ class LogRecorder(Recorder):
             self.problem = str(error)
 
 
+@contextmanager
+def _no_collections() -> Generator[None]:
+    """Without looking for garbage: a long session is a million values, and none of them is."""
+    was = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was:
+            gc.enable()
+
+
+@_no_collections()
 def load_run(source: str | Path | StoredSession, picture: Picture | None = None) -> Run:
     """A session from its log, as far as it had come: paused, stopped, or killed in the middle.
 

@@ -259,6 +259,9 @@ class World(Value):
             named = "" if plan_id is None else f" {plan_id!r}"
             raise ToolError(f"There is no plan{named}. Plans: {known}.", "unknown_plan")
         node = self.plans[plan_id]
+        if node.plan.id != plan_id:
+            altered = f"Plan {plan_id} was altered after formup wrote it; propose it again."
+            raise ToolError(altered, "void_plan")
         if self.is_void(node.plan):
             raise ToolError(
                 f"Plan {plan_id} is void: what it is about was measured again since, or the scale "

@@ -170,15 +170,15 @@ class DatabaseSession:
             rows = connection.execute(chosen.order_by(EVENTS.c.number)).all()
         if not rows and not after:
             raise StorageError(f"{self.label} was broken off before anything began; run again.")
+        numbers, kinds, seconds, texts = zip(*rows, strict=True) if rows else ((), (), (), ())
         try:
-            data = from_json(f"[{','.join(row.data for row in rows)}]")
-            if [row.number for row in rows] != list(range(after + 1, after + len(data) + 1)):
-                raise ValueError
-            if not {row.kind for row in rows} <= KINDS:
+            data = from_json(f"[{','.join(texts)}]")
+            gapless = numbers == tuple(range(after + 1, after + len(data) + 1))
+            if not gapless or not KINDS.issuperset(kinds):
                 raise ValueError
         except ValueError:
             raise StorageError(f"{self.label} is no whole session that formup wrote.") from None
-        return tuple(Event(r[0], r[1], r[2], d) for r, d in zip(rows, data, strict=True))
+        return tuple(map(Event, numbers, kinds, seconds, data))
 
     def write(self, after: int) -> EventLog:
         """See `StoredSession.write`."""
