@@ -1,0 +1,249 @@
+"""A conversation: turn after turn about one picture, and the commands a person gives beside them.
+
+Robots move when the person says go, or at once where they asked for that. What "go" is, is read
+here and nowhere else, for every model alike.
+"""
+
+import asyncio
+import copy
+from collections.abc import Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any, Unpack
+
+from ..tools.context import Settings
+from ..tools.errors import InputError
+from ..tools.perception.image import Picture
+from ..tools.perception.target_prompt import TargetPrompt
+from .agent import Agent, SayOptions
+from .first_message import standing
+from .offline.followups import read_followup
+from .offline.standing import Standing
+from .outcomes import Paused
+from .session import Run, Show
+from .store.protocol import StoredSession
+from .wrappers.commands import Commands
+
+NOTHING_SAID = "Say what to do first, such as surround the coin with 6 robots."
+HELD = "The robots are held where they are. Say what to change, or go to drive on."
+STOP = frozenset({"stop", "halt", "freeze", "stop now", "stop it", "emergency stop"})
+"""Words that hold the robots at once, whoever else would have read them."""
+
+
+@dataclass
+class Session:
+    """A conversation, as far as it has come; `run` is its last turn.
+
+    Attributes:
+        agent: who decides.
+        picture: that it is about.
+        settings: what the person fixed; the number of robots holds for the first turn.
+        pointed: what they point at with their next words.
+        keep_out: what no robot may enter, of the first turn.
+        stored: where it is written, if it is.
+        auto: whether simulated robots move as soon as a plan is certified.
+        held: whether they are not to, until the person says go.
+        run: the last turn; None before the first.
+    """
+
+    agent: Agent
+    picture: Picture
+    settings: Settings = field(default_factory=Settings)
+    pointed: tuple[TargetPrompt, ...] = ()
+    keep_out: tuple[TargetPrompt, ...] = ()
+    stored: StoredSession | None = None
+    auto: bool = False
+    held: bool = False
+    run: Run | None = None
+
+    async def asay(self, words: str, **options: Unpack[SayOptions]) -> Run:
+        """What the person says next: an instruction, a change, a question, an answer, go or stop.
+
+        Raises:
+            InputError: something given cannot be used.
+        """
+        if words.strip(" .!").lower() in STOP:
+            return await self.astop()
+        show, pointed = options.get("show"), (*self.pointed, *options.get("pointed", ()))
+        run = self.run
+        if run is not None and isinstance(run.outcome, Paused) and not pointed:
+            return self._keep(await self._answered(run, words, show))
+        if run is not None and isinstance(run.outcome, Paused):  # the answer is a point
+            words = f"{run.report.instruction} {words}".strip()
+        settings = await self._for_turn(words)
+        self.pointed = ()
+        if run is None:
+            given = {"pointed": pointed, "keep_out": self.keep_out, "settings": settings}
+            made = self.agent.arun(self.picture, words, trace=self.stored, show=show, **given)
+        else:
+            keep = options.get("keep_out", ())
+            made = self.agent.asay(
+                run, words, pointed=pointed, keep_out=keep, settings=settings, show=show
+            )
+        return self._keep(await made)
+
+    async def aact(
+        self,
+        words: str,
+        *calls: tuple[str, dict[str, Any]],
+        text: str = "",
+        show: Show | None = None,
+    ) -> Run:
+        """A turn that asks no model: calls of tools by the person.
+
+        Args:
+            words: what it is called in the log, such as /undo.
+            calls: names of tools and their arguments.
+            text: what is said where there are none.
+
+        Raises:
+            InputError: nothing was said yet.
+        """
+        agent, run = copy.copy(self.agent), self._run
+        agent.model = Commands(calls, text)
+        moves = any(name == "deploy" for name, _ in calls)
+        settings = self._fixed(run).model_copy(update={"may_deploy": moves})
+        return self._keep(await agent.asay(run, words, settings=settings, show=show))
+
+    async def aundo(self, steps: int = 1, to: str | None = None) -> Run:
+        """Go back to the plan before, `steps` below 0 forward again; robots stay where they are."""
+        arguments = {"steps": steps} if to is None else {"to": to}
+        words = f"/undo {to or steps}" if steps > 0 or to else f"/redo {-steps}"
+        return await self.aact(words, ("undo", arguments))
+
+    async def aedit(self, *edits: dict[str, Any]) -> Run:
+        """Change the plan that stands, by edits as `edit_formation` takes them."""
+        return await self.aact("/edit", ("edit_formation", {"edits": list(edits)}))
+
+    async def ago(self, plan_id: str | None = None, show: Show | None = None) -> Run:
+        """Drive the robots to a plan, the one that stands by default."""
+        run = self._run
+        plan_id = plan_id or run.world.current
+        if plan_id is None:
+            return await self.aact("/go", text="There is no plan to go to yet; nothing moves.")
+        await self._release()
+        return await self.aact("/go", ("deploy", {"plan_id": plan_id}), show=show)
+
+    async def aapprove(self, plan_id: str, show: Show | None = None) -> Run:
+        """Approve one plan, and drive real robots to it.
+
+        Raises:
+            InputError: it is not the plan that waits.
+        """
+        run = self._run
+        waits = run.outcome.plan_id if isinstance(run.outcome, Paused) else None
+        if waits != plan_id:
+            what = f"plan {waits} waits" if waits else "no plan waits for approval"
+            raise InputError(f"{plan_id} cannot be approved: {what}.")
+        return self._keep(await self.agent.aresume(run, approve=True, show=show))
+
+    async def astop(self) -> Run:
+        """Hold all robots where they are; they drive on after the next go."""
+        await self.ahold()
+        return await self.aact("stop", text=HELD)
+
+    async def ahold(self) -> None:
+        """Stop the fleets at once, whatever else runs."""
+        if self.run is not None:
+            services = self.run.context.services
+            services.stopped.add(self.run.context.settings.fleet)
+            for fleet in services.fleets.values():
+                await fleet.stop()
+
+    def at(self, run: Run) -> "Session":
+        """The same conversation at a turn of it, to go on differently; it is written nowhere."""
+        return replace(self, run=replace(run, stored=None, events=0), stored=None)
+
+    def fork(self) -> "Session":
+        """A copy that goes on by itself; what was said so far is in both."""
+        return self if self.run is None else self.at(self.run)
+
+    def say(self, words: str, **options: Unpack[SayOptions]) -> Run:
+        """See `asay`; the synchronous door, which works inside a running event loop too."""
+        return self._sync(self.asay(words, **options))
+
+    def undo(self, steps: int = 1, to: str | None = None) -> Run:
+        """See `aundo`."""
+        return self._sync(self.aundo(steps, to))
+
+    def edit(self, *edits: dict[str, Any]) -> Run:
+        """See `aedit`."""
+        return self._sync(self.aedit(*edits))
+
+    def go(self, plan_id: str | None = None) -> Run:
+        """See `ago`."""
+        return self._sync(self.ago(plan_id))
+
+    @property
+    def _run(self) -> Run:
+        if self.run is None:
+            raise InputError(NOTHING_SAID)
+        return self.run
+
+    def _keep(self, run: Run) -> Run:
+        self.run = run
+        return run
+
+    async def _answered(self, run: Run, words: str, show: Show | None) -> Run:
+        """Give the turn that waits its answer."""
+        outcome = run.outcome
+        assert isinstance(outcome, Paused)
+        if outcome.call.name == "ask_user":
+            return await self.agent.aresume(run, answer=words, show=show)
+        yes = read_followup(words, self._standing(run)).go or words.strip().lower() in ("y", "yes")
+        return await self.agent.aresume(run, approve=yes, answer=None if yes else words, show=show)
+
+    def _standing(self, run: Run | None) -> Standing | None:
+        """What follow-ups are read by."""
+        if run is None:
+            return None
+        context = replace(run.context, world=run.world, steps=run.steps)
+        facts = standing(context)
+        size, scale = run.world.picture.size, run.world.metres_per_pixel
+        return None if facts is None else Standing.of(facts, size=size, metres_per_pixel=scale)
+
+    async def _for_turn(self, words: str) -> Settings:
+        """What holds in the next turn, as its words say: whether robots move."""
+        read = read_followup(words, self._standing(self.run))
+        go = read.go or read.kind == "go"
+        self.held = (self.held or read.hold or read.kind == "hold") and not go
+        if go:
+            await self._release()
+        moves = go or (self.auto and not self.held)
+        return self._fixed(self.run).model_copy(update={"may_deploy": moves})
+
+    def _fixed(self, run: Run | None) -> Settings:
+        if run is None:
+            return self.settings
+        once = {"robots": None, "starts": None, "approved": None}
+        return run.context.settings.model_copy(update=once)
+
+    async def _release(self) -> None:
+        """Lift a stop: the person says go."""
+        if self.run is not None:
+            services = self.run.context.services
+            services.stopped.clear()
+            for fleet in services.fleets.values():
+                await fleet.release()
+
+    def _sync(self, turn: Coroutine[Any, Any, Run]) -> Run:
+        return in_own_loop(self._closing(turn))
+
+    async def _closing(self, turn: Coroutine[Any, Any, Run]) -> Run:
+        """A turn after which nothing stays open: connections cannot outlive their event loop."""
+        try:
+            return await turn
+        finally:
+            if self.run is not None:
+                await self.run.context.services.close_fleets()
+            await self.agent.aclose()
+
+
+def in_own_loop(work: Coroutine[Any, Any, Any]) -> Any:
+    """Run to its end from code that does not await, inside a running event loop too."""
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return asyncio.run(work)
+    with ThreadPoolExecutor(1) as thread:  # as in a notebook
+        return thread.submit(asyncio.run, work).result()
