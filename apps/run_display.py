@@ -29,6 +29,7 @@ PLACES = {
     "between": "between",
     "centre": "at the centre of",
     "shape": "in a form by",
+    "at": "at points by",
 }
 GOING_ON = {
     "question": " --answer TEXT",
@@ -145,7 +146,11 @@ def _group(group: Group, scale: float | None) -> str:
     elif group.clearance is not None and group.relation != "corners":
         words.append(f"{length_text(group.clearance, scale)} away")
     escape_proof = group.closure == "escape-proof"
-    if group.spacing == "even" and group.relation not in ("corners", "centre") and not escape_proof:
+    if (
+        group.spacing == "even"
+        and group.relation not in ("corners", "centre", "at")
+        and not escape_proof
+    ):
         words.append("evenly spaced")
     if group.closure:
         words.append("escape-proof" if escape_proof else f"in a closed {group.closure}")

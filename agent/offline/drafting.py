@@ -20,6 +20,7 @@ NAMES = {
     "between": "between the two",
     "centre": "at its centre",
     "shape": "in a form drawn by it",
+    "at": "at a point",
 }
 """Arrangements as questions name them."""
 

@@ -10,7 +10,7 @@ from ..context import Context, Settings
 from ..errors import ToolError
 from ..fleet.deploy import Arrival
 from ..formation.checking.instruction_doubts import doubts
-from ..formation.contract import MIN_CLEARANCE, Contract, Group, nominal
+from ..formation.contract import MIN_CLEARANCE, Contract, Group, exact_clearance, nominal
 from ..formation.placement.avoidance import off_others
 from ..formation.placement.caging import CUT_SHORT
 from ..formation.placement.partial import best_partial
@@ -36,8 +36,6 @@ from .targets import (
 
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
-EXACT_SHARE, EXACT_PX = 0.05, 1.0
-"""How exactly a clearance the person fixed is held."""
 SLACK_SHARE, SLACK_PX = 0.25, 3.0
 """How far off an outline may be, as a share of the distance kept from it, and at least."""
 SHOW_PARTIAL = "To show it to the person, pass its plan_id to report_impossible."
@@ -350,10 +348,7 @@ def _held_to(contract: Contract, settings: Settings) -> Contract:
 def _with_clearance(group: Group, clearance: float | None) -> Group:
     if clearance is None or not group.keeps_clearance:
         return group
-    slack = max(EXACT_PX, EXACT_SHARE * clearance)
-    greatest = 100_000.0 if group.relation == "inside" else clearance + slack
-    least = clearance if group.relation == "inside" else max(clearance - slack, 0.0)
-    return group.model_copy(update={"clearance": (least, greatest)})
+    return group.model_copy(update={"clearance": exact_clearance(group, clearance)})
 
 
 def _sampled(world: World, samples: tuple[str, ...]) -> Any:

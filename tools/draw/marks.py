@@ -279,7 +279,8 @@ def _guides(part: Part) -> list[FloatArray]:
 
 
 def _is_free(part: Part) -> bool:
-    return part.group.relation == "shape" and part.group.line is part.group.shape is None
+    shape = part.group.relation == "shape" and part.group.line is part.group.shape is None
+    return shape or part.group.relation == "at"
 
 
 def _widest_opening(part: Part) -> Opening | None:

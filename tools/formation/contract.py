@@ -13,7 +13,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from ..geometry.outline import Outline
-from .shape_spec import Four, ShapeSpec, numbers
+from .shape_spec import Four, Pair, ShapeSpec, numbers
 from .value import Value
 
 MAX_ROBOTS = 10_000
@@ -29,7 +29,12 @@ CENTRE_SHARE = 0.2
 PITCH_SHARE, PITCH_PX = 0.01, 0.5
 """Neighbours an exact distance apart may differ from it by this share, at least half a pixel."""
 
-Relation = Literal["around", "cage", "corners", "along", "inside", "between", "centre", "shape"]
+EXACT_SHARE, EXACT_PX = 0.05, 1.0
+"""How exactly a clearance that is named to the pixel is held: within this share, at least 1 px."""
+
+Relation = Literal[
+    "around", "cage", "corners", "along", "inside", "between", "centre", "shape", "at"
+]
 Unit = Literal["px", "m"]
 SideName = Literal["left", "right", "top", "bottom", "long", "short"]
 RingPart = Literal[
@@ -38,6 +43,7 @@ RingPart = Literal[
 Fit = Literal["tight", "normal", "wide"]
 FIT_FACTOR = {"tight": 0.5, "normal": 1.0, "wide": 2.0}
 MAX_LENGTH = 100_000.0
+"""A greatest clearance of this is none: "at least"."""
 LOOKING = ("towards", "away")
 DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
 Length = Annotated[float, Field(ge=0, le=MAX_LENGTH, allow_inf_nan=False)]
@@ -53,10 +59,10 @@ class Group(Value):
     (the picture's border is one): only if so said. corners: one at each, also if surrounded "at
     the corners"; clearance [0, 0]: on them. along: one of side, edges (describe_shape's numbers),
     facing an id. inside: spread over it (in, on). between: two targets. centre: gathered there.
-    shape: shape, line (x0, y0, x1, y1) or positions. clearance: from the outline (inside: inwards)
-    to robots' edges; 15 px away is [15, 15], at least 15 [15, 1000]; else fit: normal also "next
-    to". min_spacing, pitch (exact): of centres; max_gap: of edges. heading: towards, away, id or
-    degrees; opening_towards: left, right, top, bottom, id or degrees.
+    shape: shape, line (x0, y0, x1, y1) or positions. at: points. clearance: from the outline
+    (inside: inwards) to robots' edges; 15 px away is [15, 15], at least 15 [15, 1000]; else fit:
+    normal also "next to". min_spacing, pitch (exact): of centres; max_gap: of edges. heading:
+    towards, away, id or degrees; opening_towards: left, right, top, bottom, id or degrees.
     """
 
     relation: Relation
@@ -76,6 +82,7 @@ class Group(Value):
     edges: tuple[Annotated[int, Field(ge=0)], ...] | None = Field(default=None, min_length=1)
     layout: Literal["line", "divider"] = "line"
     line: Four | None = None
+    points: tuple[Pair, ...] | None = None
     closure: Literal["ring", "escape-proof"] | None = None
     walls: bool | None = None
     facing: str | None = None
@@ -94,7 +101,7 @@ class Group(Value):
         """Whether a clearance says anything: of a shape, where a target gives it its place."""
         if self.shape is not None:
             return self.shape.where not in (None, "on")
-        return self.relation not in ("between", "centre", "shape")
+        return self.relation not in ("between", "centre", "shape", "at")
 
     @property
     def enters(self) -> bool:
@@ -129,8 +136,8 @@ class Group(Value):
         return least + radius, greatest + radius
 
     def _missing(self) -> Iterator[str]:
-        wanted = {"between": 2, "shape": 0}.get(self.relation, 1)
-        if self.relation != "shape" and len(self.targets) != wanted:
+        wanted = {"between": 2}.get(self.relation, 1)
+        if self.relation not in ("shape", "at") and len(self.targets) != wanted:
             yield f"{self.relation} takes {wanted} target(s), got {len(self.targets)}"
         if len(set(self.targets)) < len(self.targets):
             yield f"targets {self.targets} must differ"
@@ -158,6 +165,8 @@ class Group(Value):
             yield f"clearance {self.clearance} must be (least, greatest > 0)"
 
     def _misplaced(self) -> Iterator[str]:
+        if self.relation == "at" and len(self.points or ()) != self.robots:
+            yield f"at takes a point for each robot, got {len(self.points or ())}"
         if self.clearance is not None and not self.keeps_clearance:
             yield f"clearance does not apply to {self.relation}"
         if self.facing is not None and self.facing in self.targets:
@@ -168,12 +177,12 @@ class Group(Value):
             yield "a cage is evenly spaced"
         if self.walls and self.closure != "escape-proof":
             yield "walls belong to the closure escape-proof"
-        for name, only in _ONLY_IN.items():
+        for name, only in ONLY_IN.items():
             if getattr(self, name) is not None and self.relation not in only:
                 yield f"{name} belongs to {' or '.join(only)}, not to {self.relation}"
 
 
-_ONLY_IN = {
+ONLY_IN = {
     "side": ("along",),
     "edges": ("along",),
     "max_gap": ("cage", "around", "along"),
@@ -185,9 +194,11 @@ _ONLY_IN = {
     "closure": ("cage",),
     "walls": ("cage",),
     "line": ("shape",),
+    "points": ("at",),
     "facing": ("along",),
     "shape": ("shape",),
 }
+"""The relations that a field of a group says something in, where those are not all."""
 
 
 class Contract(Value):
@@ -264,11 +275,28 @@ def nominal(clearance: tuple[float, float]) -> float:
     return math.sqrt(least * min(greatest, 4 * least)) if least > 0 else greatest / 2
 
 
+def has_default_clearance(
+    group: Group, outlines: Mapping[str, Outline], room: tuple[float, float], radius: float
+) -> bool:
+    """Whether the clearance written out in a group is the one it has where none is named."""
+    if group.clearance is None or not group.targets:
+        return True
+    return group.clearance == _default_range(group, outlines[group.targets[0]], room, radius)
+
+
 def default_clearance(outline: Outline, room: tuple[float, float], radius: float) -> float:
     """0.16 of the target's size, at least 6 px, no more than the picture has room for."""
     x0, y0, x1, y1 = outline.bounds
     widest = max(x0, y0, room[0] - 1 - x1, room[1] - 1 - y1) - 2 * radius
     return min(max(CLEARANCE_SHARE * outline.size, MIN_CLEARANCE), max(0.6 * widest, 1.0))
+
+
+def exact_clearance(group: Group, px: float) -> tuple[float, float]:
+    """The range that says a group's robots keep just so far from the outline; inside, at least."""
+    if group.relation == "inside":
+        return px, MAX_LENGTH
+    slack = max(EXACT_PX, EXACT_SHARE * px)
+    return max(px - slack, 0.0), px + slack
 
 
 def _defaults(

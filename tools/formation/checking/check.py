@@ -36,6 +36,8 @@ LINE_SHARE = 0.03
 """How far off a straight line a robot may stand, as a share of its length in the picture."""
 HEADING_SLACK = 1.0
 """How far a robot may look past what it is to look at, degrees."""
+AT_POINT = 0.5
+"""As near to a point, px, a robot is at it."""
 WHOLE = 0.995
 """A curve of which the picture leaves this share is not cut."""
 
@@ -327,6 +329,17 @@ def _check_centre(part: Part, audit: Audit) -> None:
         audit.find("off_centre", distance[i], most, robot=part.first + i, about="the centre")
 
 
+def _check_at(part: Part, audit: Audit) -> None:
+    """Everybody at a point of their own, and off the group's targets."""
+    _check_off_targets(part, audit)
+    wanted = np.asarray(part.group.points, dtype=float)
+    off = np.linalg.norm(part.points - wanted, axis=1)
+    audit.greatest("max_from_point_px", off.max())
+    for i in np.flatnonzero(off > AT_POINT + TOLERANCE):
+        about = "({:.0f}, {:.0f})".format(*wanted[i])
+        audit.find("off_point", off[i], AT_POINT, robot=part.first + i, about=about)
+
+
 _RULES: dict[str, Callable[[Part, Audit], None]] = {
     "around": _check_around,
     "cage": _check_around,
@@ -336,4 +349,5 @@ _RULES: dict[str, Callable[[Part, Audit], None]] = {
     "between": _check_line,
     "shape": _check_shape,
     "centre": _check_centre,
+    "at": _check_at,
 }

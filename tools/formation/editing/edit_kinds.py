@@ -223,25 +223,26 @@ class KeepOff(_Edit):
 _FIELDS: dict[str, tuple[str, ...]] = {
     "integer": ("group", "n", "a", "b", "robot"),
     "number": ("px", "factor", "degrees", "dx", "dy"),
-    "array": ("only", "without", "by", "ids"),
     "string": ("kind", "axis", "side", "target"),
     "boolean": ("stay",),
     "object": ("demands",),
 }
+_LISTS = {"only": "string", "without": "string", "ids": "string", "by": "number"}
 _OF_ANY_TYPE: tuple[str, ...] = ("robots", "towards", "to")
 EDIT_SCHEMA: dict[str, Any] = {
     "type": "object",
     "description": (
-        "Kinds: out, in: px or factor. distance: px from the outline. spacing: px or factor. rotate: "
-        "degrees clockwise. mirror: axis left-right or top-bottom. shift: dx, dy. scale: factor. "
-        "add: n. remove: n or robots (numbers); others close up. count: robots, a number, needed "
-        "(to close the ring) or fit. swap: a, b. skip: robots; places stay empty. side: all to it. "
-        "sides: only or without, as of a ring. opening: towards, px wide or factor. close, open, "
-        "escape-proof. arrange: demands, fields of a group. target: to an id; only robots (a count "
-        "or numbers), the rest stay. merge. place: robot to [x, y], by [dx, dy] or target. heading: "
-        "to. keep-out: ids. group: which, if several."
+        "Kinds: out, in: px or factor. distance: px from the outline. spacing: px or factor. "
+        "rotate: degrees clockwise. mirror: axis left-right or top-bottom. shift: dx, dy. scale: "
+        "factor. add: n. remove: n or robots (numbers); others close up. count: robots, a number, "
+        "needed (to close the ring) or fit. swap: a, b. skip: robots; places stay empty. side: all "
+        "to it. sides: only or without, as of a ring. opening: towards, px wide or factor. close, "
+        "open, escape-proof. arrange: demands, fields of a group. target: to an id; only robots (a "
+        "count or numbers), the rest stay. merge. place: robot to [x, y], by [dx, dy] or target. "
+        "heading: to. keep-out: ids. group: which, if several."
     ),
     "properties": {name: {"type": type_} for type_, names in _FIELDS.items() for name in names}
+    | {name: {"type": "array", "items": {"type": type_}} for name, type_ in _LISTS.items()}
     | {name: {} for name in _OF_ANY_TYPE},
     "required": ["kind"],
 }

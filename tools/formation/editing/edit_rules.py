@@ -4,144 +4,42 @@ Maps of the plane and shifts along a curve take every robot with them; only wher
 does the least sum of squared ways decide. Frame: image pixels, x right, y down.
 """
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
-from pydantic import ValidationError
-from shapely.geometry import LineString, Point
+from shapely.geometry import LineString
 
 from ...errors import ToolError
-from ...geometry.assignment import EXACT, assign
 from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import along_curve, corner_points, nearest
-from ..contract import OUTSIDE, Contract, Group, SideName, broken_rules
+from ..contract import MAX_LENGTH, OUTSIDE, RingPart, SideName, exact_clearance
 from ..placement.figure import figure_of
-from ..placement.place import Site, place, reference_curve
+from ..placement.pitch import pitch_places
+from ..placement.ring_parts import opening_way
 from .edit_forms import DECIMALS, Affine, form_after
-from .edit_kinds import Add, Mirror, Offset, Rotate, Scale, Shift, SideOnly
-from .respacing import Track, moved_out, pushed, respaced, track, track_at
+from .edit_kinds import Mirror, Offset, Rotate, Scale, Shift, SideOnly
+from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
+from .respacing import Track, feet_on, moved_out, pushed, track, track_at
 
-IntArray = NDArray[np.intp]
-UNLIMITED = 100_000.0
-"""A greatest clearance of this is none: "at least"."""
-ON_CURVE = frozenset({"around", "cage", "along"})
+QUARTERS: tuple[RingPart, ...] = ("left", "top", "right", "bottom")
+"""Clockwise as seen."""
 OPPOSITE: Mapping[str, Mapping[str, SideName]] = {
     "left-right": {"left": "right", "right": "left"},
     "top-bottom": {"top": "bottom", "bottom": "top"},
 }
 
 
-@dataclass(frozen=True)
-class Part:
-    """One group while it is edited: positions (n, 2) and old numbers from 0, -1 for new ones."""
-
-    group: Group
-    points: FloatArray
-    was: IntArray
-    site: Site
-    radius: float
-
-    def to(self, points: FloatArray, **update: object) -> "Part":
-        """With its robots at other places, and other demands."""
-        return replace(self, points=points, group=self.group.model_copy(update=update))
-
-    @property
-    def free(self) -> bool:
-        """Whether its places follow from nothing but what was given."""
-        group = self.group
-        return group.relation == "shape" and group.line is None and group.shape is None
-
-    @property
-    def centre(self) -> FloatArray:
-        """Of the target; of the robots where there is none, or more than one."""
-        if len(self.group.targets) != 1:
-            return self.points.mean(axis=0)
-        outline = self.site.outlines[self.group.targets[0]]
-        return shapely.get_coordinates(outline.filled.centroid)[0]
-
-    def track(self, count: int) -> Track:
-        """The curve its robots stand on, and would if there were `count`."""
-        if self.group.relation in ON_CURVE:
-            return track(self.group, self.points, self.site, self.radius)
-        group = self.group.model_copy(update={"robots": count})
-        return Track(Point(), 0.0, reference_curve(group, self.site, self.radius))
-
-    def valid_group(self, **update: object) -> Group:
-        """The group with other demands.
-
-        Raises:
-            ToolError: there is no such group.
-        """
-        group = self.group.model_copy(update=update)
-        try:
-            return Group.model_validate(group.model_dump())
-        except ValidationError as error:
-            why = broken_rules(error)
-            raise ToolError(f"The {group.relation} group cannot be changed so: {why}.") from None
-
-    def placed(self, count: int, **update: object) -> FloatArray:
-        """Places for `count` robots, computed anew, (count, 2)."""
-        group = self.valid_group(**update, robots=count)
-        return place(Contract(groups=(group,), robot_radius=self.radius), self.site)
-
-
-def skipped(part: Part, stay: FloatArray) -> Part:
-    """Nobody moves; a ring of a cage stays even by definition, and its verdict says so."""
-    spacing = "even" if part.group.relation == "cage" else "free"
-    if part.group.relation == "between":  # its line would be that of fewer robots
-        line = np.concatenate(part.track(len(part.points)).curve.lines)[[0, -1]].ravel()
-        ends = tuple(round(float(v), DECIMALS) for v in line)
-        return part.to(stay, spacing=spacing, relation="shape", line=ends, layout="line")
-    if part.group.shape is not None and part.group.shape.kind == "grid":
-        return part.to(stay, spacing=spacing, shape=None, clearance=None, pitch=None)
-    return part.to(stay, spacing=spacing, pitch=None)
-
-
-def closed_up(part: Part, stay: FloatArray) -> Part:
-    """Those who stay share the place evenly; at corners and where spacing is free nobody moves."""
-    if part.free or part.group.spacing == "free" or part.group.relation == "corners":
-        return part.to(stay)
-    slots, takes = _slots(replace(part, points=stay), len(stay))
-    return part.to(slots[takes])
-
-
-def _slots(part: Part, count: int) -> tuple[FloatArray, IntArray]:
-    """Places for `count` robots, and which of them those that are there take."""
-    drawn = part.group.shape is not None
-    exact = part.group.pitch is not None
-    if not drawn and not exact and part.group.relation not in ("corners", "inside", "centre"):
-        here = part.track(count)
-        _check_room(part, here)
-        return respaced(here, part.points, count)
-    slots = part.placed(count)
-    return slots, _taken(part.points, slots)
-
-
-def _taken(points: FloatArray, slots: FloatArray) -> IntArray:
-    """For each robot one of as many slots or more, by least sum of squares."""
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
-    if len(slots) <= EXACT:
-        cost = cdist(points, slots, "sqeuclidean")
-        return np.asarray(linear_sum_assignment(cost)[1], dtype=np.intp)
-    away, _ = nearest(points, slots, 1)  # many: the places furthest from anybody stay empty
-    kept = np.sort(np.argsort(away, kind="stable")[: len(points)])
-    return kept[np.argsort(assign(points, slots[kept]).robots)]
-
-
-def _check_room(part: Part, here: Track) -> None:
-    if here.curve.length <= 0:
-        raise ToolError(
-            f"Nothing of the place for the {part.group.relation} group would lie in the picture."
-        )
-
-
 def _offset(part: Part, edit: Offset) -> Part:
     group = part.group
+    if group.relation == "at" and group.targets:
+        return _pushed(part, edit)
+    if group.solves_clearance:  # how far apart they stand gives way
+        clearance = exact_clearance(group, part.offset - part.radius)
+        group = group.model_copy(update={"clearance": clearance, **without_pitch(group)})
+        part = replace(part, group=group)
     if group.clearance is None or not group.targets:
         raise ToolError(
             f"The {group.relation} group keeps no distance to move out or in by: scale it instead."
@@ -159,11 +57,20 @@ def _offset(part: Part, edit: Offset) -> Part:
             f"robots' edges are {part.site.length(max(clearance, 0.0))} from it."
         )
     least, greatest = (round(max(bound + by, 0.0), DECIMALS) for bound in group.clearance)
-    if group.clearance[1] >= UNLIMITED:
-        greatest = UNLIMITED
+    if group.clearance[1] >= MAX_LENGTH:
+        greatest = MAX_LENGTH
     if group.radius is not None:
         return _resized(part, (group.radius + by) / group.radius, (least, greatest))
     return part.to(_beyond(part, here, by, (least, greatest)), clearance=(least, greatest))
+
+
+def _pushed(part: Part, edit: Offset) -> Part:
+    """Robots at points of their own straight away from the target, or towards it."""
+    solid = part.site.outlines[part.group.targets[0]].filled
+    by = _by(edit, part.offset - part.radius, inward=False)
+    if part.offset - part.radius + by <= 0:
+        raise ToolError(f"{part.site.length(-by)} nearer to {part.group.targets[0]} is too much.")
+    return part.to(pushed(solid, part.points, feet_on(solid, part.points), by))
 
 
 def _resized(part: Part, factor: float, clearance: tuple[float, float]) -> Part:
@@ -188,14 +95,18 @@ def _beyond(
     group, points = part.group.model_copy(update={"clearance": clearance}), part.points
     if here is not None:
         there = track_at(group, part.site, part.radius, here.offset + by)
-        _check_room(part, there)
+        check_room(part, there)
+        if group.pitch is not None:
+            slots = pitch_places(group, there.curve, part.site)
+            if len(slots) == len(points):
+                return slots[taken(points, slots)]
         return moved_out(points, here, there)
     if group.relation == "corners":
         outline = part.site.outlines[group.targets[0]]
         corners = corner_points(outline, group.robots)
         return pushed(outline.filled, points, corners[nearest(corners, points, 1)[1]], by)
     slots = part.placed(len(points), clearance=clearance)
-    return slots[_taken(points, slots)]
+    return slots[taken(points, slots)]
 
 
 def _rotated(part: Part, edit: Rotate) -> Part:
@@ -204,8 +115,32 @@ def _rotated(part: Part, edit: Rotate) -> Part:
         arc = here.clockwise * here.curve.length * edit.degrees / 360
         points = here.at(here.stations(part.points) + arc)
         return part.to(here.settled(points, distances(here.base, part.points)))
+    if part.group.opens or part.group.sides is not None:
+        turned = part.valid_group(**_turned(part, edit.degrees))
+        return part.on_ring(turned)
     c, s = np.cos(np.radians(edit.degrees)), np.sin(np.radians(edit.degrees))
     return _rigid(part, np.array([[c, s], [-s, c]]), part.centre, part.centre)
+
+
+def _turned(part: Part, degrees: float) -> dict[str, object]:
+    """Where the opening or the sides of a ring are after a turn.
+
+    Raises:
+        ToolError: sides are turned by what is no quarter of a turn.
+    """
+    group = part.group
+    if group.sides is None:
+        x, y = opening_way(group, part.site)
+        angle = math.degrees(math.atan2(y, x)) + degrees
+        return {"opening_towards": round((angle + 180) % 360 - 180, DECIMALS)}
+    quarters = degrees / 90
+    if abs(quarters - round(quarters)) > 1e-9:
+        raise ToolError("Robots on some sides turn by quarters: 90, 180 or 270 degrees.")
+    following = dict(zip(QUARTERS, (*QUARTERS[1:], QUARTERS[0]), strict=True))
+    sides = group.sides
+    for _ in range(round(quarters) % 4):
+        sides = tuple(" ".join([following[w.split()[0]], *w.split()[1:]]) for w in sides)
+    return {"sides": sides}
 
 
 def _mirrored(part: Part, edit: Mirror) -> Part:
@@ -214,7 +149,15 @@ def _mirrored(part: Part, edit: Mirror) -> Part:
     there = _rigid(part, flip, part.centre, part.centre)
     side = side and OPPOSITE[edit.axis].get(side, side)
     edges = part.group.edges and _edges_after(part, Affine(flip, part.centre, part.centre))
-    return there.to(there.points, side=side, edges=edges)
+    other = OPPOSITE[edit.axis]
+    sides = part.group.sides and tuple(
+        " ".join([other.get(w.split()[0], w.split()[0]), *w.split()[1:]]) for w in part.group.sides
+    )
+    towards = part.group.opening_towards
+    if part.group.opens:
+        x, y = opening_way(part.group, part.site) @ flip
+        towards = round(math.degrees(math.atan2(y, x)), DECIMALS)
+    return there.to(there.points, side=side, edges=edges, sides=sides, opening_towards=towards)
 
 
 def _edges_after(part: Part, there: Affine) -> tuple[int, ...]:
@@ -231,7 +174,7 @@ def _shifted(part: Part, edit: Shift) -> Part:
     return _rigid(part, np.eye(2), centre, centre + np.array([edit.dx, edit.dy]))
 
 
-def _scaled(part: Part, edit: Scale) -> Part:
+def scaled(part: Part, edit: Scale) -> Part:
     """Rigid but for size; clearances demanded grow as those that are kept do."""
     there = _rigid(part, np.eye(2) * edit.factor, part.centre, part.centre)
     group = there.group
@@ -244,7 +187,7 @@ def _scaled(part: Part, edit: Scale) -> Part:
         return there.to(there.points, radius=round(group.radius * edit.factor, DECIMALS))
     least, greatest = group.clearance
     least = round(least * float(new.min() / old.min()), DECIMALS)
-    if greatest < UNLIMITED:
+    if greatest < MAX_LENGTH:
         greatest = round(greatest * float(new.max() / old.max()), DECIMALS)
     return there.to(there.points, clearance=(least, greatest))
 
@@ -267,22 +210,12 @@ def _rigid(part: Part, linear: FloatArray, origin: FloatArray, to: FloatArray) -
         moved = replace(part, group=group, points=points)
         if anew:
             slots = moved.placed(len(points))
-            moved = replace(moved, points=slots[_taken(points, slots)])
+            moved = replace(moved, points=slots[taken(points, slots)])
         return moved
     if part.group.line is None:
         return part.to(points)
     ends = there(np.reshape(part.group.line, (2, 2)))
     return part.to(points, line=tuple(round(float(v), DECIMALS) for v in ends.ravel()))
-
-
-def _added(part: Part, edit: Add) -> Part:
-    if part.free:
-        raise ToolError("A free shape has no places of its own for more robots: give positions.")
-    old = len(part.points)
-    slots, takes = _slots(part, old + edit.n)
-    new = np.setdiff1d(np.arange(len(slots)), takes)
-    was = np.concatenate([part.was, np.full(edit.n, -1)])
-    return replace(part.to(slots[np.concatenate([takes, new])]), was=was)
 
 
 def _to_side(part: Part, edit: SideOnly) -> Part:
@@ -292,16 +225,12 @@ def _to_side(part: Part, edit: SideOnly) -> Part:
             f"Only robots outside a target can keep to one side of it; these are {group.relation}."
         )
     other = {"relation": "along", "side": edit.side, "edges": None, "facing": None}
-    ring = ("closure", "walls", "radius", "sides", "opening", "opening_towards", "pitch")
-    along = group.model_copy(update={**other, "max_gap": None, **dict.fromkeys(ring)})
-    outline = part.site.outlines[group.targets[0]]
-    offset = float(distances(outline.filled, part.points).min())
-    if offset <= 0:
-        raise ToolError(f"A robot stands on {group.targets[0]}: propose the formation anew.")
-    there = track_at(along, part.site, part.radius, offset)
-    _check_room(part, there)
+    gone = dict.fromkeys((*RING, "max_gap"))
+    along = group.model_copy(update={**other, **gone, **without_pitch(group)})
+    there = track_at(along, part.site, part.radius, part.offset)
+    check_room(part, there)
     slots = along_curve(there.curve, len(part.points))
-    return replace(part, group=along, points=slots[_taken(part.points, slots)])
+    return replace(part, group=along, points=slots[taken(part.points, slots)])
 
 
 RULES: Mapping[str, Callable[..., Part]] = {
@@ -310,7 +239,6 @@ RULES: Mapping[str, Callable[..., Part]] = {
     "rotate": _rotated,
     "mirror": _mirrored,
     "shift": _shifted,
-    "scale": _scaled,
-    "add": _added,
+    "scale": scaled,
     "side": _to_side,
 }

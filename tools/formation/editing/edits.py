@@ -5,25 +5,36 @@ plan. Robots keep their identities: each goes to the image of its own place, and
 places themselves are new, the least sum of squared ways decides who takes which.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import ToolError
+from ...geometry.cages.budget import search_budget
 from ...geometry.outline import FloatArray
+from ..contract import Contract
+from ..encounters import encounters_of, others_than
+from ..placement.avoidance import off_others
 from ..placement.place import Site
 from ..plan import Plan, make_plan
 from ..value import Value
-from .edit_kinds import Add, Edit, Offset, Remove, SideOnly, Skip, Swap
-from .edit_rules import RULES, Part, closed_up, skipped
+from .draft import Draft, draft_of
+from .edit_kinds import Edit
+from .edit_rules import RULES
+from .part import IntArray, taken
+from .ring_rules import RING_RULES
+from .staying import held, holding, moved_in, settled
+from .team_rules import TEAM_RULES
 
-IntArray = NDArray[np.intp]
+EXACT = frozenset(
+    {"rotate", "mirror", "shift", "scale", "swap", "skip", "place", "heading", "distance"}
+)
+"""What says where everybody is to be: nobody is moved off another thing for it."""
 
 
 class Diff(Value):
-    """What an edit changes, robots numbered from 1.
+    """What edits change; robots are numbered from 1 in the order of the plans' `points`.
 
     Attributes:
         was: for each robot of the new plan its number in the old one; None for one added.
@@ -39,58 +50,102 @@ class Diff(Value):
 
 
 class Edited(Value):
-    """The plan after an edit, certified or with findings, and what the edit changed."""
+    """The plan after edits, certified or with findings, and what they changed.
+
+    Attributes:
+        robots: for each of the new plan's `points` the id of the robot that goes there; None for
+            one added.
+    """
 
     plan: Plan
     parent: str
     diff: Diff
+    robots: tuple[str | None, ...]
 
 
-def edited(plan: Plan, edit: Edit, site: Site) -> Edited:
-    """The plan, certified or not, after an edit in the site it was made in.
+def edited(plan: Plan, edit: Edit, site: Site, version: Callable[[Contract], str]) -> Edited:
+    """The plan, certified or not, after an edit; see `edited_all`."""
+    return edited_all(plan, (edit,), site, version)
+
+
+def edited_all(
+    plan: Plan,
+    edits: Sequence[Edit],
+    site: Site,
+    version: Callable[[Contract], str],
+    stay: Collection[int] = (),
+) -> Edited:
+    """The plan, certified or not, after edits one after another.
+
+    Args:
+        site: with the outlines of all that the plan or an edit names, and as `others` what else is
+            in the picture; of these the things that the new contract names count no more.
+        version: of the scene, as far as a contract depends on it.
+        stay: numbers of robots that do not move; "robot k" is the one whose id is k, in a fleet
+            whose ids are no numbers the k-th.
 
     Raises:
-        ToolError: the edit makes no sense for this plan; the text says why.
+        ToolError: an edit makes no sense for this plan; the text says why.
     """
-    formation = plan.formation
-    parts = _parts(plan, site)
-    if isinstance(edit, Swap):
-        parts = _swapped(parts, edit)
-    elif isinstance(edit, Skip):
-        parts = _without_robots(parts, edit.robots, skipped)
-    elif isinstance(edit, Remove):
-        parts = _without_robots(parts, edit.robots or _last(parts, edit), closed_up)
-    else:
-        chosen = set(_chosen(edit, parts))
-        parts = [RULES[edit.kind](p, edit) if k in chosen else p for k, p in enumerate(parts)]
-    groups = tuple(part.valid_group(robots=len(part.points)) for part in parts)
-    contract = formation.contract.model_copy(update={"groups": groups})
-    points = np.concatenate([part.points for part in parts])
-    after = make_plan(contract, site, formation.scene_version, points)
-    was = np.concatenate([part.was for part in parts])
-    return Edited(plan=after, parent=plan.id, diff=_diff(plan, after, was))
+    with search_budget():
+        start = draft_of(plan, site)
+        draft = settled(_after(holding(start, stay), edits), start)
+        if moved_in(draft, start):
+            draft = _after(held(start, stay), edits)
+        if astray := moved_in(draft, start):
+            names = " and ".join(map(str, astray))
+            raise ToolError(f"Robot {names} cannot stay where it is and take part in that.")
+        contract = draft.agreed()
+        after = make_plan(contract, site, version(contract), draft.points)
+        after = _off_others(after, draft, plan.formation.points, edits)
+    notes = (*after.verdict.notes, *draft.notes)
+    verdict = after.verdict.model_copy(update={"notes": tuple(dict.fromkeys(notes))})
+    after = after.model_copy(update={"verdict": verdict})
+    was, names = draft.was, plan.formation.robot_of_place
+    robots = tuple(names[i] if i >= 0 else None for i in was.tolist())
+    return Edited(plan=after, parent=plan.id, diff=_diff(plan, after, was), robots=robots)
 
 
-def _parts(plan: Plan, site: Site) -> list[Part]:
-    contract, points = plan.formation.contract, plan.formation.points
-    if plan.partial is not None:
-        short = plan.partial.short(site.metres_per_pixel)
-        raise ToolError(
-            f"Plan {plan.id} is partial ({short}); propose what is wanted instead before changing "
-            "it."
-        )
-    if len(points) != contract.robots:
-        raise ToolError(
-            f"Plan {plan.id} has {len(points)} positions for {contract.robots} robots; propose it "
-            "anew before changing it."
-        )
-    ends = np.cumsum([g.robots for g in contract.groups])
-    numbers = np.split(np.arange(len(points)), ends[:-1])
-    radius = contract.robot_radius
-    return [
-        Part(group, points[mine], mine, site, radius)
-        for group, mine in zip(contract.groups, numbers, strict=True)
-    ]
+def _after(draft: Draft, edits: Sequence[Edit]) -> Draft:
+    for edit in edits:
+        if edit.kind in TEAM_RULES:
+            draft = TEAM_RULES[edit.kind](draft, edit)
+            continue
+        rule = RULES.get(edit.kind) or RING_RULES[edit.kind]
+        draft = draft.with_each(draft.chosen(edit), lambda part: rule(part, edit))  # noqa: B023
+    return draft
+
+
+def _off_others(plan: Plan, draft: Draft, before: FloatArray, edits: Sequence[Edit]) -> Plan:
+    """The plan, or one whose robots that moved stand on fewer other things, as few moved as can.
+
+    Nobody who is to stay is moved.
+    """
+    if all(edit.kind in EXACT for edit in edits):
+        return plan
+    contract, points, was = plan.formation.contract, plan.formation.points, draft.was
+    outlines = {name: draft.site.outlines[name] for name in contract.target_ids}
+    others = others_than(contract, outlines, draft.site.others)
+    site = replace(draft.site, others=others)
+    on = [e for e in encounters_of(plan, site, {}, 0.0) if e.how == "on"]
+    here = np.array([int(name) - 1 for e in on for name in e.robots], dtype=np.intp)
+    moved = (was < 0) | (np.linalg.norm(points - before[was], axis=1) > 0)
+    if not moved[here].any() and plan.verdict.certified:
+        return plan
+    off = off_others(plan, site)
+    if off is plan:
+        return plan
+    slots, parts = off.formation.points, np.split(np.arange(len(was)), _ends(draft))
+    order = np.concatenate([mine[taken(points[mine], slots[mine])] for mine in parts])
+    stays = np.isin(was, list(draft.held))
+    if (slots[order][stays] != points[stays]).any():
+        return plan
+    again = make_plan(contract, site, plan.formation.scene_version, slots[order])
+    return again if again.verdict.certified else plan
+
+
+def _ends(draft: Draft) -> IntArray:
+    return np.cumsum([len(part.points) for part in draft.parts])[:-1]
 
 
 def _diff(before: Plan, after: Plan, was: IntArray) -> Diff:
@@ -104,63 +159,3 @@ def _diff(before: Plan, after: Plan, was: IntArray) -> Diff:
         added=tuple(int(i) + 1 for i in np.flatnonzero(~kept)),
         removed=tuple(int(i) + 1 for i in gone),
     )
-
-
-def _chosen(edit: Edit, parts: list[Part]) -> list[int]:
-    """Which groups an edit is for, from 0."""
-    number = getattr(edit, "group", None)
-    if number is not None and number > len(parts):
-        raise ToolError(f"There is no group {number}: they go from 1 to {len(parts)}.")
-    if number is not None:
-        return [number - 1]
-    if isinstance(edit, Add | Remove | SideOnly) and len(parts) > 1:
-        raise ToolError(f"Say which of the groups 1 to {len(parts)} is meant.")
-    if isinstance(edit, Offset):  # those without a clearance stay, unless there is no other
-        some = [k for k, part in enumerate(parts) if part.group.clearance is not None]
-        return some or [0]
-    return list(range(len(parts)))
-
-
-def _robot_indices(robots: Collection[int], parts: list[Part]) -> IntArray:
-    """Numbers from 0 of robots that are there."""
-    count = sum(len(part.points) for part in parts)
-    strange = sorted({r for r in robots if r > count})
-    if strange:
-        names = " and ".join(f"no robot {r}" for r in strange)
-        raise ToolError(f"There is {names}: they go from 1 to {count}.")
-    return np.unique(np.asarray(list(robots), dtype=np.intp)) - 1
-
-
-def _swapped(parts: list[Part], edit: Swap) -> list[Part]:
-    if edit.a == edit.b:
-        raise ToolError(f"Robot {edit.a} cannot swap with itself: name two robots.")
-    a, b = _robot_indices((edit.a, edit.b), parts)
-    points = np.concatenate([part.points for part in parts])
-    points[[a, b]] = points[[b, a]]
-    return [replace(part, points=points[part.was]) for part in parts]
-
-
-def _last(parts: list[Part], edit: Remove) -> list[int]:
-    """Numbers from 1 of the last robots of a group."""
-    part = parts[_chosen(edit, parts)[0]]
-    count, n = len(part.points), edit.n or 0
-    if n > count:
-        raise ToolError(f"{n} robots cannot be removed: there are {count}.")
-    return [int(i) + 1 for i in part.was[count - n :]]
-
-
-def _without_robots(
-    parts: list[Part], robots: Collection[int], leave: Callable[[Part, FloatArray], Part]
-) -> list[Part]:
-    """The groups that are left without some robots, numbered from 1."""
-    gone = _robot_indices(robots, parts)
-    left: list[Part] = []
-    for part in parts:
-        stays = ~np.isin(part.was, gone)
-        if stays.all():
-            left.append(part)
-        elif stays.any():
-            left.append(replace(leave(part, part.points[stays]), was=part.was[stays]))
-    if not left:
-        raise ToolError("Nobody would be left: at least one robot has to stay.")
-    return left

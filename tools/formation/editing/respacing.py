@@ -74,7 +74,7 @@ class Track:
             apart: (n,) from the base, px; points much further off, over a recess, stay.
         """
         now = distances(self.base, points)
-        feet = _feet(self.base, points)
+        feet = feet_on(self.base, points)
         near = np.abs(now - apart) <= OFF_TRACK + (ROUND_JOIN_DIP**2 - 1) * self.offset
         share = np.where(near & (now > 0), apart / np.maximum(now, 1e-9), 1.0)
         return feet + (points - feet) * share[:, None]
@@ -102,7 +102,7 @@ def moved_out(points: FloatArray, old: Track, new: Track) -> FloatArray:
     loops = old.curve.closed and new.curve.closed
     whole = loops or _one_piece(old.curve, new.curve)
     if not old.holds(points):
-        return pushed(old.base, points, _feet(old.base, points), by)
+        return pushed(old.base, points, feet_on(old.base, points), by)
     if not whole:
         slots = along_curve(new.curve, len(points))
         return slots[_ordered(new, points, slots)]
@@ -110,7 +110,7 @@ def moved_out(points: FloatArray, old: Track, new: Track) -> FloatArray:
     if not loops:
         return new.settled(new.at(stations * share), apart + by)
     anchor = int(np.argmax(apart <= old.offset + OFF_TRACK))
-    foot = _feet(old.base, points[anchor : anchor + 1])
+    foot = feet_on(old.base, points[anchor : anchor + 1])
     start = new.stations(pushed(old.base, points[anchor : anchor + 1], foot, by))[0]
     turn = new.clockwise * old.clockwise
     return new.settled(new.at(start + turn * share * (stations - stations[anchor])), apart + by)
@@ -206,7 +206,7 @@ def _one_piece(old: Curve, new: Curve) -> bool:
     return all(whole) and not old.closed and not new.closed
 
 
-def _feet(base: BaseGeometry, points: FloatArray) -> FloatArray:
+def feet_on(base: BaseGeometry, points: FloatArray) -> FloatArray:
     """The nearest point of a geometry to each of (n, 2) points, (n, 2)."""
     lines = shapely.shortest_line(base, shapely.points(points))
     return shapely.get_coordinates(lines).reshape(-1, 2, 2)[:, 0]

@@ -54,14 +54,7 @@ def caged_places(group: Group, site: Site, radius: float, curve: Curve) -> Float
     Raises:
         CageError: none were found; it says how many robots would do.
     """
-    demand = Demand(
-        site.outlines[group.targets[0]],
-        group.offsets(),
-        radius,
-        site.frame(radius),
-        group.min_spacing or 0.0,
-        walls_of(group, site.room),
-    )
+    demand = demand_of(group, site, radius)
     points = caging_places(demand, group.robots, (curve,))
     if points is None:
         longest = max(c.length for c in (curve, *demand.curves))
@@ -70,6 +63,18 @@ def caged_places(group: Group, site: Site, radius: float, curve: Curve) -> Float
         fits = min(int(longest / demand.spacing), group.robots - 1) if crowded else 0
         raise CageError(group, None if enough is None else len(enough), fits, site)
     return points
+
+
+def demand_of(group: Group, site: Site, radius: float) -> Demand:
+    """What a cage of a group is made for."""
+    return Demand(
+        site.outlines[group.targets[0]],
+        group.offsets(),
+        radius,
+        site.frame(radius),
+        group.min_spacing or 0.0,
+        walls_of(group, site.room),
+    )
 
 
 def walls_of(group: Group, room: tuple[float, float]) -> BaseGeometry | None:

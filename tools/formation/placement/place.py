@@ -64,13 +64,28 @@ def place(contract: Contract, site: Site, sound: Sound = lambda group, points: T
     """
     stands: list[Stand] = []
     for group in contract.groups:
-        stand = Stand(group, _place_group(group, site, contract.robot_radius))
-        clash = conflict(stand, stands)
-        solid = _foreign(contract, group, site)
-        if clash is not None or _stands_on(solid, stand.points, contract.robot_radius):
-            stand = _elsewhere(contract, stand, stands, site, clash, sound)
-        stands.append(stand)
+        stands.append(stand_of(group, contract, stands, site, sound))
     return np.concatenate([stand.points for stand in stands])
+
+
+def stand_of(
+    group: Group,
+    contract: Contract,
+    earlier: list[Stand],
+    site: Site,
+    sound: Sound = lambda group, points: True,
+) -> Stand:
+    """A group of a contract and its places beside those of groups that stand already.
+
+    Raises:
+        CapacityError, CageError, CrowdedError, ToolError: as `place`.
+    """
+    stand = Stand(group, _place_group(group, site, contract.robot_radius))
+    clash = conflict(stand, earlier)
+    solid = _foreign(contract, group, site)
+    if clash is not None or _stands_on(solid, stand.points, contract.robot_radius):
+        return _elsewhere(contract, stand, earlier, site, clash, sound)
+    return stand
 
 
 def _foreign(contract: Contract, group: Group, site: Site) -> list[Polygon]:
@@ -225,6 +240,8 @@ def _offsets(group: Group, radius: float) -> tuple[float | None, ...]:
 def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
     if group.shape is not None:
         return place_figure(group, group.shape, site, radius)
+    if group.points is not None:
+        return np.asarray(group.points, dtype=float)
     if group.relation == "shape" and group.line is None:
         raise ToolError("A free shape has no places of its own: give the positions.")
     points, why = _as_many_as_fit(group, site, radius)

@@ -119,15 +119,16 @@ def _far(site: Site) -> float:
 def opening_station(group: Group, site: Site, loop: FloatArray) -> float:
     """Arc length on a ring (m, 2) of the middle of its opening, px."""
     centre = centre_of(site.outlines[group.targets[0]])
-    unit = _towards(group, site, centre)
+    unit = opening_way(group, site)
     ray = LineString([centre, centre + _far(site) * unit])
     hits = shapely.get_coordinates(shapely.intersection(ray, LineString(loop)))
     points = hits if len(hits) else loop
     return float(locate(loop, points[[int(np.argmax((points - centre) @ unit))]])[0])
 
 
-def _towards(group: Group, site: Site, centre: FloatArray) -> FloatArray:
-    """Unit vector from the target's centre to where the opening is to be."""
+def opening_way(group: Group, site: Site) -> FloatArray:
+    """Unit vector (2,) from the target's centre to where the opening is to be."""
+    centre = centre_of(site.outlines[group.targets[0]])
     towards = group.opening_towards
     if isinstance(towards, str) and towards not in DIRECTIONS:
         other = site.outlines[towards].filled

@@ -1,0 +1,215 @@
+"""What edits do to a group around a target: its distance, spacing, sides, opening and closure."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import ToolError
+from ...geometry.cages.cage_places import fewest_cage
+from ...geometry.outline import FloatArray
+from ...geometry.sampling import along_curve, nearest
+from ..checking.check import certify
+from ..contract import (
+    LEAST_SOLVED,
+    MAX_LENGTH,
+    MAX_ROBOTS,
+    OUTSIDE,
+    Contract,
+    Group,
+    RingPart,
+    exact_clearance,
+    has_default_clearance,
+)
+from ..placement.caging import demand_of, escape_proof
+from ..placement.pitch import pitch_offset
+from ..site import Site
+from .edit_kinds import Closure, Distance, Heading, Opening, Scale, Sides, Spacing
+from .edit_rules import QUARTERS, scaled
+from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
+from .respacing import moved_out, track, track_at
+
+OTHER_HALF: Mapping[str, RingPart] = {
+    "left half": "right half",
+    "right half": "left half",
+    "top half": "bottom half",
+    "bottom half": "top half",
+}
+
+
+def _distant(part: Part, edit: Distance) -> Part:
+    """Everybody straight to the distance where the curve is one; else to places anew."""
+    group = part.group
+    if group.clearance is None or not group.targets:
+        raise ToolError(f"The {group.relation} group keeps no distance from anything.")
+    unsolved = without_pitch(group) if group.solves_clearance else {}
+    clearance = exact_clearance(group, edit.px)
+    group = part.valid_group(clearance=clearance, radius=None, **unsolved)
+    if group.relation not in ON_CURVE or group.pitch is not None:
+        return part.anew(group)
+    here = track(part.group, part.points, part.site, part.radius)
+    there = track_at(group, part.site, part.radius, edit.px + part.radius)
+    check_room(part, there)
+    if here.holds(part.points) and part.group.radius is None:
+        points = moved_out(part.points, here, there)
+        if there.holds(points):
+            return replace(part, group=group, points=points)
+    slots = along_curve(there.curve, len(part.points))
+    return replace(part, group=group, points=slots[taken(part.points, slots)])
+
+
+def _spaced(part: Part, edit: Spacing) -> Part:
+    """Neighbours nearer or further: on a closed ring by its distance, else where they stand."""
+    group, count = part.group, len(part.points)
+    if count < 2:
+        raise ToolError("One robot alone has no neighbours.")
+    if group.relation in ("between", "corners", "at"):
+        raise ToolError(
+            f"How far apart robots are follows from where they stand: {group.relation}."
+        )
+    now = neighbours_px(part)
+    px = edit.px or now * (edit.factor or 1.0)
+    loose = {**without_pitch(group), "min_spacing": None, "max_gap": None}
+    if group.relation == "inside" and edit.px is not None:
+        return part.anew(part.valid_group(**loose | {"min_spacing": px}))
+    if group.relation not in ON_CURVE:
+        larger = scaled(part, Scale(factor=px / now))
+        pitch = px if edit.px and (group.line or group.shape) else None
+        return replace(larger, group=larger.valid_group(**loose, pitch=pitch))
+    whole = group.relation != "along" and group.sides is None and not group.opens
+    if not whole:
+        return part.anew(part.valid_group(**loose | {"pitch": px, "spacing": "even"}))
+    return _ring_spaced(part, px, exact=edit.px is not None, loose=loose)
+
+
+def _ring_spaced(part: Part, px: float, *, exact: bool, loose: dict[str, object]) -> Part:
+    """A whole ring at the distance at which its robots stand so far apart."""
+    solved = {"clearance": (LEAST_SOLVED, MAX_LENGTH), "radius": None, "spacing": "even"}
+    if exact and part.group.relation == "around":
+        return part.anew(part.valid_group(**loose | solved | {"pitch": px}))
+    asked = {"relation": "around", **dict.fromkeys(RING), **loose, **solved, "pitch": px}
+    offset = pitch_offset(part.valid_group(**asked), part.site, part.radius)
+    loose = loose | {"radius": None}
+    return _distant(part.to(part.points, **loose), Distance(px=offset - part.radius))
+
+
+def neighbours_px(part: Part) -> float:
+    """How far neighbours are apart on average, straight, px."""
+    if part.group.relation not in ON_CURVE and part.group.line is None:
+        return float(nearest(part.points, part.points, 2)[0][:, 1].mean())
+    steps = _steps(part)
+    return float(np.delete(steps, np.argmax(steps)).mean() if len(steps) > 1 else steps.mean())
+
+
+def _steps(part: Part) -> FloatArray:
+    """Ways from robot to robot along a curve, straight; round a target all the way round."""
+    here = part.track(len(part.points))
+    ordered = part.points[np.argsort(here.stations(part.points), kind="stable")]
+    if part.group.relation in ("around", "cage"):
+        ordered = np.concatenate([ordered, ordered[:1]])
+    return np.linalg.norm(np.diff(ordered, axis=0), axis=1)
+
+
+def _ringed(part: Part, relation: str = "around", **demands: object) -> Group:
+    """The group as a ring of other demands round the same target.
+
+    Raises:
+        ToolError: it is not round one.
+    """
+    group = part.group
+    if group.relation not in OUTSIDE:
+        raise ToolError(
+            f"Only robots outside a target can make a ring round it; these are {group.relation}."
+        )
+    usual = has_default_clearance(group, part.site.outlines, part.site.room, part.radius)
+    gone = dict.fromkeys((*RING, "side", "edges", "facing"))
+    kept = {"clearance": None} if usual and group.relation == "corners" else {}
+    return part.valid_group(**{**gone, **kept, "relation": relation, "spacing": "even", **demands})
+
+
+def _sided(part: Part, edit: Sides) -> Part:
+    sides = edit.only
+    if sides is None:
+        free = set(edit.without or ())
+        halves = {name for name in free if name.endswith(" half")}
+        left = part.group.sides or QUARTERS
+        if halves:
+            left = tuple(OTHER_HALF[name] for name in sorted(halves)) if len(halves) == 1 else ()
+        sides = tuple(name for name in left if name not in free)
+    if not sides:
+        raise ToolError("No part of the way round would be left to stand on.")
+    return part.on_ring(_ringed(part, sides=sides, radius=part.group.radius))
+
+
+def _opened(part: Part, edit: Opening) -> Part:
+    group = part.group
+    towards = group.opening_towards if edit.towards is None else edit.towards
+    px = group.opening if edit.px is None else edit.px
+    if edit.factor is not None:
+        px = edit.factor * max(float(_steps(part).max()) - 2 * part.radius, 0.0)
+    towards = "bottom" if towards is None else towards
+    ring = _ringed(part, radius=group.radius, opening=px or 0.0, opening_towards=towards)
+    return part.on_ring(ring)
+
+
+def _closed(part: Part, edit: Closure) -> Part:
+    group = part.group
+    if edit.kind == "open":
+        if group.relation != "cage":
+            raise ToolError(f"The {group.relation} group is no closed ring that could be opened.")
+        return part.to(part.points, relation="around", closure=None, walls=None, max_gap=None)
+    closure = "ring" if edit.kind == "close" else "escape-proof"
+    cage = _ringed(part, "cage", closure=closure, walls=group.walls, **without_pitch(group))
+    if group.solves_clearance:
+        cage = cage.model_copy(
+            update={"clearance": exact_clearance(cage, part.offset - part.radius)}
+        )
+    there = part.on_ring(cage) if group.relation != "cage" else replace(part, group=cage)
+    alone = Contract(groups=(cage,), robot_radius=part.radius)
+    if closure == "ring" or certify(there.points, alone, part.site).certified:
+        return there
+    return part.anew(cage)
+
+
+def robots_to_close(group: Group, site: Site, radius: float, offset: float) -> int:
+    """How many robots evenly on a group's ring leave no gap that its target could pass through.
+
+    No gap is wider than the contract allows, or where it says nothing than the target's least
+    width; for an escape-proof cage, as many as are known to be enough.
+
+    Args:
+        offset: of robots' centres from the outline, px.
+
+    Raises:
+        ToolError: no number does, or the picture cuts the ring.
+    """
+    name = group.targets[0]
+    curve = track_at(group, site, radius, offset).curve
+    if not curve.closed:
+        raise ToolError(f"The picture's border cuts the ring around {name}: come nearer to it.")
+    if escape_proof(group):
+        found = fewest_cage(demand_of(group, site, radius), 3)
+        needed = 0 if found is None else len(found)
+    else:
+        widest = site.outlines[name].min_width if group.max_gap is None else group.max_gap
+        needed = max(math.ceil(curve.length / max(widest + 2 * radius, 1e-9)), 3)
+    if not 0 < needed <= MAX_ROBOTS or curve.length / needed < (group.min_spacing or 0.0):
+        raise ToolError(f"No number of robots is known to close the ring around {name}.")
+    return needed
+
+
+def _headed(part: Part, edit: Heading) -> Part:
+    return replace(part, group=part.valid_group(heading=edit.to))
+
+
+RING_RULES: Mapping[str, Callable[..., Part]] = {
+    "distance": _distant,
+    "spacing": _spaced,
+    "sides": _sided,
+    "opening": _opened,
+    "close": _closed,
+    "open": _closed,
+    "escape-proof": _closed,
+    "heading": _headed,
+}
