@@ -12,7 +12,6 @@ from ..contract import OUTSIDE, Contract, Group, broken_rules
 from ..placement.group_conflicts import Stand
 from ..placement.place import Site
 from ..plan import Plan
-from .edit_forms import DECIMALS
 from .edit_kinds import (
     Add,
     Closure,
@@ -29,7 +28,7 @@ from .edit_kinds import (
     SideOnly,
     Sides,
 )
-from .part import IntArray, Part
+from .part import IntArray, Part, pairs
 
 NEW = 100_000
 """Robots that were added are called by no number yet: later than all that are."""
@@ -149,9 +148,7 @@ def _suits(edit: Edit, group: Group) -> bool:
 
 def _counted(part: Part) -> Part:
     """A group that says how many robots it has, and where those at points of their own are."""
-    points = part.group.points and tuple(
-        (float(x), float(y)) for x, y in part.points.round(DECIMALS)
-    )
+    points = pairs(part.points) if part.group.relation == "at" else None
     return replace(part, group=part.valid_group(robots=len(part.points), points=points))
 
 

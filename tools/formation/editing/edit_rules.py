@@ -15,7 +15,7 @@ from shapely.geometry import LineString
 from ...errors import ToolError
 from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import along_curve, corner_points, nearest
-from ..contract import MAX_LENGTH, OUTSIDE, RingPart, SideName, exact_clearance
+from ..contract import MAX_LENGTH, OUTSIDE, SideName, exact_clearance
 from ..placement.figure import figure_of
 from ..placement.pitch import pitch_places
 from ..placement.ring_parts import opening_way
@@ -24,7 +24,7 @@ from .edit_kinds import Mirror, Offset, Rotate, Scale, Shift, SideOnly
 from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
 from .respacing import Track, feet_on, moved_out, pushed, track, track_at
 
-QUARTERS: tuple[RingPart, ...] = ("left", "top", "right", "bottom")
+QUARTERS: tuple[SideName, ...] = ("left", "top", "right", "bottom")
 """Clockwise as seen."""
 OPPOSITE: Mapping[str, Mapping[str, SideName]] = {
     "left-right": {"left": "right", "right": "left"},
@@ -119,7 +119,7 @@ def _rotated(part: Part, edit: Rotate) -> Part:
         turned = part.valid_group(**_turned(part, edit.degrees))
         return part.on_ring(turned)
     c, s = np.cos(np.radians(edit.degrees)), np.sin(np.radians(edit.degrees))
-    return _rigid(part, np.array([[c, s], [-s, c]]), part.centre, part.centre)
+    return rigid(part, np.array([[c, s], [-s, c]]), part.centre, part.centre)
 
 
 def _turned(part: Part, degrees: float) -> dict[str, object]:
@@ -136,23 +136,24 @@ def _turned(part: Part, degrees: float) -> dict[str, object]:
     quarters = degrees / 90
     if abs(quarters - round(quarters)) > 1e-9:
         raise ToolError("Robots on some sides turn by quarters: 90, 180 or 270 degrees.")
-    following = dict(zip(QUARTERS, (*QUARTERS[1:], QUARTERS[0]), strict=True))
-    sides = group.sides
-    for _ in range(round(quarters) % 4):
-        sides = tuple(" ".join([following[w.split()[0]], *w.split()[1:]]) for w in sides)
-    return {"sides": sides}
+    by = round(quarters) % 4
+    after = dict(zip(QUARTERS, (*QUARTERS[by:], *QUARTERS[:by]), strict=True))
+    return {"sides": _sides_by(after, group.sides)}
+
+
+def _sides_by(after: Mapping[str, str], sides: tuple[str, ...]) -> tuple[str, ...]:
+    """Parts of the way round by other names: "left half" may become "top half"."""
+    words = (name.split() for name in sides)
+    return tuple(" ".join([after.get(side, side), *half]) for side, *half in words)
 
 
 def _mirrored(part: Part, edit: Mirror) -> Part:
     flip = np.diag([-1.0, 1.0] if edit.axis == "left-right" else [1.0, -1.0])
     side = part.group.side
-    there = _rigid(part, flip, part.centre, part.centre)
+    there = rigid(part, flip, part.centre, part.centre)
     side = side and OPPOSITE[edit.axis].get(side, side)
     edges = part.group.edges and _edges_after(part, Affine(flip, part.centre, part.centre))
-    other = OPPOSITE[edit.axis]
-    sides = part.group.sides and tuple(
-        " ".join([other.get(w.split()[0], w.split()[0]), *w.split()[1:]]) for w in part.group.sides
-    )
+    sides = part.group.sides and _sides_by(OPPOSITE[edit.axis], part.group.sides)
     towards = part.group.opening_towards
     if part.group.opens:
         x, y = opening_way(part.group, part.site) @ flip
@@ -171,12 +172,12 @@ def _edges_after(part: Part, there: Affine) -> tuple[int, ...]:
 
 def _shifted(part: Part, edit: Shift) -> Part:
     centre = part.centre
-    return _rigid(part, np.eye(2), centre, centre + np.array([edit.dx, edit.dy]))
+    return rigid(part, np.eye(2), centre, centre + np.array([edit.dx, edit.dy]))
 
 
 def scaled(part: Part, edit: Scale) -> Part:
     """Rigid but for size; clearances demanded grow as those that are kept do."""
-    there = _rigid(part, np.eye(2) * edit.factor, part.centre, part.centre)
+    there = rigid(part, np.eye(2) * edit.factor, part.centre, part.centre)
     group = there.group
     if group.clearance is None or not group.targets:
         return there
@@ -200,7 +201,7 @@ def _edges_off(part: Part) -> FloatArray:
     return np.where(within == (part.group.relation == "inside"), apart, -apart) - part.radius
 
 
-def _rigid(part: Part, linear: FloatArray, origin: FloatArray, to: FloatArray) -> Part:
+def rigid(part: Part, linear: FloatArray, origin: FloatArray, to: FloatArray) -> Part:
     """Every place, and a line or form of the contract, by the same map of row vectors."""
     there = Affine(linear, origin, to)
     points, shape = there(part.points), part.group.shape

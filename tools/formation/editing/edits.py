@@ -7,12 +7,14 @@ places themselves are new, the least sum of squared ways decides who takes which
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
 from ...errors import ToolError
 from ...geometry.cages.budget import search_budget
 from ...geometry.outline import FloatArray
+from ..checking.verdict import Verdict
 from ..contract import Contract
 from ..encounters import encounters_of, others_than
 from ..placement.avoidance import off_others
@@ -27,9 +29,7 @@ from .ring_rules import RING_RULES
 from .staying import held, holding, moved_in, settled
 from .team_rules import TEAM_RULES
 
-EXACT = frozenset(
-    {"rotate", "mirror", "shift", "scale", "swap", "skip", "place", "heading", "distance"}
-)
+EXACT = frozenset({"rotate", "mirror", "shift", "scale", "swap", "skip", "place", "heading"})
 """What says where everybody is to be: nobody is moved off another thing for it."""
 
 
@@ -98,11 +98,10 @@ def edited_all(
         contract = draft.agreed()
         after = make_plan(contract, site, version(contract), draft.points)
         after = _off_others(after, draft, plan.formation.points, edits)
-    notes = (*after.verdict.notes, *draft.notes)
-    verdict = after.verdict.model_copy(update={"notes": tuple(dict.fromkeys(notes))})
-    after = after.model_copy(update={"verdict": verdict})
-    was, names = draft.was, plan.formation.robot_of_place
-    robots = tuple(names[i] if i >= 0 else None for i in was.tolist())
+    after = after.model_copy(update={"verdict": _named(after.verdict, draft)})
+    was = draft.was
+    names = plan.formation.robot_of_place
+    robots = tuple(None if i < 0 else names[i] for i in map(int, was))
     return Edited(plan=after, parent=plan.id, diff=_diff(plan, after, was), robots=robots)
 
 
@@ -142,6 +141,24 @@ def _off_others(plan: Plan, draft: Draft, before: FloatArray, edits: Sequence[Ed
         return plan
     again = make_plan(contract, site, plan.formation.scene_version, slots[order])
     return again if again.verdict.certified else plan
+
+
+def _named(verdict: Verdict, draft: Draft) -> Verdict:
+    """The verdict in which robots are called as the person calls them, with the draft's notes."""
+    used = set(draft.numbers)
+    free = (n for n in count(1) if n not in used)
+    names = [next(free) if i < 0 else draft.number(i) for i in draft.was.tolist()]
+    findings = tuple(
+        f.model_copy(
+            update={
+                "robot": None if f.robot is None else names[f.robot - 1],
+                "others": tuple(names[k - 1] for k in f.others),
+            }
+        )
+        for f in verdict.findings
+    )
+    notes = tuple(dict.fromkeys((*verdict.notes, *draft.notes)))
+    return verdict.model_copy(update={"findings": findings, "notes": notes})
 
 
 def _ends(draft: Draft) -> IntArray:

@@ -79,6 +79,13 @@ class Part:
             raise ToolError(f"A robot stands on {name}: propose the formation anew.")
         return apart
 
+    @property
+    def certified(self) -> bool:
+        """Whether it alone is what its group demands."""
+        group = self.group.model_copy(update={"robots": len(self.points)})
+        alone = Contract.model_construct(groups=(group,), robot_radius=self.radius)
+        return certify(self.points, alone, self.site).certified
+
     def track(self, count: int) -> Track:
         """The curve its robots stand on, and would if there were `count`."""
         if self.group.relation in ON_CURVE:
@@ -118,7 +125,7 @@ class Part:
         contract = alone.model_copy(update={"groups": (group, *others), "keep_out": self.keep_out})
 
         def sound(group: Group, points: FloatArray) -> bool:
-            return certify(points, alone, self.site).certified
+            return replace(self, group=group, points=points).certified
 
         return stand_of(group, contract, list(self.beside), self.site, sound).points
 
@@ -138,7 +145,8 @@ class Part:
         slots, takes = respaced(there, self.points, len(self.points))
         if not there.curve.closed:
             takes = taken(self.points, slots)
-        return replace(self, group=group, points=slots[takes])
+        ring = replace(self, group=group, points=slots[takes])
+        return ring if ring.certified else self.anew(group)
 
 
 def check_known(name: str, site: Site) -> None:
@@ -177,13 +185,23 @@ def skipped(part: Part, stay: FloatArray) -> Part:
         return part.to(stay, spacing=spacing, relation="shape", line=ends, layout="line")
     if part.group.shape is not None and part.group.shape.kind == "grid":
         return part.to(stay, spacing=spacing, shape=None, clearance=None, pitch=None)
-    return part.to(stay, spacing=spacing, pitch=None)
+    left = part.to(stay, spacing=spacing, pitch=None)
+    if part.group.relation == "corners" and not left.certified:  # fewer would be at other corners
+        return part.to(stay, relation="at", clearance=None)
+    return left
+
+
+def pairs(points: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Points (n, 2) as a contract has them."""
+    return tuple((float(x), float(y)) for x, y in points.round(DECIMALS))
 
 
 def closed_up(part: Part, stay: FloatArray) -> Part:
-    """Those who stay share the place evenly; at corners and where spacing is free nobody moves."""
-    if part.free or part.group.spacing == "free" or part.group.relation == "corners":
-        return part.to(stay)
+    """Those who stay share the place evenly; where spacing is free nobody moves."""
+    left = part.to(stay)
+    at_corners = part.group.relation == "corners" and left.certified
+    if part.free or part.group.spacing == "free" or at_corners:
+        return left
     slots, takes = slots_for(replace(part, points=stay), len(stay))
     return part.to(slots[takes])
 

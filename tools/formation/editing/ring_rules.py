@@ -10,13 +10,11 @@ from ...errors import ToolError
 from ...geometry.cages.cage_places import fewest_cage
 from ...geometry.outline import FloatArray
 from ...geometry.sampling import along_curve, nearest
-from ..checking.check import certify
 from ..contract import (
     LEAST_SOLVED,
     MAX_LENGTH,
     MAX_ROBOTS,
     OUTSIDE,
-    Contract,
     Group,
     RingPart,
     exact_clearance,
@@ -24,12 +22,15 @@ from ..contract import (
 )
 from ..placement.caging import demand_of, escape_proof
 from ..placement.pitch import pitch_offset
-from ..site import Site
+from ..site import PlacementError, Site
+from .edit_forms import DECIMALS
 from .edit_kinds import Closure, Distance, Heading, Opening, Scale, Sides, Spacing
 from .edit_rules import QUARTERS, scaled
 from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
 from .respacing import moved_out, track, track_at
 
+DEPTHS, INSIDE_SLACK = 7, 0.15
+"""Distances from the edge that are tried; how exactly robots inside are then so far apart."""
 OTHER_HALF: Mapping[str, RingPart] = {
     "left half": "right half",
     "right half": "left half",
@@ -71,8 +72,8 @@ def _spaced(part: Part, edit: Spacing) -> Part:
     now = neighbours_px(part)
     px = edit.px or now * (edit.factor or 1.0)
     loose = {**without_pitch(group), "min_spacing": None, "max_gap": None}
-    if group.relation == "inside" and edit.px is not None:
-        return part.anew(part.valid_group(**loose | {"min_spacing": px}))
+    if group.relation == "inside":
+        return _inside_spaced(part, px, loose)
     if group.relation not in ON_CURVE:
         larger = scaled(part, Scale(factor=px / now))
         pitch = px if edit.px and (group.line or group.shape) else None
@@ -81,6 +82,29 @@ def _spaced(part: Part, edit: Spacing) -> Part:
     if not whole:
         return part.anew(part.valid_group(**loose | {"pitch": px, "spacing": "even"}))
     return _ring_spaced(part, px, exact=edit.px is not None, loose=loose)
+
+
+def _inside_spaced(part: Part, px: float, loose: dict[str, object]) -> Part:
+    """Robots spread evenly over more or less of a target: what is as far from its edge as it takes.
+
+    Raises:
+        ToolError: they are nearer to each other even over all of it.
+    """
+    least, greatest = 0.0, part.site.outlines[part.group.targets[0]].min_width / 2 - part.radius
+    best, deep = part, part.group.offsets()[1]
+    for _ in range(DEPTHS):
+        margin = round((least + greatest) / 2, DECIMALS)
+        try:
+            best = part.anew(part.valid_group(**loose, clearance=(margin, max(deep, margin + 1))))
+            wide = neighbours_px(best) > px
+        except PlacementError:
+            wide = False
+        least, greatest = (margin, greatest) if wide else (least, margin)
+    now = neighbours_px(best)
+    if abs(now - px) > INSIDE_SLACK * px:
+        asked, has = part.site.length(px), part.site.length(now)
+        raise ToolError(f"Inside {part.group.targets[0]} they cannot be {asked} apart; {has} can.")
+    return best
 
 
 def _ring_spaced(part: Part, px: float, *, exact: bool, loose: dict[str, object]) -> Part:
@@ -111,7 +135,7 @@ def _steps(part: Part) -> FloatArray:
     return np.linalg.norm(np.diff(ordered, axis=0), axis=1)
 
 
-def _ringed(part: Part, relation: str = "around", **demands: object) -> Group:
+def ringed(part: Part, relation: str = "around", **demands: object) -> Group:
     """The group as a ring of other demands round the same target.
 
     Raises:
@@ -129,17 +153,17 @@ def _ringed(part: Part, relation: str = "around", **demands: object) -> Group:
 
 
 def _sided(part: Part, edit: Sides) -> Part:
-    sides = edit.only
+    sides: tuple[str, ...] | None = edit.only
     if sides is None:
         free = set(edit.without or ())
         halves = {name for name in free if name.endswith(" half")}
-        left = part.group.sides or QUARTERS
+        left: tuple[str, ...] = part.group.sides or QUARTERS
         if halves:
             left = tuple(OTHER_HALF[name] for name in sorted(halves)) if len(halves) == 1 else ()
         sides = tuple(name for name in left if name not in free)
     if not sides:
         raise ToolError("No part of the way round would be left to stand on.")
-    return part.on_ring(_ringed(part, sides=sides, radius=part.group.radius))
+    return part.on_ring(ringed(part, sides=sides, radius=part.group.radius))
 
 
 def _opened(part: Part, edit: Opening) -> Part:
@@ -149,27 +173,25 @@ def _opened(part: Part, edit: Opening) -> Part:
     if edit.factor is not None:
         px = edit.factor * max(float(_steps(part).max()) - 2 * part.radius, 0.0)
     towards = "bottom" if towards is None else towards
-    ring = _ringed(part, radius=group.radius, opening=px or 0.0, opening_towards=towards)
+    ring = ringed(part, radius=group.radius, opening=px or 0.0, opening_towards=towards)
     return part.on_ring(ring)
 
 
-def _closed(part: Part, edit: Closure) -> Part:
+def closed(part: Part, edit: Closure) -> Part:
+    """A group as a closed ring all round, as one that nothing gets out of, or as an open one."""
     group = part.group
     if edit.kind == "open":
         if group.relation != "cage":
             raise ToolError(f"The {group.relation} group is no closed ring that could be opened.")
         return part.to(part.points, relation="around", closure=None, walls=None, max_gap=None)
     closure = "ring" if edit.kind == "close" else "escape-proof"
-    cage = _ringed(part, "cage", closure=closure, walls=group.walls, **without_pitch(group))
+    cage = ringed(part, "cage", closure=closure, walls=group.walls, **without_pitch(group))
     if group.solves_clearance:
         cage = cage.model_copy(
             update={"clearance": exact_clearance(cage, part.offset - part.radius)}
         )
     there = part.on_ring(cage) if group.relation != "cage" else replace(part, group=cage)
-    alone = Contract(groups=(cage,), robot_radius=part.radius)
-    if closure == "ring" or certify(there.points, alone, part.site).certified:
-        return there
-    return part.anew(cage)
+    return there if closure == "ring" or there.certified else part.anew(cage)
 
 
 def robots_to_close(group: Group, site: Site, radius: float, offset: float) -> int:
@@ -208,8 +230,8 @@ RING_RULES: Mapping[str, Callable[..., Part]] = {
     "spacing": _spaced,
     "sides": _sided,
     "opening": _opened,
-    "close": _closed,
-    "open": _closed,
-    "escape-proof": _closed,
+    "close": closed,
+    "open": closed,
+    "escape-proof": closed,
     "heading": _headed,
 }

@@ -17,6 +17,7 @@ from ...geometry.outline import FloatArray, distances
 from ..contract import (
     DIRECTIONS,
     MAX_ROBOTS,
+    MIN_SPACING,
     ONLY_IN,
     OUTSIDE,
     default_clearance,
@@ -29,6 +30,7 @@ from .draft import Draft
 from .edit_kinds import (
     Add,
     Arrange,
+    Closure,
     Count,
     KeepOff,
     Merge,
@@ -38,8 +40,9 @@ from .edit_kinds import (
     Swap,
     Target,
 )
+from .edit_rules import rigid
 from .part import ON_CURVE, IntArray, Part, check_known, closed_up, skipped, slots_for, taken
-from .ring_rules import robots_to_close
+from .ring_rules import closed, ringed, robots_to_close
 from .staying import alone
 
 Leave = Callable[[Part, FloatArray], Part]
@@ -117,29 +120,21 @@ def _more_of(part: Part, n: int, coming: Part | None = None) -> Part:
 
 def _counted(draft: Draft, edit: Count) -> Draft:
     k = draft.chosen(edit)[0]
-    part = draft.parts[k]
-    if edit.robots == "needed":
-        part = _closing(part)
-        draft = draft.with_parts(part if i == k else p for i, p in enumerate(draft.parts))
+    if edit.robots != "needed":
         part = draft.parts[k]
-        wanted = robots_to_close(part.group, part.site, part.radius, part.offset)
-    else:
-        wanted = _fitting(part) if edit.robots == "fit" else edit.robots
-    more = wanted - len(part.points)
+        return _with_count(draft, k, _fitting(part) if edit.robots == "fit" else edit.robots)
+    if draft.parts[k].group.relation != "cage":
+        draft = draft.with_each((k,), lambda part: part.on_ring(ringed(part)))
+    part = draft.parts[k]
+    draft = _with_count(draft, k, robots_to_close(part.group, part.site, part.radius, part.offset))
+    return draft.with_each((k,), lambda part: closed(part, Closure(kind="close")))
+
+
+def _with_count(draft: Draft, k: int, count: int) -> Draft:
+    more = count - len(draft.parts[k].points)
     if more > 0:
         return draft.with_each((k,), lambda part: _more_of(part, more))
     return _fewer(draft, k, -more) if more else draft
-
-
-def _closing(part: Part) -> Part:
-    """A ring round a target as one that is to be closed."""
-    group = part.group
-    if group.relation not in ("around", "cage") or group.sides is not None or group.opens:
-        raise ToolError("Only a ring all round a target can be closed: close it first.")
-    if group.relation == "cage":
-        return part
-    gone = {"relation": "cage", "closure": "ring", "spacing": "even", "radius": None, "pitch": None}
-    return replace(part, group=part.valid_group(**gone))
 
 
 def _fitting(part: Part) -> int:
@@ -150,7 +145,9 @@ def _fitting(part: Part) -> int:
     """
     group = part.group
     apart = group.pitch or group.min_spacing or 0.0
-    if group.relation in ON_CURVE or group.line is not None:
+    if group.relation in ("corners", "centre"):
+        most = MAX_ROBOTS
+    elif group.relation in (*ON_CURVE, "between") or group.line or group.shape:
         most = int(part.track(len(part.points)).curve.length / apart) + 2
     elif group.relation == "inside":
         outline = part.site.visible(group.targets[0])
@@ -158,10 +155,10 @@ def _fitting(part: Part) -> int:
         most = int(room.area / (0.8 * apart**2) + room.length / apart) + 2
     else:
         raise ToolError(f"How many fit is not known of a {group.relation} group: give a number.")
-    if most > MAX_ROBOTS or (part.radius == 0 and apart <= 2):
+    if group.relation != "corners" and part.radius == 0 and apart <= MIN_SPACING:
         raise ToolError("Say how far apart they are to be: robots are points, so any number fits.")
     try:
-        part.placed(most)
+        part.placed(min(most, MAX_ROBOTS))
     except CapacityError as error:
         return error.fits
     return most
@@ -187,6 +184,17 @@ def _retargeted(part: Part, to: str) -> dict[str, Any]:
     return demands
 
 
+def _taken_to(part: Part, to: str) -> Part:
+    """A group round another thing; what has its place without one is moved as things lie."""
+    group = part.group
+    if len(group.targets) == 1 and (part.free or _placeless(group.model_dump())):
+        check_known(to, part.site)
+        there = replace(part, group=group.model_copy(update={"targets": (to,)}))
+        moved = rigid(part, np.eye(2), part.centre, there.centre)
+        return moved.to(moved.points, targets=(to,))
+    return part.anew(part.demanding(_retargeted(part, to)))
+
+
 def _side_of(part: Part) -> str:
     """The side of its target on which a group stands."""
     way = part.points.mean(axis=0) - part.centre
@@ -199,9 +207,7 @@ def _targeted(draft: Draft, edit: Target) -> Draft:
         chosen = [k for k in draft.chosen(edit) if draft.parts[k].group.targets != (edit.to,)]
         if not chosen:
             raise ToolError(f"The robots are at {edit.to} already.")
-        return draft.with_each(
-            chosen, lambda part: part.anew(part.demanding(_retargeted(part, edit.to)))
-        )
+        return draft.with_each(chosen, lambda part: _taken_to(part, edit.to))
     going = _going(draft, edit)
     first = next(p for p in draft.parts if np.isin(p.was, going).any())
     where = {int(i): point for i, point in zip(draft.was, draft.points, strict=True)}
@@ -291,7 +297,12 @@ def _placeless(demands: dict[str, Any]) -> bool:
 
 
 KEPT = ("targets", "heading", "min_spacing", "max_gap", "pitch")
-EITHER = (("side", "edges", "facing"), ("sides", "opening"), ("sides", "opening_towards"))
+EITHER = (
+    ("line", "shape"),
+    ("side", "edges", "facing"),
+    ("sides", "opening"),
+    ("sides", "opening_towards"),
+)
 """Of these fields a group has one."""
 
 

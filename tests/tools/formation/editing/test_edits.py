@@ -290,7 +290,8 @@ def test_every_edit_is_certified_by_the_checker_and_tells_how_far_everybody_goes
         found = after(plan, edit)
         formation = found.plan.formation
         again = make_plan(formation.contract, SITE, "s", formation.points)
-        assert again == found.plan
+        assert again.id == found.plan.id
+        assert again.verdict.certified == found.plan.verdict.certified
         assert found.parent == plan.id
         old = np.array([w for w in found.diff.was if w is not None]) - 1
         apart = np.linalg.norm(points(found) - points(plan)[old], axis=1)
