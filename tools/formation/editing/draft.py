@@ -27,6 +27,7 @@ from .edit_kinds import (
     Shift,
     SideOnly,
     Sides,
+    Target,
 )
 from .part import IntArray, Part, pairs
 
@@ -139,6 +140,8 @@ def _suits(edit: Edit, group: Group) -> bool:
     """Whether an edit that names no group can be meant for this one."""
     if isinstance(edit, Offset):
         return group.clearance is not None or (group.relation == "at" and bool(group.targets))
+    if isinstance(edit, Target):
+        return group.relation != "at" or bool(group.targets)
     if isinstance(edit, Distance):
         return group.clearance is not None
     if isinstance(edit, Sides | Opening | Closure):

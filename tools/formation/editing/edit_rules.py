@@ -137,7 +137,7 @@ def _turned(part: Part, degrees: float) -> dict[str, object]:
     if abs(quarters - round(quarters)) > 1e-9:
         raise ToolError("Robots on some sides turn by quarters: 90, 180 or 270 degrees.")
     by = round(quarters) % 4
-    after = dict(zip(QUARTERS, (*QUARTERS[by:], *QUARTERS[:by]), strict=True))
+    after: dict[str, str] = dict(zip(QUARTERS, (*QUARTERS[by:], *QUARTERS[:by]), strict=True))
     return {"sides": _sides_by(after, group.sides)}
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import ToolError
 from ...geometry.cages.cage_places import fewest_cage
+from ...geometry.interior import ground
 from ...geometry.outline import FloatArray
 from ...geometry.sampling import along_curve, nearest
 from ..contract import (
@@ -22,15 +23,16 @@ from ..contract import (
 )
 from ..placement.caging import demand_of, escape_proof
 from ..placement.pitch import pitch_offset
-from ..site import PlacementError, Site
+from ..site import Site
 from .edit_forms import DECIMALS
 from .edit_kinds import Closure, Distance, Heading, Opening, Scale, Sides, Spacing
 from .edit_rules import QUARTERS, scaled
 from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
 from .respacing import moved_out, track, track_at
 
-DEPTHS, INSIDE_SLACK = 7, 0.15
-"""Distances from the edge that are tried; how exactly robots inside are then so far apart."""
+ROUNDS, HALVINGS, INSIDE_SLACK = 2, 12, 0.15
+"""How often robots inside are spread anew, by halving for the room they need; and how exactly they
+are then so far apart."""
 OTHER_HALF: Mapping[str, RingPart] = {
     "left half": "right half",
     "right half": "left half",
@@ -85,25 +87,28 @@ def _spaced(part: Part, edit: Spacing) -> Part:
 
 
 def _inside_spaced(part: Part, px: float, loose: dict[str, object]) -> Part:
-    """Robots spread evenly over more or less of a target: what is as far from its edge as it takes.
+    """Robots spread evenly over as much of a target's middle as has them so far apart.
 
     Raises:
         ToolError: they are nearer to each other even over all of it.
     """
-    least, greatest = 0.0, part.site.outlines[part.group.targets[0]].min_width / 2 - part.radius
-    best, deep = part, part.group.offsets()[1]
-    for _ in range(DEPTHS):
-        margin = round((least + greatest) / 2, DECIMALS)
-        try:
-            best = part.anew(part.valid_group(**loose, clearance=(margin, max(deep, margin + 1))))
-            wide = neighbours_px(best) > px
-        except PlacementError:
-            wide = False
-        least, greatest = (margin, greatest) if wide else (least, margin)
+    outline, (margin, deep) = part.site.visible(part.group.targets[0]), part.group.offsets()
+    best = part
+    for _ in range(ROUNDS):
+        room = ground(outline, margin + part.radius, outline.size).area
+        room *= (px / neighbours_px(best)) ** 2
+        low, high = 0.0, outline.min_width / 2
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            wide = ground(outline, middle + part.radius, outline.size).area > room
+            low, high = (middle, high) if wide else (low, middle)
+        margin = round(low, DECIMALS)
+        best = part.anew(part.valid_group(**loose, clearance=(margin, max(deep, margin + 1))))
     now = neighbours_px(best)
     if abs(now - px) > INSIDE_SLACK * px:
         asked, has = part.site.length(px), part.site.length(now)
-        raise ToolError(f"Inside {part.group.targets[0]} they cannot be {asked} apart; {has} can.")
+        name = part.group.targets[0]
+        raise ToolError(f"Inside {name} they cannot be {asked} apart: its room allows {has}.")
     return best
 
 
@@ -172,6 +177,7 @@ def _opened(part: Part, edit: Opening) -> Part:
     px = group.opening if edit.px is None else edit.px
     if edit.factor is not None:
         px = edit.factor * max(float(_steps(part).max()) - 2 * part.radius, 0.0)
+        px = round(px, DECIMALS)
     towards = "bottom" if towards is None else towards
     ring = ringed(part, radius=group.radius, opening=px or 0.0, opening_towards=towards)
     return part.on_ring(ring)

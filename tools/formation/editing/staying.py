@@ -8,10 +8,11 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...geometry.outline import FloatArray, distances
 from .draft import Draft
-from .part import Part, skipped
+from .part import Part, pairs, skipped
 
 STILL = 0.5
 """Px by which a robot that stays may miss its place on a curve, before it is put there."""
@@ -59,36 +60,38 @@ def held(draft: Draft, robots: Collection[int]) -> Draft:
     Groups all of whose robots stay are left alone.
     """
     draft = holding(draft, robots)
-    for index in draft.held:
-        draft = alone(draft, index)
-    return draft
+    names = ", ".join(map(str, sorted(robots)))
+    who = f"Robot {names} stays" if len(robots) == 1 else f"Robots {names} stay"
+    note = f"{who} as it is, by itself." if len(robots) == 1 else f"{who} as they are."
+    return replace(alone(draft, draft.held), notes=(*draft.notes, note))
 
 
-def alone(draft: Draft, index: int) -> Draft:
-    """The draft in which a robot stands at a point of its own, and its place is empty."""
-    k = next(k for k, part in enumerate(draft.parts) if index in part.was)
-    part = draft.parts[k]
-    mine = part.was == index
-    if part.group.relation == "at" and len(mine) == 1:
-        return draft
-    if set(part.was.tolist()) <= draft.held:
-        return draft
-    group = part.group
-    single = part.demanding(
-        {
-            "relation": "at",
-            "targets": () if group.enters or len(group.targets) != 1 else group.targets,
-            "robots": 1,
-            "points": (tuple(part.points[mine][0].tolist()),),
-            "heading": group.heading,
-        }
-    )
-    one = replace(part, group=single, points=part.points[mine], was=part.was[mine])
-    rest = replace(part, was=part.was[~mine])
-    if not mine.all():
-        rest = replace(skipped(_unringed(rest), part.points[~mine]), was=part.was[~mine])
-    others = [*draft.parts[:k], *([] if mine.all() else [rest]), *draft.parts[k + 1 :], one]
-    return draft.with_parts(others)
+def alone(draft: Draft, robots: Collection[int]) -> Draft:
+    """The draft in which robots stand at points of their own, and their places are empty.
+
+    Args:
+        robots: their places in the formation before.
+    """
+    left: list[Part] = []
+    singles: list[Part] = []
+    for part in draft.parts:
+        mine = np.isin(part.was, list(robots))
+        if not mine.any() or (mine.all() and (part.group.relation == "at" or draft.held)):
+            left.append(part)
+            continue
+        singles.append(_at_points(part, mine))
+        if not mine.all():
+            rest = skipped(_unringed(part), part.points[~mine])
+            left.append(replace(rest, was=part.was[~mine]))
+    return draft.with_parts([*left, *singles])
+
+
+def _at_points(part: Part, mine: NDArray[np.bool_]) -> Part:
+    group, points = part.group, part.points[mine]
+    targets = () if group.enters or len(group.targets) != 1 else group.targets
+    demands = {"relation": "at", "targets": targets, "robots": len(points)}
+    single = part.demanding(demands | {"points": pairs(points), "heading": group.heading})
+    return replace(part, group=single, points=points, was=part.was[mine])
 
 
 def _unringed(part: Part) -> Part:

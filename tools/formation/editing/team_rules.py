@@ -122,7 +122,12 @@ def _counted(draft: Draft, edit: Count) -> Draft:
     k = draft.chosen(edit)[0]
     if edit.robots != "needed":
         part = draft.parts[k]
-        return _with_count(draft, k, _fitting(part) if edit.robots == "fit" else edit.robots)
+        if edit.robots == "fit":
+            return _with_count(draft, k, _fitting(part))
+        others = 0 if edit.group else len(draft.was) - len(part.points)
+        if edit.robots <= others:
+            raise ToolError(f"{others} robots stand in other groups: say who is to leave.")
+        return _with_count(draft, k, edit.robots - others)
     if draft.parts[k].group.relation != "cage":
         draft = draft.with_each((k,), lambda part: part.on_ring(ringed(part)))
     part = draft.parts[k]
@@ -184,6 +189,29 @@ def _retargeted(part: Part, to: str) -> dict[str, Any]:
     return demands
 
 
+def _all_to(draft: Draft, chosen: Sequence[int], to: str) -> Draft:
+    """Whole groups round another thing; those of one relation are one group there."""
+    joined: dict[str, list[Part]] = {}
+    done: list[Part] = []
+    for k, part in enumerate(draft.parts):
+        there = part.group.targets == (to,)
+        if k not in chosen and not there:
+            done.append(part)
+        else:
+            name = part.group.relation if part.group.relation in OUTSIDE | {"inside"} else f"{k}"
+            joined.setdefault(name, []).insert(0 if there else len(draft.parts), part)
+    for parts in joined.values():
+        first = parts[0]
+        if len(parts) == 1:
+            stays = first.group.targets == (to,)
+            done.append(first if stays else _taken_to(_beside_others(first, done), to))
+        elif first.group.targets == (to,):
+            done.append(_gathered(parts, first.group.model_dump(), done))
+        else:
+            done.append(_gathered(parts, _retargeted(first, to), done))
+    return draft.with_parts(done)
+
+
 def _taken_to(part: Part, to: str) -> Part:
     """A group round another thing; what has its place without one is moved as things lie."""
     group = part.group
@@ -207,7 +235,7 @@ def _targeted(draft: Draft, edit: Target) -> Draft:
         chosen = [k for k in draft.chosen(edit) if draft.parts[k].group.targets != (edit.to,)]
         if not chosen:
             raise ToolError(f"The robots are at {edit.to} already.")
-        return draft.with_each(chosen, lambda part: _taken_to(part, edit.to))
+        return _all_to(draft, chosen, edit.to)
     going = _going(draft, edit)
     first = next(p for p in draft.parts if np.isin(p.was, going).any())
     where = {int(i): point for i, point in zip(draft.was, draft.points, strict=True)}
@@ -331,9 +359,10 @@ def _rearranged(part: Part, demands: dict[str, Any]) -> dict[str, Any]:
 def _placed(draft: Draft, edit: Place) -> Draft:
     """One robot elsewhere; its group has a hole where it stood, and says so."""
     (index,) = draft.indices((edit.robot,))
-    draft = alone(draft, int(index))
+    before = len(draft.parts)
+    draft = alone(draft, (int(index),))
     k = next(k for k, part in enumerate(draft.parts) if index in part.was)
-    part, hole = draft.parts[k], len(draft.parts)
+    part = draft.parts[k]
     i = int(np.flatnonzero(part.was == index)[0])
     points = part.points.copy()
     if edit.target is not None:
@@ -342,9 +371,9 @@ def _placed(draft: Draft, edit: Place) -> Draft:
     else:
         points[i] = edit.to if edit.to is not None else points[i] + np.asarray(edit.by)
     targets = (edit.target,) if edit.target is not None else part.group.targets
-    moved = replace(part.to(points, targets=targets))
+    moved = part.to(points, targets=targets)
     draft = draft.with_parts(moved if p is part else p for p in draft.parts)
-    if hole > 1:
+    if len(draft.parts) > before:
         note = f"Robot {edit.robot} stands by itself; nobody else moves, so its old place is empty."
         draft = replace(draft, notes=(*draft.notes, note))
     return draft
