@@ -176,3 +176,12 @@ def test_a_form_has_one_place(kind: str) -> None:
         ShapeSpec.model_validate({"kind": kind, "box": [0, 0, 9, 9], "where": "inside"})
     assert f"{kind} takes either a box, or where" in str(caught.value)
     assert f"a {kind}" not in str(caught.value)
+
+
+def test_robots_at_points_take_one_each_and_nothing_else_does() -> None:
+    with pytest.raises(ValidationError, match="at takes a point for each robot, got 1"):
+        Group(relation="at", robots=2, points=((1, 2),))
+    with pytest.raises(ValidationError, match="points belongs to at"):
+        Group(relation="around", targets=("t1",), robots=1, points=((1, 2),))
+    with pytest.raises(ValidationError, match="clearance does not apply to at"):
+        Group(relation="at", robots=1, points=((1, 2),), clearance=(1, 2))

@@ -299,3 +299,29 @@ def test_a_ring_of_a_cage_that_lets_the_thing_through_sideways_says_so() -> None
         contract = Contract(groups=(Group(relation="cage", targets=("t1",), robots=n),))
         notes = make_plan(contract, site, "s").verdict.notes
         assert any("wider than t1" in note for note in notes) is noted
+
+
+def test_robots_at_points_are_held_to_them_to_keep_outs_and_to_each_other() -> None:
+    site = Site({"t1": square(300, 200, 400, 300)}, WIDTH, HEIGHT)
+    around = Group(relation="around", targets=("t1",), robots=4)
+    at = Group(relation="at", robots=2, points=((100, 100), (150, 100)))
+    contract = with_defaults(
+        Contract(groups=(around, at), robot_radius=3), site.outlines, site.room
+    )
+    plan = make_plan(contract, site, "s")
+    assert plan.verdict.certified
+    assert plan.formation.points[4:] == pytest.approx(np.array(at.points))
+    for moved, kind, robot in (
+        ((101, 100), "off_point", 5),
+        ((350, 250), "keep_out", 5),
+        ((149, 100), "too_close", 5),
+        ((1, 100), "out_of_picture", 5),
+    ):
+        points = plan.formation.points
+        points[4] = moved
+        assert (kind, robot) in [
+            (f.kind, f.robot) for f in certify(points, contract, site).findings
+        ]
+    own = at.model_copy(update={"targets": ("t1",), "robots": 1, "points": ((350.0, 250.0),)})
+    alone = with_defaults(Contract(groups=(own,)), site.outlines, site.room)
+    assert [f.kind for f in certify([(350, 250)], alone, site).findings] == ["on_target"]

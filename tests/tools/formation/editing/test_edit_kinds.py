@@ -10,7 +10,7 @@ from formup.tools.formation.editing.team_rules import TEAM_RULES
 from pydantic import TypeAdapter, ValidationError
 
 ADAPTER: TypeAdapter[Any] = TypeAdapter(Edit)
-KINDS = [model for model in get_args(get_args(Edit)[0])]
+KINDS = list(get_args(get_args(Edit)[0]))
 
 
 def kinds_of(model: Any) -> list[str]:
