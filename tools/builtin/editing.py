@@ -12,7 +12,7 @@ import numpy as np
 from ..context import Context
 from ..errors import ToolError
 from ..formation.editing.edit_kinds import Edit
-from ..formation.editing.edits import Edited, edited
+from ..formation.editing.edits import Edited, edited_all
 from ..formation.plan import Plan
 from ..formation.units import with_metres
 from ..perception.target_prompt import TargetPrompt
@@ -67,9 +67,7 @@ async def edit_formation(
         edit=json.dumps([_edit_facts(edit) for edit in edits], separators=(",", ":")),
         unseen=tuple(n for n in (*parent.unseen, *unseen) if n in contract.target_ids),
     )
-    names = parent.plan.formation.robot_of_place
-    taking = [None if was is None else names[was - 1] for was in made.diff.was]
-    world = await with_robots(context.at(world), node, taking)
+    world = await with_robots(context.at(world), node, made.robots)
     node = world.latest
     data = {"parent": parent.plan.id, **proposal_data(world, node.plan)}
     data |= with_metres(moves(parent.plan, node.plan), world.metres_per_pixel)
@@ -77,13 +75,12 @@ async def edit_formation(
 
 
 def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]) -> Edited:
-    """The certified plan after edits whose numbers are those of robots.
+    """The certified plan after edits.
 
     Raises:
         ToolError: an edit makes no sense, or what comes of it is not certified: nothing changed.
     """
-    site, meant = world.site(plan.formation.contract), [_by_place(edit, plan) for edit in edits]
-    made = edited_all(plan, meant, site)
+    made = edited_all(plan, edits, world.whole_site(), world.version_of, stay)
     verdict = made.plan.verdict
     if not verdict.certified:
         findings = [finding.sentence for finding in verdict.findings]
@@ -100,39 +97,6 @@ def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]
 def _edit_facts(edit: Edit) -> dict[str, Any]:
     """An edit as JSON, its kind always named."""
     return {"kind": edit.kind, **to_json_values(edit)}
-
-
-def _by_place(edit: Edit, plan: Plan) -> Edit:
-    """An edit whose robots are numbered by their places, from 1, instead of by their ids."""
-    names = plan.formation.robot_of_place
-
-    def place(number: int) -> int:
-        if str(number) not in names:
-            known = ", ".join(sorted(names, key=lambda name: (len(name), name)))
-            raise ToolError(f"There is no robot {number} in the plan; robots: {known}.")
-        return names.index(str(number)) + 1
-
-    given = {name: getattr(edit, name, None) for name in ("a", "b", "robot", "robots")}
-    places: dict[str, Any] = {}
-    for name, number in given.items():
-        if isinstance(number, tuple):
-            places[name] = tuple(map(place, number))
-        elif number is not None and name != "robots":  # there it is how many
-            places[name] = place(number)
-    return edit.model_copy(update=places)
-
-
-def edited_all(plan: Plan, edits: Sequence[Edit], site: Any) -> Edited:
-    """Temporary."""
-    first, was = plan, list(range(1, len(plan.formation.positions) + 1))
-    made = None
-    for edit in edits:
-        made = edited(plan, edit, site)
-        was = [None if w is None else was[w - 1] for w in made.diff.was]
-        plan = made.plan
-    return made.model_copy(
-        update={"parent": first.id, "diff": made.diff.model_copy(update={"was": tuple(was)})}
-    )
 
 
 def moves(before: Plan, after: Plan) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def test_edits_of_one_call_are_one_step_and_robots_are_called_by_number(work: "T
     left = places(work)
     assert set(left) == set(before) - {"2"}
     assert left["5"] == pytest.approx(before["2"], abs=0.01)
-    with pytest.raises(ToolError, match="no robot 2 in the plan; robots: 1, 3, 4"):
+    with pytest.raises(ToolError, match="no robot 2: there are 1, 3, 4"):
         edit(work, {"kind": "skip", "robots": [2]})
     assert places(work) == left
 
@@ -121,7 +121,7 @@ def test_the_plan_is_measured_robot_by_robot(work: "ToolCalls") -> None:
     (group,) = work.call("measure", a="plan").data["groups"]
     assert group["closed"] is False
     assert group["robots_to_close"] > 3
-    with pytest.raises(ToolError, match=r"no robot 'r9'\. Robots: r3, r4, r5"):
+    with pytest.raises(ToolError, match=r"no robot 'r9'\. Robots: r1, r2, r3"):
         work.call("measure", a="r9", b="t1")
     with pytest.raises(ToolError, match="b is missing"):
         work.call("measure", a="t1")
