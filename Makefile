@@ -46,9 +46,10 @@ check: .venv/.ready-dev
 wordings: .venv/.ready-dev
 	$(BIN)/python -m formup.evals.wordings
 
-# The tools, placing and checking, who takes which place, cages: each beside the bare library calls.
+# The tools, placing and checking, who takes which place, cages, each beside the bare library calls;
+# long sessions.
 bench: .venv/.ready-dev
-	@for what in bench bench_sampling bench_assignment bench_cages; do \
+	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions; do \
 	  echo "== $$what"; $(BIN)/python -m formup.benchmarks.$$what || exit 1; echo; \
 	done
 

@@ -1,0 +1,139 @@
+"""Sessions for others to read: a page with pictures, JSON, or the folder that `formup trace` reads.
+
+All of it comes from the events; keys are in none of them.
+"""
+
+import io
+import json
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..tools.draw import draw_plan
+from ..tools.errors import StorageError
+from ..tools.perception.image import Picture
+from ..tools.store import write_whole
+from ..tools.world import World
+from .session import load_run, model_name
+from .session_start import read_session
+from .store.folder import PICTURES, log_path, suffix_of
+from .store.folder_store import write_session
+from .store.protocol import Event, StoredSession, files_named
+
+PAGE, EVENTS = "session.md", "session.json"
+FORMAT = "formup-export-1"
+
+
+def export_folder(session: StoredSession, folder: Path) -> Path:
+    """Write a session as a run folder; its log.
+
+    Raises:
+        StorageError: there is a session already, or it cannot be read or written.
+    """
+    events = read_session(session)
+    _new(log_path(_made(folder)))
+    write_session(folder, events, files_named(events, session.artefacts))
+    return log_path(folder)
+
+
+def export_json(session: StoredSession, folder: Path) -> Path:
+    """Write all events of a session as one JSON object; pictures are named by their hash.
+
+    Raises:
+        StorageError: there is a file already, or it cannot be read or written.
+    """
+    lines = [
+        {"n": e.number, "type": e.kind, "seconds": e.seconds, **e.data}
+        for e in read_session(session)
+    ]
+    content = {"format": FORMAT, "session": session.id, "events": lines}
+    path = _new(_made(folder) / EVENTS)
+    write_whole(path, json.dumps(content, indent=1, ensure_ascii=False).encode())
+    return path
+
+
+def export_page(session: StoredSession, folder: Path) -> Path:
+    """Write what was said and what came of it as Markdown, with a picture of each new plan.
+
+    Raises:
+        StorageError: there is a page already, or it cannot be read or written.
+        InputError: the picture is missing.
+    """
+    start, *events = read_session(session)
+    picture = load_run(session).context.picture
+    path = _new(_made(folder) / PAGE)
+    (folder / PICTURES).mkdir(exist_ok=True)
+    facts = picture.width, picture.height, model_name(start.data)
+    lines = [f"# Session {session.id}", "", "{} x {} px, {}".format(*facts), ""]
+    data = session.artefacts.get(start.data["picture"]["file"])
+    lines += _shown(folder, "start", data)
+    world = World.of(picture)
+    for number, turn in enumerate(_turns(events), start=1):
+        began, world = world, _after(world, turn)
+        lines += [f"## {number}. {_plain(turn[0].data['words'])}", "", *_answers(turn)]
+        if world.current is not None and world.current != began.current:
+            lines += _shown(folder, world.current, _drawn(picture, world, turn[0].data["words"]))
+        lines += [_plain(_told(turn)), ""]
+    write_whole(path, "\n".join(lines).encode())
+    return path
+
+
+def _turns(events: Sequence[Event]) -> Iterator[Sequence[Event]]:
+    starts = [place for place, event in enumerate(events) if event.kind == "turn"]
+    for first, after in zip(starts, [*starts[1:], len(events)], strict=True):
+        yield events[first:after]
+
+
+def _after(world: World, turn: Sequence[Event]) -> World:
+    for event in turn:
+        world = world.with_changes(event.data["changes"]) if event.kind == "world" else world
+    return world
+
+
+def _answers(turn: Sequence[Event]) -> Iterator[str]:
+    """Questions of the turn that were answered, with the answers."""
+    messages = [event.data for event in turn if event.kind == "message"]
+    calls = {c["id"]: c for m in messages for c in m.get("calls", ())}
+    for message in messages:
+        if message.get("name") == "ask_user" and not message.get("error"):
+            question: Any = calls[message["call_id"]]["arguments"].get("question", "")
+            yield f"> {_plain(question)}\n>\n> **{_plain(message['text'])}**"
+            yield ""
+
+
+def _told(turn: Sequence[Event]) -> str:
+    ends = [event.data for event in turn if event.kind == "end"]
+    return f"{ends[-1]['status']}: {ends[-1]['message']}" if ends else "This was broken off."
+
+
+def _drawn(picture: Picture, world: World, title: str) -> bytes:
+    file = io.BytesIO()
+    draw_plan(picture, world, world.plan().plan, title).save(file, "PNG")
+    return file.getvalue()
+
+
+def _shown(folder: Path, name: str, data: bytes) -> list[str]:
+    """A picture beside the page, and the lines that show it."""
+    path = f"{PICTURES}/{name}.{suffix_of(data)}"
+    write_whole(folder / path, data)
+    return [f"![{name}]({path})", ""]
+
+
+def _plain(text: str) -> str:
+    """A text as one line in which nothing means anything to Markdown."""
+    return re.sub(r"([\\`*_{}\[\]<>#|&])", r"\\\1", " ".join(text.split()))
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{folder} cannot be made: {error.strerror}.") from None
+    return folder
+
+
+def _new(path: Path) -> Path:
+    if path.exists():
+        raise StorageError(f"{path} is there already and is not overwritten; name another folder.")
+    return path
