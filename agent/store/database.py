@@ -50,8 +50,12 @@ class DatabaseStore:
     def __init__(self, url: str) -> None:
         self._engine = engine_of(url)
         self.label = self._engine.url.render_as_string(hide_password=True)
-        with self._as_storage_errors():
-            prepare(self._engine, self.label)
+        try:
+            with self._as_storage_errors():
+                prepare(self._engine, self.label)
+        except BaseException:
+            self._engine.dispose()
+            raise
 
     def create(
         self, name: str = "", events: Sequence[Event] = (), files: Sequence[bytes] = ()
@@ -123,12 +127,14 @@ class DatabaseStore:
                 stack.callback(_unlink, path)
                 return stack
             connection = self._engine.connect()
-            connection.detach()  # closed it is gone, and with it the lock
+            connection.detach()  # when it is gone, so is the lock
             stack.callback(connection.close)
-            if not connection.scalar(select(func.pg_try_advisory_lock(_lock_number(session)))):
+            number = _lock_number(session)
+            if not connection.scalar(select(func.pg_try_advisory_lock(number))):
                 stack.close()
                 return None
             connection.commit()
+            stack.callback(_unlock, connection, number)
             return stack
 
     @contextmanager
@@ -330,6 +336,12 @@ def _storable(words: object) -> str:
 def _lock_number(session: str) -> int:
     """A session's number among the advisory locks of PostgreSQL."""
     return int.from_bytes(hashlib.sha256(session.encode()).digest()[:8], "big", signed=True)
+
+
+def _unlock(connection: Connection, number: int) -> None:
+    """At once: a server takes a while to see that a connection is closed."""
+    with suppress(SQLAlchemyError):
+        connection.scalar(select(func.pg_advisory_unlock(number)))
 
 
 def _unlink(path: Path) -> None:
