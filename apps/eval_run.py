@@ -34,7 +34,7 @@ from . import arguments as inputs
 from . import eval_options as e
 from . import options as o
 from .eval_progress import sweep
-from .eval_tables import print_misses, print_placed, print_scores, print_spent
+from .eval_tables import print_misses, print_placed, print_scores, print_spent, print_turns
 from .terminal import say
 
 RUNS = Path("formup-runs")
@@ -191,6 +191,7 @@ def _print_summary(
         print_scores(f"{suite.name}, {arm}", found)
         if own[0].arm.model != "none":
             print_placed(found)
+            print_turns(own)
             print_spent(own)
             print_misses(own)
     content = {"suite": suite.name, "sha256": planned[0].suite, "arms": summary}

@@ -57,6 +57,19 @@ def print_placed(found: Sequence[Cell]) -> None:
     Console(highlight=False).print(table)
 
 
+def print_turns(rows: Sequence[TrialRow]) -> None:
+    """Turns of dialogues that were right, and of those that were to change nothing, which did."""
+    turns = [row.turns for row in rows if row.turns is not None]
+    if not turns:
+        return
+    right, total = sum(t.right for t in turns), sum(t.total for t in turns)
+    kept, still = sum(t.kept for t in turns), sum(t.still for t in turns)
+    Console(highlight=False, soft_wrap=True).print(
+        f"Turns right: {right}/{total} ({_share(right, total)}). Turns that were only to ask, "
+        f"answer or refuse and changed nothing: {kept}/{still}."
+    )
+
+
 def print_spent(rows: Sequence[TrialRow]) -> None:
     """Requests and tokens of a trial, if a language model was asked."""
     scored = [row for row in rows if row.scored]
@@ -76,7 +89,8 @@ def print_misses(rows: Sequence[TrialRow]) -> None:
     misses = [row for row in rows if not row.strict and row.feedback]
     for row in misses[:MISSES]:
         kind = "not strict: " if row.sr else ""
-        console.print(styled(f"{row.task} trial {row.trial}: {kind}{row.feedback[:LONGEST]}"))
+        text = row.feedback[:LONGEST] if row.turns is None else row.feedback
+        console.print(styled(f"{row.task} trial {row.trial}: {kind}{text}"))
     if len(misses) > MISSES:
         console.print(f"and {len(misses) - MISSES} more")
 

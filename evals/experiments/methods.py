@@ -108,7 +108,12 @@ class Method:
         return agent
 
     def takes(self, task: Task) -> bool:
-        """Whether a task can be tried: pointed at this way, and recorded if that is replayed."""
+        """Whether a task can be tried: pointed at this way, and recorded if that is replayed.
+
+        Dialogues are held with what has tools.
+        """
+        if task.dialogue is not None and self.name not in WITH_TOOLS:
+            return False
         recorded = recordings(self.model)
         return can_point(task, self.mode) and (
             recorded is None or recorded.of(task.id, 0) is not None

@@ -2,7 +2,8 @@
 
 truth: the drawn outline is the mask. box: the target's box, each side moved by up to 8 % of the
 box. outline: at most 12 vertices, each coordinate moved by up to 4 % of the size (square root of
-the area). point: one point well inside. words: nothing is pointed at.
+the area). point: one point well inside. words: nothing is pointed at but what a dialogue begins
+with, by its outline.
 """
 
 import zlib
@@ -22,6 +23,8 @@ Mode = Literal["truth", "outline", "box", "point", "words"]
 JITTERED: tuple[Mode, ...] = ("outline", "box", "point")
 """Modes in which each trial points in another way."""
 BOX_JITTER, OUTLINE_JITTER, OUTLINE_VERTICES = 0.08, 0.04, 12
+MOST_VERTICES = 30
+"""That an outline may be drawn with."""
 
 
 class Pointing(NamedTuple):
@@ -45,6 +48,8 @@ def mode_named(text: str) -> Mode:
 
 def can_point(task: Task, mode: Mode) -> bool:
     """Whether a task can be pointed at this way: a single pointing settles one thing alone."""
+    if task.dialogue is not None:
+        return mode in ("truth", "words")
     if mode in JITTERED:
         return len(task.things) == 1
     return mode == "words" or bool(task.things)
@@ -52,10 +57,12 @@ def can_point(task: Task, mode: Mode) -> bool:
 
 def pointing(task: Task, mode: Mode, number: int) -> Pointing:
     """How a task is pointed at in the trial of a number, which settles the jitter."""
+    things = task.things[: task.dialogue.given] if task.dialogue else task.things
     if mode == "words":
-        return Pointing()
+        shown = enumerate(things, start=1) if task.dialogue else ()
+        return Pointing(pointed=tuple(_drawn_outline(thing, f"t{i}") for i, thing in shown))
     if mode == "truth":
-        return Pointing(targets=tuple(map(_true_target, task.things, range(len(task.things)))))
+        return Pointing(targets=tuple(map(_true_target, things, range(len(things)))))
     random = np.random.default_rng([number, zlib.crc32(task.id.encode())])
     (thing,) = task.things
     far = np.array(task.goals[0].size, dtype=float) - 1
@@ -82,14 +89,26 @@ def _jittered_box(thing: Thing, random: np.random.Generator, far: FloatArray) ->
     return TargetPrompt(box=(float(x0), float(y0), float(x1), float(y1)))
 
 
-def _jittered_outline(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
-    """The true outline simplified to at most 12 vertices, each moved."""
-    ring = LineString([*thing.polygon, thing.polygon[0]])
+def _drawn_outline(thing: Thing, name: str) -> TargetPrompt:
+    """The true outline with as many vertices as can be given."""
+    vertices = _simplified(thing, MOST_VERTICES)
+    return TargetPrompt(id=name, outline=tuple((float(x), float(y)) for x, y in vertices))
+
+
+def _simplified(thing: Thing, most: int) -> FloatArray:
+    """An outline's vertices, at most so many, (n, 2) px."""
     tolerance = 0.5
+    ring = LineString([*thing.polygon, thing.polygon[0]])
     vertices = shapely.get_coordinates(ring.simplify(tolerance))[:-1]
-    while len(vertices) > OUTLINE_VERTICES:
+    while len(vertices) > most:
         tolerance *= 1.15
         vertices = shapely.get_coordinates(ring.simplify(tolerance))[:-1]
+    return vertices
+
+
+def _jittered_outline(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
+    """The true outline simplified to at most 12 vertices, each moved."""
+    vertices = _simplified(thing, OUTLINE_VERTICES)
     amount = OUTLINE_JITTER * thing.outline.size
     while True:  # a jitter that crosses itself is no outline a person would draw
         moved = np.clip(vertices + random.uniform(-amount, amount, vertices.shape), 0, far)

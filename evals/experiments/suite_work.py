@@ -5,7 +5,7 @@ model's failure, counted apart.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,15 +20,17 @@ from ...tools.context import Settings
 from ...tools.perception.image import Picture, load_picture
 from ...tools.store import write_whole
 from ..grading.attempts import Attempt, grade_attempt
+from ..grading.dialogue import summary
 from ..grading.grades import VERSION, Graded
 from ..grading.policies import POLICIES, positions
-from ..tasks.task import Task
+from ..tasks.task import Dialogue, Task
+from .dialogue_work import Held, hold
 from .methods import Method
-from .pointing import pointing
+from .pointing import Pointing, pointing
 from .recordings import file_name, recordings
 from .simulated_model import SIMULATED
 from .tokens import spent
-from .trials import Status, Trial, TrialRow, canonical
+from .trials import Status, Trial, TrialRow, Turns, canonical
 
 LONGEST = 400
 """Characters of feedback in a row."""
@@ -54,6 +56,8 @@ class SuiteWork:
     def __call__(self, trial: Trial) -> TrialRow:
         """The row of a trial."""
         task, arm = self.tasks[trial.task], self.arms[trial.arm.name]
+        if task.dialogue is not None:
+            return self._dialogue(task, task.dialogue, arm, trial)
         if arm.name in POLICIES:
             attempt, run, cost = _by_policy(task, arm.name, trial.seed), None, {}
         else:
@@ -82,6 +86,52 @@ class SuiteWork:
 
     def _run(self, task: Task, arm: Method, trial: Trial) -> tuple[Run, dict[str, Any]]:
         """The run of a trial and what it cost."""
+        agent, settings, shown, trace = self._begin(task, arm, trial)
+        run = agent.run(
+            _picture(self.pictures[task.id]),
+            task.instruction,
+            pointed=shown.pointed,
+            targets=shown.targets,
+            settings=settings,
+            trace=trace,
+        )
+        return run, _cost([run], agent, arm)
+
+    def _dialogue(self, task: Task, dialogue: Dialogue, arm: Method, trial: Trial) -> TrialRow:
+        """The row of a dialogue: it succeeds if every turn does; gcr is the share of those."""
+        agent, settings, shown, trace = self._begin(task, arm, trial)
+        picture = _picture(self.pictures[task.id])
+        held = hold(agent, picture, task, dialogue, settings, shown, trace)
+        cost = _cost(held.runs, agent, arm)
+        lost = next(filter(None, map(_lost, held.runs)), None)
+        if lost is not None:
+            return TrialRow.of(trial, "infra_error", feedback=lost, **cost)
+        if self.attempts is not None:
+            _write_dialogue(self.attempts / f"{attempt_name(trial)}.json", held, dialogue)
+        grades = held.grades
+        right = sum(not grade.problems for grade in grades)
+        done = right == len(grades)
+        still = [grade for grade in grades if grade.still]
+        return TrialRow.of(
+            trial,
+            "pass" if done else "fail",
+            outcome=held.states[-1].status,
+            gcr=right / len(grades),
+            strict=done,
+            feedback=summary(grades, dialogue.turns) if self.attempts else "",
+            turns=Turns(
+                total=len(grades),
+                right=right,
+                still=len(still),
+                kept=sum(grade.kept for grade in still),
+            ),
+            **cost,
+        )
+
+    def _begin(
+        self, task: Task, arm: Method, trial: Trial
+    ) -> tuple[Agent, Settings, Pointing, Path | None]:
+        """Who carries a trial out, what the person fixes and points at, where it is written."""
         seed, recording, recorded = trial.seed, None, recordings(arm.model)
         if recorded and (recording := recorded.of(task.id, trial.trial)):
             seed = recorded.seed(recording)
@@ -94,17 +144,8 @@ class SuiteWork:
         trace = None
         if self.attempts is not None and arm.model not in ("offline", SIMULATED):
             trace = self.attempts / f"{attempt_name(trial)}.jsonl"
-        pointed, targets = pointing(task, arm.mode, trial.trial)
-        agent = arm.agent(trial.seed, recording)
-        run = agent.run(
-            _picture(self.pictures[task.id]),
-            task.instruction,
-            pointed=pointed,
-            targets=targets,
-            settings=settings,
-            trace=trace,
-        )
-        return run, _cost(run, agent, arm)
+        shown = pointing(task, arm.mode, trial.trial)
+        return arm.agent(trial.seed, recording), settings, shown, trace
 
 
 def attempt_name(trial: Trial) -> str:
@@ -186,19 +227,23 @@ def _invalid(run: Run, arm: Method, attempt: Attempt) -> bool:
     return not results or results[-1].error in ("unknown_tool", "arguments")
 
 
-def _cost(run: Run, agent: Agent, arm: Method) -> dict[str, Any]:
-    """Tokens as the provider counts them, else by rule of thumb; rules take none."""
-    usage = run.report.usage
+def _cost(runs: Sequence[Run], agent: Agent, arm: Method) -> dict[str, Any]:
+    """Tokens as the provider counts them, else by rule of thumb; rules take none.
+
+    Args:
+        runs: one, or all turns of a dialogue.
+    """
+    usage = [run.report.usage for run in runs]
     if arm.model == "offline":
-        return {"requests": usage.requests}
-    guess = spent(run.outcome.messages, agent.system, agent.offered)
+        return {"requests": sum(u.requests for u in usage)}
+    guess = spent(runs[-1].outcome.messages, agent.system, agent.offered)
     counted = arm.model != SIMULATED and recordings(arm.model) is None
     return {
-        "requests": usage.requests,
-        "input_tokens": usage.input_tokens if counted else guess.input,
-        "output_tokens": usage.output_tokens if counted else guess.output,
+        "requests": sum(u.requests for u in usage),
+        "input_tokens": sum(u.input_tokens for u in usage) if counted else guess.input,
+        "output_tokens": sum(u.output_tokens for u in usage) if counted else guess.output,
         "cached_tokens": guess.cached,
-        "cost_usd": usage.cost_usd if counted else 0.0,
+        "cost_usd": sum(u.cost_usd for u in usage) if counted else 0.0,
     }
 
 
@@ -215,6 +260,21 @@ def _write(path: Path, attempt: Attempt, graded: Graded, run: Run | None) -> Non
         "confidence": [t.confidence for t in run.world.targets] if run else [],
         "found": [list(polygon.exterior.coords) for polygon in attempt.found],
         "graded": asdict(graded),
+    }
+    write_whole(path, canonical(content))
+
+
+def _write_dialogue(path: Path, held: Held, dialogue: Dialogue) -> None:
+    """In the form of an attempt, with what stands at the end, and all turns beside it."""
+    last = held.states[-1]
+    problems = summary(held.grades, dialogue.turns)
+    content = {
+        "graders": VERSION,
+        "status": last.status,
+        "message": problems or last.message,
+        "planned": last.positions.tolist(),
+        "observed": None,
+        "turns": held.as_data(dialogue),
     }
     write_whole(path, canonical(content))
 

@@ -97,6 +97,22 @@ class Trial(BaseModel):
 _FIELDS = set(Trial.model_fields)
 
 
+class Turns(BaseModel):
+    """The turns of a dialogue, counted.
+
+    Attributes:
+        right: turns in which all was right.
+        still: those that were to change nothing; `kept` of them did.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    total: Count
+    right: Count
+    still: Count
+    kept: Count
+
+
 class TrialRow(Trial):
     """A trial with what came of it.
 
@@ -109,6 +125,7 @@ class TrialRow(Trial):
         iou: overlap of the best outline measured with the true one; None where none was.
         feedback: what was wrong, in a sentence.
         cached_tokens: input in tokens of full price, with the prompt and the tools in the cache.
+        turns: of a dialogue, whose gcr is the share of them that were right; else None.
     """
 
     status: Status
@@ -126,6 +143,7 @@ class TrialRow(Trial):
     cost_usd: Amount = 0.0
     seconds: Amount = 0.0
     host: str = ""
+    turns: Turns | None = None
 
     @classmethod
     def of(cls, trial: Trial, status: Status, **facts: Any) -> Self:

@@ -16,6 +16,7 @@ from ...tools.errors import InputError
 from ...tools.store import write_whole
 from ..scenes.stories import entry_of, family_of, story_of
 from .annotations import ANNOTATIONS, PHOTOS, SCALE, Entry, check_format, read_entries, task_of
+from .dialogues import dialogue_task, dialogues_in
 from .frames import check_frame
 from .recipes.caged import caged
 from .recipes.frontier import frontier
@@ -173,6 +174,9 @@ def _tasks_of_item(
     item: Entry, path: Path, splits: dict[str, list[str]], wanted: str | None
 ) -> Iterator[Task]:
     """The tasks of one item of a suite's list that are in the split wanted, if one is."""
+    if "dialogues" in item:
+        yield from _dialogues(item, path, splits, wanted)
+        return
     must, named = bool(item.get("must_pass")), item.get("photos", "all")
     scale = {name: item[name] for name in (SCALE,) if name in item}
     for make, family, root in _entries(item, path):
@@ -183,6 +187,21 @@ def _tasks_of_item(
         for task in entry["tasks"]:
             if named == "all" or task["id"] in named:
                 yield task_of(entry, task, root, family=family, split=split, must_pass=must)
+
+
+def _dialogues(
+    item: Entry, path: Path, splits: dict[str, list[str]], wanted: str | None
+) -> Iterator[Task]:
+    """The dialogues of an item; those of a file are held to the schema as if they stood here."""
+    listed = dialogues_in(item, path)
+    if not isinstance(item["dialogues"], list):
+        whole = {"name": "listed", "description": "-", "tasks": [{"dialogues": listed}]}
+        check_format(whole, schema(), f"{item['dialogues']} breaks the format of dialogues")
+    family = item.get("family", "dialogues")
+    split = _split_of(family, splits, path)
+    if wanted in (None, split):
+        for given in listed:
+            yield dialogue_task(given, item.get("category", family), split)
 
 
 def _entries(item: Entry, path: Path) -> Iterator[tuple[Callable[[], Entry], str, Path]]:

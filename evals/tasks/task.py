@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -72,6 +72,39 @@ class Goal:
 
 
 @dataclass(frozen=True)
+class Turn:
+    """What a person says in a dialogue, and what must come of it.
+
+    Attributes:
+        words: as they are typed.
+        expect: kind of what is right, such as edit or ask; see grading/dialogue.py.
+        checks: what must have changed and what must not, by name; see grading/dialogue_checks.py.
+        point: where the person points meanwhile, (x, y) px.
+    """
+
+    words: str
+    expect: str
+    checks: dict[str, Any] = field(default_factory=dict[str, Any], repr=False)
+    point: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Dialogue:
+    """Several turns about things that the person points at.
+
+    Attributes:
+        things: pointed at, t1 first.
+        given: how many of them from the start; the others in later turns.
+        size: of the picture, (width, height), px.
+    """
+
+    turns: tuple[Turn, ...]
+    things: tuple[Thing, ...]
+    given: int
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True)
 class Drawing:
     """A picture that is drawn: the scene of a seed, perhaps with words in it."""
 
@@ -105,6 +138,7 @@ class Task:
         picture: a file, or one that is drawn.
         must_pass: it always succeeds; the gate holds new versions to it.
         metres_per_pixel: of the picture, given to the method; None where it has no scale.
+        dialogue: what is said and graded turn by turn; None for one instruction.
     """
 
     id: str
@@ -121,10 +155,13 @@ class Task:
     picture: Path | Drawing
     must_pass: bool = False
     metres_per_pixel: float | None = None
+    dialogue: Dialogue | None = None
 
     @property
     def things(self) -> tuple[Thing, ...]:
         """The things robots are to be placed about, each once."""
+        if self.dialogue is not None:
+            return self.dialogue.things
         return tuple({thing.id: thing for goal in self.goals for thing in goal.things}.values())
 
     @property
@@ -139,6 +176,7 @@ class Task:
             "goals": [_goal_content(goal) for goal in self.goals],
             "must_pass": self.must_pass,
             **({"metres_per_pixel": self.metres_per_pixel} if self.metres_per_pixel else {}),
+            **({"dialogue": asdict(self.dialogue)} if self.dialogue else {}),
         }
 
 

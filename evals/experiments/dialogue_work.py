@@ -1,0 +1,121 @@
+"""Holds a dialogue with an agent, turn by turn, as a front end would, and grades every turn.
+
+Words that come while a question is open answer it; robots are allowed to move in the turn that
+says so and in no other.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...agent.agent import Agent, Run
+from ...agent.outcomes import Paused
+from ...tools.context import Settings
+from ...tools.perception.image import Picture
+from ...tools.perception.target_prompt import TargetPrompt
+from ..grading.dialogue import TurnGrade, grade_turn
+from ..grading.dialogue_states import NOTHING, State, case_of
+from ..tasks.task import Dialogue, Task, Turn
+from .pointing import Pointing
+
+
+@dataclass(frozen=True)
+class Held:
+    """A dialogue that was held.
+
+    Attributes:
+        runs: after each turn.
+        states: the same as graders see it.
+        grades: of each turn.
+    """
+
+    runs: Sequence[Run]
+    states: Sequence[State]
+    grades: Sequence[TurnGrade]
+
+    def as_data(self, dialogue: Dialogue) -> list[dict[str, Any]]:
+        """What was said, what came of it and what was wrong, turn by turn, as JSON."""
+        return [
+            {
+                "words": turn.words,
+                "expect": turn.expect,
+                "status": state.status,
+                "message": state.message,
+                "plan_id": state.plan_id,
+                "parent": state.parent,
+                "robots": state.robots,
+                "positions": state.positions.tolist(),
+                "problems": grade.problems,
+                "kept": grade.kept,
+            }
+            for turn, state, grade in zip(dialogue.turns, self.states, self.grades, strict=True)
+        ]
+
+
+def hold(
+    agent: Agent,
+    picture: Picture,
+    task: Task,
+    dialogue: Dialogue,
+    settings: Settings,
+    pointing: Pointing,
+    trace: Path | None,
+) -> Held:
+    """Say every turn of a dialogue to an agent, whatever came of those before.
+
+    Raises:
+        ModelError, FleetError, OSError: as running an agent does.
+    """
+    runs, states, grades = list[Run](), [NOTHING], list[TurnGrade]()
+    still = settings.model_copy(update={"may_deploy": False})
+    for turn in dialogue.turns:
+        fixed = still.model_copy(update={"may_deploy": turn.expect == "go"})
+        if runs:
+            run = _said(agent, runs[-1], turn, fixed.model_copy(update={"robots": None}))
+        else:
+            run = agent.run(
+                picture,
+                turn.words,
+                pointed=pointing.pointed,
+                targets=pointing.targets,
+                settings=fixed,
+                trace=trace,
+            )
+        runs.append(run)
+        after = state_of(run)
+        case = case_of(dialogue, states, after, task.metres_per_pixel)
+        grades.append(grade_turn(turn, case))
+        states.append(after)
+    return Held(runs, states[1:], grades)
+
+
+def _said(agent: Agent, run: Run, turn: Turn, settings: Settings) -> Run:
+    asked = isinstance(run.outcome, Paused) and run.outcome.call.name == "ask_user"
+    if asked and turn.point is None:
+        return agent.resume(run, answer=turn.words)
+    pointed = () if turn.point is None else (TargetPrompt(points=(turn.point,)),)
+    return agent.say(run, turn.words, pointed=pointed, settings=settings)
+
+
+def state_of(run: Run) -> State:
+    """What stands after a turn, from its report."""
+    report, world = run.report, run.world
+    positions = np.asarray(report.positions or (), dtype=float).reshape(-1, 2)
+    numbers = tuple(str(i) for i in range(1, len(positions) + 1))
+    arrival = report.arrival
+    off = () if report.contract is None else report.contract.keep_out
+    return State(
+        status=report.status,
+        message=report.message,
+        plan_id=report.plan_id,
+        parent=report.parent,
+        robots=report.robots or numbers,
+        positions=positions,
+        headings=report.headings_deg or (),
+        certified=bool(report.verdict and report.verdict.certified),
+        observed=None if arrival is None else np.asarray(arrival.observed).reshape(-1, 2),
+        kept_off=tuple(t.outline.polygon for t in world.targets if t.id in off),
+    )

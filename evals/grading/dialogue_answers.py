@@ -1,0 +1,69 @@
+"""Whether the numbers that a sentence must hold are in it, each worked out on true outlines."""
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from .dialogue_forms import gaps_around
+from .dialogue_states import Case, distances_to
+
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:,\d{3})*(?:\.\d+)?")
+_NO = re.compile(r"\b(?:no|not|isn't|open|opening|gap)\b", re.IGNORECASE)
+PX, SHARE = 3.0, 0.15
+
+
+def says(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
+    """What the message must hold.
+
+    number: it; robots: how many there are; distance: how far a robot is from its thing; gap: the
+    widest; nearest: the robot nearest to a thing; closed: yes or no; words: these, in any case.
+    """
+    text = case.after.message
+    numbers = [float(n.replace(",", "")) for n in _NUMBER.findall(text)]
+    for name, value in wanted.items():
+        if name == "words":
+            missing = [word for word in value if word.lower() not in text.lower()]
+            if missing:
+                yield f"{missing[0]!r} is not in {text!r}"
+        elif name == "closed":
+            if bool(_NO.search(text)) == value:
+                yield f"it is {'closed' if value else 'open'}, told: {text!r}"
+        elif name == "nearest":
+            if not {float(robot) for robot in _nearest(case, value)} & set(numbers):
+                yield f"robot {' or '.join(_nearest(case, value))} is nearest, told: {text!r}"
+        else:
+            length = _lengths(case, name, value)
+            if not any(
+                _is(told, length, case.scale, exact=name not in LENGTHS) for told in numbers
+            ):
+                yield f"{length:.1f} is not in {text!r}"
+
+
+LENGTHS = ("distance", "gap")
+
+
+def _is(told: float, right: float, scale: float | None, *, exact: bool) -> bool:
+    """Whether a number is the one wanted: a length in px, or in metres where there is a scale."""
+    if exact:
+        return abs(told - right) < 1e-6
+    near = [abs(told - right) <= max(PX, SHARE * right)]
+    if scale is not None:
+        near.append(abs(told - right * scale) <= max(PX * scale, SHARE * right * scale))
+    return any(near)
+
+
+def _lengths(case: Case, name: str, value: Any) -> float:
+    state = case.after
+    if name == "distance":
+        return float(case.distances(state)[list(state.robots).index(str(value))])
+    if name == "gap":
+        return max(float(gaps_around(t, points).chords.max()) for t, points in case.rings())
+    return float(len(state.robots)) if name == "robots" else float(value)
+
+
+def _nearest(case: Case, thing: str) -> list[str]:
+    """Robots that are nearest to a thing, ties within the slack of an outline."""
+    far = distances_to(case.things[thing], case.after.positions)
+    return [r for r, d in zip(case.after.robots, far, strict=True) if d <= np.min(far) + PX]
