@@ -44,13 +44,14 @@ def _named(wanted: Any, all_of: Sequence[str]) -> list[str]:
     return list(all_of) if wanted == "all" else [str(name) for name in wanted]
 
 
-def robots(case: Case, wanted: int) -> Iterator[str]:
-    """So many in all; those that were there keep their ids as far as the number allows."""
-    count, kept = len(case.after.robots), len(case.kept)
-    if count != wanted:
-        yield f"{count} robots, not {wanted}"
-    elif kept < min(len(case.before.robots), wanted):
-        yield f"only {kept} robots kept their ids"
+def robots(case: Case, wanted: int | str) -> Iterator[str]:
+    """So many in all, `more`, `fewer` or `any`; those there keep their ids as far as that allows."""
+    count, was = len(case.after.robots), len(case.before.robots)
+    right = {"more": count > was, "fewer": count < was, "any": True}
+    if not right.get(str(wanted), count == wanted):
+        yield f"{count} robots after {was}, not {wanted}"
+    elif len(case.kept) < min(was, count):
+        yield f"only {len(case.kept)} robots kept their ids"
 
 
 def ids(case: Case, wanted: Sequence[int]) -> Iterator[str]:

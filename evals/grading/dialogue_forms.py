@@ -18,7 +18,7 @@ SIDES = {"left": (-1, 0), "right": (1, 0), "top": (0, -1), "bottom": (0, 1)}
 GATHERED = 0.5
 """Robots at a centre are no further from it than this share of the thing's size."""
 CORNER, BORDER = 0.35, 1.5
-"""As near to a corner, as a share of the size, a robot is at it; so near, px, it is still inside."""
+"""A robot is at a corner as near as this share of the size; so near, px, it is still inside."""
 
 
 @dataclass(frozen=True)
