@@ -15,7 +15,7 @@ PLACED = (
     *("trials", "placed", "success", "strict"),
     *("right thing,\nif placed", "success,\nif placed", "mean IoU"),
 )
-MISSES = 100
+MISSES = 200
 """Misses that are listed; the report shows all."""
 LONGEST = 150
 
