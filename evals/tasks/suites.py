@@ -192,11 +192,10 @@ def _tasks_of_item(
 def _dialogues(
     item: Entry, path: Path, splits: dict[str, list[str]], wanted: str | None
 ) -> Iterator[Task]:
-    """The dialogues of an item; those of a file are held to the schema as if they stood here."""
+    """The dialogues of an item, listed there or in a file of their own."""
     listed = dialogues_in(item, path)
-    if not isinstance(item["dialogues"], list):
-        whole = {"name": "listed", "description": "-", "tasks": [{"dialogues": listed}]}
-        check_format(whole, schema(), f"{item['dialogues']} breaks the format of dialogues")
+    form = {"type": "array", "items": {"$ref": "#/$defs/dialogue"}, "$defs": schema()["$defs"]}
+    check_format(listed, form, f"{path} breaks the format of dialogues")
     family = item.get("family", "dialogues")
     split = _split_of(family, splits, path)
     if wanted in (None, split):

@@ -82,10 +82,15 @@ def test_a_dialogue_is_one_row_with_its_turns_counted(tmp_path: Path) -> None:
     tasks = load_suite(written(tmp_path, TURNS)).tasks
     arm = check_method(Method("rules", mode="truth"))
     attempts = tmp_path / "attempts"
-    trials, work = work_of(tasks, arm, tmp_path, 1, attempts)
+    attempts.mkdir()
+    work, trials = work_of(tasks, arm, tmp_path, 1, attempts)
     run_trials(trials, work, tmp_path / "run", executor=executor("serial"))
     (row,) = read_rows(tmp_path / "run")
-    assert (row.status, row.sr, row.turns) == ("fail", False, Turns(total=3, right=2, still=1, kept=1))
+    assert (row.status, row.sr, row.turns) == (
+        "fail",
+        False,
+        Turns(total=3, right=2, still=1, kept=1),
+    )
     assert row.gcr == pytest.approx(2 / 3)
     assert "turn 3 'four robots at its corners': 4 robots after" in row.feedback
     (path,) = attempts.glob("*.json")

@@ -80,7 +80,12 @@ def square() -> Task:
 
 def stands(name: str, parent: str | None = None, points: Any = RING, **more: Any) -> State:
     ids = tuple(str(i) for i in range(1, len(points) + 1))
-    facts: dict[str, Any] = {"status": "planned", "message": "-", "robots": ids, "certified": True} | more
+    facts: dict[str, Any] = {
+        "status": "planned",
+        "message": "-",
+        "robots": ids,
+        "certified": True,
+    } | more
     return State(plan_id=name, parent=parent, positions=np.asarray(points, float), **facts)
 
 
