@@ -33,6 +33,7 @@ class Task:
         deploy: whether robots shall move once the plan is certified.
         metres_per_pixel: of the picture; None where it has no scale.
         standing: of a later turn, the plan that stands and what led to it, see `standing`.
+        size: of the picture, px.
     """
 
     instruction: str
@@ -42,6 +43,7 @@ class Task:
     deploy: bool
     metres_per_pixel: float | None = None
     standing: dict[str, Any] | None = None
+    size: tuple[int, int] = (0, 0)
 
 
 def first_message(context: Context, before: History, *, seen: bool) -> User:
@@ -100,7 +102,10 @@ def standing(context: Context) -> dict[str, Any] | None:
         "robots": formation.robots,
         "deployed": node.plan.id in world.arrivals,
         "last": {"words": node.words, "edits": json.loads(node.edit or "null")},
-        "things": [{"id": t.id, "label": t.label} for t in world.targets],
+        "things": [
+            {"id": t.id, "label": t.label, "centre": [round(v) for v in t.outline.centre]}
+            for t in world.targets
+        ],
         "undo": max(back, 0),
         "redo": world.undone,
     }
@@ -125,7 +130,13 @@ def read_task(text: str) -> Task:
         deploy=facts["Deploy"],
         metres_per_pixel=facts.get("Metres per pixel"),
         standing=facts.get("Standing"),
+        size=_size(facts["Picture"]),
     )
+
+
+def _size(words: str) -> tuple[int, int]:
+    width, _, height = words.split(" ")[:3]
+    return int(width), int(height)
 
 
 def numbered_anew(pointed: Sequence[TargetPrompt], world: World) -> list[TargetPrompt]:

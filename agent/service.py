@@ -15,6 +15,7 @@ from ..tools.perception.target_prompt import TargetPrompt
 from .agent import Agent, SayOptions
 from .conversation import Session
 from .session import Run, Show, load_run
+from .store.copies import fork
 from .store.protocol import Event, Store
 
 
@@ -129,7 +130,7 @@ class Service:
         Returns:
             Its id. The other one stays as it is.
         """
-        made = self.store.fork(session, turn)
+        made = fork(self.store, self.store.open(session), turn)
         self.reopen(made.id)
         return made.id
 

@@ -8,6 +8,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 from ...tools.perception.referring.query import SINGLE
@@ -172,7 +173,7 @@ def _choose_one(thing: Reference, history: History) -> Found | Step:
     if trouble:
         return _ask_all(trouble, history)
     query = thing.whole_query
-    reply = _located(query, history)
+    reply = located(query, history)
     if reply is None:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
@@ -192,7 +193,7 @@ def _choose_one(thing: Reference, history: History) -> Found | Step:
 def _pair(thing: Reference, history: History) -> list[Found] | Step:
     """The two things that a plural means."""
     query = {"count": 2} | thing.whole_query
-    reply = _located(query, history)
+    reply = located(query, history)
     if reply is None:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
@@ -260,13 +261,13 @@ def _ask(question: str, matches: Sequence[dict[str, Any]]) -> Step:
 
 def _ask_all(question: str, history: History) -> Step:
     """The question with all that stands out in the picture."""
-    reply = _located(None, history)
+    reply = located(None, history)
     if reply is None:
         return Step("locate_object", {})
     return _ask(question, reply["candidates"])
 
 
-def _located(query: dict[str, Any] | None, history: History) -> dict[str, Any] | None:
+def located(query: dict[str, Any] | None, history: History) -> dict[str, Any] | None:
     """What locate_object answered to a query, if it was asked."""
     for call in calls_in(history):
         if call.name == "locate_object" and call.arguments.get("query") == query:
@@ -283,6 +284,28 @@ def located_reasons(history: History) -> dict[str, list[str]]:
             for candidate in json.loads(message.text).get("candidates", ()):
                 found[candidate["id"]] = candidate.get("reasons", [])
     return found
+
+
+def prompts_of(
+    found: Sequence[tuple[str, str]], before: History, taken: Sequence[str] = ()
+) -> list[dict[str, Any]]:
+    """Candidates and their labels as targets: those of earlier turns keep their ids.
+
+    Args:
+        found: candidates and labels.
+        before: the turns before.
+        taken: further ids that are in use.
+    """
+    calls = [c for m in before if isinstance(m, Reply) for c in m.calls]
+    given: list[Any] = [t for c in calls for t in c.arguments.get("targets") or ()]
+    earlier: list[dict[str, Any]] = [t for t in given if isinstance(t, dict) and "id" in t]
+    known = {t["candidate"]: t["id"] for t in earlier if "candidate" in t}
+    used = {*taken, *(t["id"] for t in earlier)}
+    free = (name for i in count(1) if (name := f"t{i}") not in used)
+    return [
+        {"id": known.get(name) or next(free), "candidate": name, "label": label}
+        for name, label in found
+    ]
 
 
 def calls_in(history: History) -> list[Call]:

@@ -5,7 +5,6 @@ asks when the words do not settle what to do. It is no language model: it sees m
 """
 
 import json
-from itertools import count
 from typing import Any
 
 from ...tools.formation.units import length_text
@@ -13,7 +12,8 @@ from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
-from .choosing import Step, agrees, calls_in, find, located_reasons
+from .choosing import Step, agrees, calls_in, find, located_reasons, prompts_of
+from .conversing import conversed
 from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, would_do
 from .reading import Reading
@@ -44,6 +44,10 @@ def _next_step(turn: History, before: History) -> Reply:
     first = turn[0]
     assert isinstance(first, User)
     task = read_task(first.text)
+    spoken = conversed(task, turn, before)
+    if isinstance(spoken, Reply):
+        return spoken
+    task, turn = spoken
     last = turn[-1]
     if isinstance(last, Result) and last.name == "propose_formation":
         return _after_proposal(task, last, turn, before)
@@ -61,7 +65,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         return agreed
     reading = read_instruction(_said(task, history), task.metres_per_pixel)
     wording = reading.robots or (reading.form.robots if reading.form else None)
-    robots = task.robots or wording or _number_answered(history)
+    robots = task.robots or wording or _number_answered(history) or _standing_count(task)
     question = question_of(task, reading, robots)
     if question or robots is None:
         asked: dict[str, Any] = {"question": question or "How many robots?"}
@@ -82,7 +86,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
             if isinstance(other, Step):
                 return _call(other.name, other.arguments)
             found += other
-        prompts = _prompts([(f.candidate, _label(f.wording)) for f in found], before)
+        prompts = prompts_of([(f.candidate, _label(f.wording)) for f in found], before)
         ids, others = _parted([p["id"] for p in prompts], len(named))
     contract = _in_unit(task, contract_of(reading, robots, ids, others, _refusals(history)))
     if _was_doubted(history):
@@ -121,20 +125,6 @@ def _things(task: Task, reading: Reading) -> tuple[Reference, ...]:
 def _parted(ids: list[str], last: int) -> tuple[list[str], list[str]]:
     """All but the last so many ids, and those."""
     return ids[: len(ids) - last], ids[len(ids) - last :]
-
-
-def _prompts(found: list[tuple[str, str]], before: History) -> list[dict[str, Any]]:
-    """Candidates and their labels as targets: those of earlier turns keep their ids."""
-    calls = [c for m in before if isinstance(m, Reply) for c in m.calls]
-    given: list[Any] = [t for c in calls for t in c.arguments.get("targets") or ()]
-    earlier: list[dict[str, Any]] = [t for t in given if isinstance(t, dict) and "id" in t]
-    known = {t["candidate"]: t["id"] for t in earlier if "candidate" in t}
-    used = {t["id"] for t in earlier}
-    free = (name for i in count(1) if (name := f"t{i}") not in used)
-    return [
-        {"id": known.get(name) or next(free), "candidate": name, "label": label}
-        for name, label in found
-    ]
 
 
 def _refusals(history: History) -> int:
@@ -177,6 +167,11 @@ def _number_answered(history: History) -> int | None:
     asked = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
     plain = [m.text.strip() for m in asked if m.call_id not in offered]
     return next((int(t) for t in plain if t.isascii() and t.isdecimal()), None)
+
+
+def _standing_count(task: Task) -> int | None:
+    """How many robots stand in the plan that a later turn begins with."""
+    return len(task.standing["robots"]) if task.standing else None
 
 
 def _label(wording: str) -> str:

@@ -1,12 +1,13 @@
 """A person's command in a model's place: calls they gave themselves, such as undo, and no words."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from ..messages import Call, Reply, Result, turn_of
 from ..model import Request
-from ..offline.answering import said_of_call
-
-NAME = "person"
+from ..offline.answering import arrived, said_of_edit, said_of_undo
+from ..offline.followups import Followup
 
 
 class Commands:
@@ -17,9 +18,9 @@ class Commands:
         text: what is said where there are no calls.
     """
 
-    name = NAME
+    name = "person"
 
-    def __init__(self, calls: Sequence[tuple[str, dict[str, object]]], text: str = "") -> None:
+    def __init__(self, calls: Sequence[tuple[str, dict[str, Any]]], text: str = "") -> None:
         self._calls, self._text = calls, text
 
     async def reply(self, request: Request) -> Reply:
@@ -27,10 +28,25 @@ class Commands:
         turn = turn_of(request.messages)
         results = [m for m in turn if isinstance(m, Result)]
         if results:
-            return Reply(text=" ".join(said_of_call(m) for m in results))
+            asked = {c.id: c.arguments for m in turn if isinstance(m, Reply) for c in m.calls}
+            return Reply(text=" ".join(_said(m, asked[m.call_id]) for m in results))
         number = sum(isinstance(m, Reply) for m in request.messages) + 1
         calls = (
             Call(id=f"command-{number}-{k}", name=name, arguments=arguments)
             for k, (name, arguments) in enumerate(self._calls)
         )
         return Reply(text=self._text, calls=tuple(calls))
+
+
+def _said(result: Result, arguments: Mapping[str, Any]) -> str:
+    """What a person is told of one call's result."""
+    if result.error:
+        return str((result.facts or {}).get("plain", result.text))
+    data = json.loads(result.text)
+    scale = data.get("metres_per_pixel")
+    if result.name == "deploy":
+        return arrived(data, scale)
+    if result.name == "undo":
+        steps, to = arguments.get("steps", 1), arguments.get("to") or ""
+        return said_of_undo(Followup(kind="undo", undo=steps, to=to), data, scale)
+    return said_of_edit(data, scale)

@@ -1,0 +1,234 @@
+"""What the offline planner says in a conversation: who moves, what is measured, small talk."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from ...tools.formation.units import length_text
+from ..messages import History, Reply
+from .followup_edits import listed
+from .followups import NO_PLAN, Followup
+from .standing import Standing
+
+MOST_NAMED = 4
+"""Robots of which each way is told."""
+HELP = (
+    "Say what to change: further out, closer, exactly 20 px away, two more robots, only on the left, "
+    "turn it 30 degrees, leave a gap towards the top, the same around the other one, half of them "
+    "there, fill it instead, robot 3 a bit to the left, robot 4 leaves, undo. Ask how far robot 4 is, "
+    "or whether it is closed. Nothing moves until you say go."
+)
+ROBOTS_STAY = "The robots do not move back by themselves; say go for that."
+
+
+def talk(followup: Followup, standing: Standing | None, before: History) -> str:
+    """The answer to what asks for no change."""
+    about = followup.about
+    if about == "help":
+        return HELP
+    if about == "thanks":
+        return "You are welcome."
+    if about == "hello":
+        return f"Hello. {HELP}"
+    if standing is None:
+        return _why(before) if about == "why" else NO_PLAN
+    if about == "why":
+        return _why(before)
+    if about == "did":
+        edits = ", ".join(str(e["kind"]) for e in standing.edits) or "a new plan"
+        return (
+            f'After "{standing.words}": {edits}; plan {standing.plan} stands.'
+            if standing.words
+            else f"Plan {standing.plan} stands."
+        )
+    if about == "already":
+        return f"That is so already; plan {standing.plan} stands as it is."
+    groups = "; ".join(
+        f"{g['robots']} robots {g['relation']} {' and '.join(g.get('targets', ()))}"
+        for g in standing.groups
+    )
+    driven = "the robots stand there" if standing.deployed else "no robot has moved to it yet"
+    return f"Plan {standing.plan}: {groups}; {driven}."
+
+
+def _why(before: History) -> str:
+    """The last thing that was told, which gives the reason."""
+    for message in reversed(before):
+        if isinstance(message, Reply):
+            told = message.text or next(
+                (str(c.arguments["reason"]) for c in message.calls if "reason" in c.arguments), ""
+            )
+            if told:
+                return f"As I said: {told}"
+    return "Nothing was refused or changed yet."
+
+
+def said_of_edit(data: Mapping[str, Any], scale: float | None) -> str:
+    """Who moves and how far, after a change."""
+    said = [
+        f"{data['robots']} robots have certified places (plan {data['plan_id']}):",
+        _moves(data, scale),
+    ]
+    return " ".join([*said, *data.get("notes", ())])
+
+
+def _moves(data: Mapping[str, Any], scale: float | None) -> str:
+    moving, staying, moves = data.get("moving", 0), data.get("staying", 0), data.get("moves", ())
+    parts: list[str] = []
+    if 0 < moving <= MOST_NAMED:
+        parts.append(
+            ", ".join(f"robot {m['robot']} goes {length_text(m['px'], scale)}" for m in moves)
+        )
+    elif moving:
+        parts.append(
+            f"{moving} go, robot {moves[0]['robot']} the furthest, {length_text(data['longest_px'], scale)}"
+        )
+    for name, verb in (("added", "added"), ("removed", "gone")):
+        if data.get(name):
+            parts.append(f"robot{'s' * (len(data[name]) > 1)} {listed(data[name])} {verb}")
+    parts.append(f"{staying} stay{'s' * (staying == 1)}" if staying else "none stays")
+    return ", ".join(parts) + "."
+
+
+def said_of_undo(followup: Followup, data: Mapping[str, Any], scale: float | None) -> str:
+    """What stands after steps back or forward."""
+    if data["plan_id"] is None:
+        return f"The first plan is taken back: no plan stands. {ROBOTS_STAY}"
+    where = (
+        "The first plan stands again" if followup.to else "Back" if followup.undo > 0 else "Forward"
+    )
+    return f"{where}: plan {data['plan_id']}, {_moves(data, scale)} {ROBOTS_STAY}"
+
+
+def arrived(data: Mapping[str, Any], scale: float | None) -> str:
+    """What was observed after the robots moved."""
+    if "why" in data:
+        return str(data["why"])
+    worst = f"{length_text(data['worst_residual_px'], scale)} from its place"
+    if data.get("already_there"):
+        return f"All stand there already; the furthest is {worst}."
+    if data["arrived"]:
+        return f"All arrived; the furthest is {worst}."
+    return f"Robot {data['worst_robot']} stopped {worst} after {data['corrections']} corrections."
+
+
+def said_of_query(query: Mapping[str, Any], data: Mapping[str, Any], scale: float | None) -> str:
+    """The answer to a question about the plan, of what was measured."""
+    if "nearest_px" in data:
+        return f"{length_text(data['nearest_px'], scale)} (centre to centre {length_text(data['centres_px'], scale)})."
+    rows = [r for r in data["each"] if int(r["robot"]) in query.get("robots", [int(r["robot"])])]
+    return ANSWERS[query["about"]](query, data, rows, scale)
+
+
+Rows = Sequence[Mapping[str, Any]]
+Answer = Callable[[Mapping[str, Any], Mapping[str, Any], Rows, float | None], str]
+
+
+def _distance(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    measured = [r for r in rows if "target_px" in r]
+    if not measured:
+        return "They stand about no thing."
+    if len(measured) <= MOST_NAMED:
+        return (
+            "; ".join(
+                f"Robot {r['robot']} is {length_text(r['target_px'], scale)} from {r['target']}"
+                for r in measured
+            )
+            + "."
+        )
+    ways = [r["target_px"] for r in measured]
+    least, most = length_text(min(ways), scale), length_text(max(ways), scale)
+    return f"The robots are {least} to {most} from {listed(list(dict.fromkeys(r['target'] for r in measured)))}."
+
+
+def _spacing(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    ways = [r["neighbour_px"] for r in rows if "neighbour_px" in r]
+    if not ways:
+        return "There is one robot only."
+    return f"Each is {length_text(min(ways), scale)} to {length_text(max(ways), scale)} from its nearest neighbour."
+
+
+def _nearest(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    measured = [r for r in rows if "target_px" in r]
+    if not measured:
+        return "They stand about no thing."
+    choose = max if query.get("most") == "furthest" else min
+    row = choose(measured, key=lambda r: r["target_px"])
+    return f"Robot {row['robot']}: {length_text(row['target_px'], scale)} from {row['target']}."
+
+
+def _closed(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    told: list[str] = []
+    for group in data["groups"]:
+        if "closed" not in group:
+            continue
+        widest = f"the widest opening, between robots {listed(group['between'])}, is {length_text(group['widest_opening_px'], scale)}"
+        needed = "" if group["closed"] else f"; {group['robots_to_close']} robots would close it"
+        told.append(f"{'Yes, closed' if group['closed'] else 'No, not closed'}: {widest}{needed}.")
+    return " ".join(told) or "They stand in no ring, so nothing is closed."
+
+
+def _needed(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    rings = [g for g in data["groups"] if "closed" in g]
+    if not rings:
+        return "They stand in no ring, so none would close it."
+    if rings[0]["closed"]:
+        return f"It is closed with the {data['robots']} robots there are."
+    return f"{rings[0]['robots_to_close']} robots would close it; there are {data['robots']}."
+
+
+def _count(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    return f"{data['robots']} robots."
+
+
+def _arrival(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    if not data["deployed"]:
+        return "No: no robot has moved to this plan yet; say go."
+    return (
+        "Yes, all stand at their places."
+        if data["arrived"]
+        else "No: not all stand at their places."
+    )
+
+
+def _where(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    stands = [
+        f"robot {r['robot']} {'stands at' if 'at' in r else 'is to stand at'} ({r.get('at', r['place'])[0]:g}, {r.get('at', r['place'])[1]:g})"
+        for r in rows
+    ]
+    text = "; ".join(stands)
+    return text[:1].upper() + text[1:] + "."
+
+
+def _certified(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    return f"Plan {data['plan_id']} was certified when it was made, and is certified once more before any robot moves."
+
+
+ANSWERS: dict[str, Answer] = {
+    "distance": _distance,
+    "spacing": _spacing,
+    "nearest": _nearest,
+    "closed": _closed,
+    "needed": _needed,
+    "count": _count,
+    "arrived": _arrival,
+    "place": _where,
+    "certified": _certified,
+}

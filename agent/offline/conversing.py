@@ -1,0 +1,317 @@
+"""The offline planner in a conversation: what is said to a plan that stands, tool call by tool call.
+
+What was done already is read from the turn's messages, so nothing is kept here. A whole new
+instruction is left to the planner.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from ..first_message import Task
+from ..messages import Call, History, Reply, Result
+from .answering import arrived, said_of_edit, said_of_query, said_of_undo, talk
+from .choosing import Found, Step, agrees, find, located, prompts_of
+from .followup_edits import OTHER
+from .followups import Followup, read_followup
+from .phrases import table
+from .references import described
+from .standing import Standing
+
+DEICTIC = re.compile(
+    r"\b(?:over there|there|this one|that one|the other one|that|this)\b", re.IGNORECASE
+)
+DECLINED = ("no", "nope", "nothing", "none", "no thanks", "never mind", "leave it")
+
+
+def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task, History]:
+    """The next step of a turn, or the task and messages of a whole new instruction."""
+    standing = _standing(task)
+    words, messages = task.instruction, turn[1:]
+    followup = read_followup(words, standing)
+    if standing is None and not before and followup.kind != "talk":
+        return task, turn
+    while followup.kind == "ask":
+        answer, messages = _answer(messages)
+        if answer is None:
+            return _calling("ask_user", {"question": _question(followup)})
+        if answer.lower().strip(" .!") in DECLINED:
+            return Reply(text="Nothing was changed.")
+        words = _words_meant(words, followup, answer, standing)
+        followup = read_followup(words, standing)
+    if followup.kind == "instruction":
+        fresh = words != task.instruction
+        return replace(task, instruction=words), (turn[0], *messages) if fresh else turn
+    return _Steps(task, standing, followup, messages, before).next()
+
+
+def _standing(task: Task) -> Standing | None:
+    """The plan that stands, with what this turn points at."""
+    if task.standing is None:
+        return None
+    pointed = tuple(str(p["id"]) for p in task.pointed)
+    points = [p["points"][0] for p in task.pointed if p.get("points")]
+    place = (points[0][0], points[0][1]) if points else None
+    return Standing.of(
+        task.standing,
+        pointed=pointed,
+        place=place,
+        size=task.size,
+        metres_per_pixel=task.metres_per_pixel,
+    )
+
+
+def _answer(messages: History) -> tuple[str | None, History]:
+    """The person's answer to the first question in words, and the messages after it."""
+    for k, message in enumerate(messages):
+        if isinstance(message, Result) and message.name == "ask_user" and not message.error:
+            return message.text, messages[k + 1 :]
+    return None, messages
+
+
+def _question(followup: Followup) -> str:
+    """The question with its options numbered."""
+    options = [f"{k}: {option}" for k, option in enumerate(followup.options, 1)]
+    return f"{followup.text} {'; '.join(options)}." if options else followup.text
+
+
+def _words_meant(words: str, followup: Followup, answer: str, standing: Standing | None) -> str:
+    """The words that an answer makes of what was asked about; a new command stands alone."""
+    number = re.fullmatch(r"\W*(?:option |number )?([0-9]+)\W*", answer.lower())
+    if number and 1 <= int(number[1]) <= len(followup.options):
+        return followup.options[int(number[1]) - 1]
+    if len(followup.options) == 1 and agrees(answer):
+        return followup.options[0]
+    joined = [DEICTIC.sub(answer, words, count=1)] if DEICTIC.search(words) else []
+    for attempt in (*joined, f"{words} {answer}", f"{answer} {words}"):
+        if read_followup(attempt, standing).kind not in ("ask", "refuse", "instruction"):
+            return attempt
+    return answer
+
+
+class _Steps:
+    """What a follow-up takes, one call after another."""
+
+    def __init__(
+        self,
+        task: Task,
+        standing: Standing | None,
+        followup: Followup,
+        messages: History,
+        before: History,
+    ) -> None:
+        self.task, self.standing, self.followup = task, standing, followup
+        self.messages, self.before = messages, before
+        self.done = {m.name: m for m in messages if isinstance(m, Result)}
+
+    def next(self) -> Reply:
+        """The next call, or the words that end the turn."""
+        followup, standing = self.followup, self.standing
+        if followup.kind == "refuse":
+            return Reply(text=followup.text)
+        if standing is None:
+            return Reply(text=talk(followup, None, self.before))
+        if followup.kind == "talk":
+            return Reply(text=talk(followup, standing, self.before))
+        if followup.kind == "hold":
+            return Reply(text="Nothing moves until you say go.")
+        if followup.kind == "query":
+            return self._query(standing)
+        if followup.kind == "go":
+            return self._deploy(standing.plan, "")
+        return self._change(standing)
+
+    def _query(self, standing: Standing) -> Reply:
+        query: dict[str, Any] = self.followup.query or {}
+        measured = self.done.get("measure")
+        if measured is not None:
+            text = (
+                measured.text
+                if measured.error
+                else said_of_query(query, json.loads(measured.text), self.task.metres_per_pixel)
+            )
+            return Reply(text=text)
+        robots, thing = query.get("robots", []), query.get("thing", "")
+        if str(thing).startswith("?"):
+            return Reply(text=f'"{thing[1:]}" is not measured yet: point at it, and ask again.')
+        if thing or len(robots) == 2:
+            ends = [*(f"r{r}" for r in robots), *([thing] if thing else [])]
+            ends = ends if len(ends) > 1 else [standing.targets[0], *ends]
+            return _calling("measure", {"a": ends[0], "b": ends[1]})
+        return _calling("measure", {"a": "plan"})
+
+    def _change(self, standing: Standing) -> Reply:
+        """Take back, find things, measure, edit; then move where that is asked, and say what came."""
+        followup, failed = self.followup, self.done.get("edit_formation")
+        ids: dict[str, str] = {}
+        prompts: list[dict[str, Any]] = []
+        for phrase in followup.things:
+            found = _found(phrase, standing, self.messages)
+            if isinstance(found, Step):
+                return _calling(found.name, found.arguments)
+            known = [name for name, _ in standing.things]
+            taken = [*known, *standing.pointed, *(p["id"] for p in prompts)]
+            prompt = prompts_of(
+                [(found.candidate, found.wording.removeprefix("the ")[:100])], self.before, taken
+            )[0]
+            ids[f"?{phrase}"] = prompt["id"]
+            prompts += [prompt] if prompt["id"] not in known else []
+        undone = self.done.get("undo")
+        if (followup.undo or followup.to) and undone is None:
+            return _calling(
+                "undo", {"to": followup.to} if followup.to else {"steps": followup.undo}
+            )
+        if undone is not None and (undone.error or not followup.edits):
+            return Reply(
+                text=undone.text
+                if undone.error
+                else said_of_undo(followup, json.loads(undone.text), self.task.metres_per_pixel)
+            )
+        if failed is None:
+            return self._edit(ids, prompts)
+        if failed.error:
+            return self._failed(failed, taken_back=undone is not None)
+        return self._after(failed)
+
+    def _edit(self, ids: dict[str, str], prompts: list[dict[str, Any]]) -> Reply:
+        edits = [dict(edit) for edit in self.followup.edits]
+        if any(isinstance(edit.get("by"), dict) for edit in edits):
+            measured = self.done.get("measure")
+            if measured is None:
+                return _calling("measure", {"a": "plan"})
+            assert self.standing is not None
+            edits = [_by_way(edit, json.loads(measured.text), self.standing) for edit in edits]
+        named = json.dumps(edits)
+        for phrase, name in ids.items():
+            named = named.replace(json.dumps(phrase), json.dumps(name))
+        prompts += [
+            p
+            for p in self.task.pointed
+            if json.dumps(p["id"]) in named and p["id"] not in self.task.targets
+        ]
+        arguments: dict[str, Any] = {"edits": json.loads(named)}
+        arguments |= {"targets": prompts} if prompts else {}
+        arguments |= {"stay": list(self.followup.stay)} if self.followup.stay else {}
+        return _calling("edit_formation", arguments)
+
+    def _failed(self, failed: Result, *, taken_back: bool) -> Reply:
+        """Nothing is changed: what was taken back for it is made again."""
+        undos = sum(isinstance(m, Result) and m.name == "undo" for m in self.messages)
+        if taken_back and undos == 1:
+            return _calling("undo", {"steps": -self.followup.undo})
+        return _calling("report_impossible", {"reason": failed.text})
+
+    def _after(self, made: Result) -> Reply:
+        data = json.loads(made.text)
+        if not data.get("certified", True):
+            return _calling(
+                "report_impossible",
+                {"reason": " ".join(data["findings"]), "plan_id": data["plan_id"]},
+            )
+        told = said_of_edit(data, self.task.metres_per_pixel)
+        if self.followup.rest:
+            answer, _ = _answer(self.messages)
+            if answer is None:
+                return _calling(
+                    "ask_user",
+                    {"question": f'{told} Next: "{self.followup.rest}". Shall I? 1: yes; 2: no.'},
+                )
+            return self._later(answer, told)
+        if (self.followup.go or self.task.deploy) and not self.followup.hold:
+            return self._deploy(data["plan_id"], told)
+        return Reply(text=f"{told} Nothing was moved.")
+
+    def _later(self, answer: str, told: str) -> Reply:
+        """The second step of a sequence, once it is confirmed; or what is said instead of it."""
+        assert self.standing is not None
+        confirmed = agrees(answer) or answer.strip(" .") == "1"
+        if answer.lower().strip(" .!") in (*DECLINED, "2"):
+            return Reply(text=f"{told} Nothing more was changed.")
+        words = self.followup.rest if confirmed else answer
+        now = replace(self.standing, edits=self.followup.edits, words="")
+        following = read_followup(words, now)
+        after = next(
+            k for k, m in enumerate(self.messages) if isinstance(m, Result) and m.name == "ask_user"
+        )
+        if following.kind in ("ask", "instruction"):
+            return Reply(
+                text=f"{told} {following.text if following.kind == 'ask' else 'Say that as a turn of its own.'}"
+            )
+        return _Steps(self.task, now, following, self.messages[after + 1 :], self.before).next()
+
+    def _deploy(self, plan: str, told: str) -> Reply:
+        result = self.done.get("deploy")
+        if result is None:
+            return _calling("deploy", {"plan_id": plan})
+        text = (
+            result.text
+            if result.error
+            else arrived(json.loads(result.text), self.task.metres_per_pixel)
+        )
+        return Reply(text=f"{told} {text}".strip())
+
+
+def _found(phrase: str, standing: Standing, messages: History) -> Found | Step:
+    """The candidate that words for a thing mean, or what to do to learn it."""
+    if re.fullmatch(r"c[0-9]+", phrase):
+        return Found(phrase, phrase, ())
+    if f"?{phrase}" == OTHER or phrase.startswith("other "):
+        return _other(phrase, standing, messages)
+    found = find(described([phrase]), 1, messages)
+    return found if isinstance(found, Step) else found[0]
+
+
+def _other(phrase: str, standing: Standing, messages: History) -> Found | Step:
+    """The one like the target, or of another noun, that is none of the targets."""
+    label = next((label for name, label in standing.things if name in standing.targets), "")
+    things = described(
+        [phrase.removeprefix("other ") if f"?{phrase}" != OTHER else label or "thing"]
+    )
+    noun = things[0].noun if things else ""
+    query = table()["nouns"].get(noun, {}).get("query")
+    chosen = (
+        find((), 1, messages)
+        if any(m.name == "ask_user" for m in messages if isinstance(m, Result))
+        else None
+    )
+    if isinstance(chosen, list):
+        return chosen[0]
+    reply = located(query, messages)
+    if reply is None:
+        return Step("locate_object", {"query": query} if query else {})
+    mine = [
+        standing.centre[t] for t in standing.targets if standing.centre and t in standing.centre
+    ]
+    others = [
+        c for c in reply["candidates"] if not any(_holds(c["box"], centre) for centre in mine)
+    ]
+    if len(others) == 1:
+        return Found(others[0]["id"], label or "other one", ())
+    ids = [c["id"] for c in others]
+    return Step(
+        "ask_user",
+        {"question": "Which one is the other one? Answer with its number.", "candidates": ids},
+    )
+
+
+def _holds(box: Sequence[float], point: tuple[float, float]) -> bool:
+    return box[0] <= point[0] <= box[2] and box[1] <= point[1] <= box[3]
+
+
+def _by_way(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) -> dict[str, Any]:
+    """One robot's way out from its target, or in, as a way in x and y."""
+    by = edit.get("by")
+    if not isinstance(by, dict):
+        return edit
+    row = next(r for r in measured["each"] if r["robot"] == str(edit["robot"]))
+    centre = (standing.centre or {}).get(row.get("target", ""), (0.0, 0.0))
+    x, y = row["place"][0] - centre[0], row["place"][1] - centre[1]
+    length = max((x * x + y * y) ** 0.5, 1e-9)
+    way = by.get("out", -by.get("in", 0.0)) / length
+    return edit | {"by": [round(x * way, 2), round(y * way, 2)]}
+
+
+def _calling(name: str, arguments: dict[str, Any]) -> Reply:
+    return Reply(calls=(Call(id="call", name=name, arguments=arguments),))

@@ -1,0 +1,284 @@
+"""From a frame that fits a clause to edits of the plan, one function a frame.
+
+Shares that words stand for are fixed here: "a bit" of a distance is a quarter more of it, of a
+turn 15 degrees, of a way 5 % of the picture's shorter side. Each function returns effects as JSON:
+edits, or what else a turn does (undo, go, hold, query, talk, ask, refuse); None where the
+frame does not fit what stands.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .followup_frames import Slots
+from .standing import Standing
+
+Effect = dict[str, Any]
+Effects = list[Effect] | None
+FACTOR = {"bit": 1.25, "": 1.5, "big": 2.0}
+"""Of distances, spacings and sizes."""
+TURN = {"bit": 15.0, "": 45.0, "big": 90.0}
+"""Degrees."""
+WAY = {"bit": 0.05, "": 0.1, "big": 0.2}
+"""Of the picture's shorter side."""
+LEAST_BARE = 5
+"""Numbers without a unit below this are hardly pixels."""
+VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
+SIDE_OF = {
+    "left": "left",
+    "right": "right",
+    "up": "top",
+    "down": "bottom",
+    "top": "top",
+    "bottom": "bottom",
+}
+OPPOSITE = {
+    "left": "right",
+    "right": "left",
+    "top": "bottom",
+    "bottom": "top",
+    "long": "long",
+    "short": "short",
+}
+DEGREES = {"right": 0, "down": 90, "left": 180, "up": 270}
+RINGS = ("around", "cage")
+OTHER = "?the other one"
+"""A thing that is to be found: one like the target that is not it."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """What stands when a clause is said.
+
+    Attributes:
+        standing: the plan, and what was done last.
+        words: of the clause.
+        before: effects of the clauses before it in the same line.
+    """
+
+    standing: Standing
+    words: str = ""
+    before: tuple[Mapping[str, Any], ...] = ()
+
+    @property
+    def last(self) -> list[Effect]:
+        """The last edits: of this line, else of the turn before."""
+        return [dict(e) for e in self.before or self.standing.edits]
+
+    @property
+    def count(self) -> int:
+        """How many robots there are."""
+        return len(self.standing.robots)
+
+
+def ask(question: str, *options: str) -> list[Effect]:
+    """A question with commands that would answer it."""
+    return [{"kind": "ask", "question": question, "options": options}]
+
+
+def refuse(sentence: str) -> list[Effect]:
+    """What cannot be done, and what would do."""
+    return [{"kind": "refuse", "text": sentence}]
+
+
+def much_of(slots: Slots) -> str:
+    """How much: bit, big or ""; "a bit more" is a bit."""
+    said = [str(m) for m in slots.get("much", ())]
+    return "bit" if "bit" in said else said[0] if said else ""
+
+
+def bare_length(slots: Slots) -> float | None:
+    """The length in px; a number without a unit is one unless it is small."""
+    if "px" in slots:
+        return float(slots["px"][0])
+    number = slots.get("num", [0])[0]
+    return float(number) if number >= LEAST_BARE else None
+
+
+def factor_of(slots: Slots) -> float:
+    """By how much of itself a distance, spacing or size changes."""
+    for name in ("ratio", "ratio_apart", "ratio_scale"):
+        if name in slots:
+            return float(slots[name][0])
+    return 1 + float(slots["share"][0]) if "share" in slots else FACTOR[much_of(slots)]
+
+
+def rounded(value: float) -> float:
+    """To thousandths, so that what is written down is short."""
+    return round(value, 3) + 0.0  # never -0.0
+
+
+def offset(slots: Slots, said: Said) -> Effects:
+    """Further out or in: by px, a share, or a factor of the distance."""
+    ways = set(slots["radial"])
+    length = bare_length(slots)
+    if len(ways) > 1 or ("num" in slots and length is None):
+        return None
+    kind = ways.pop()
+    if length is not None:
+        return [{"kind": kind, "px": length}]
+    if kind == "in" and "share" in slots:
+        share = float(slots["share"][0])
+        return [{"kind": "in", "factor": rounded(1 / (1 - share))}] if 0 < share < 1 else None
+    return [{"kind": kind, "factor": rounded(factor_of(slots))}]
+
+
+def ratio(slots: Slots, said: Said) -> Effects:
+    """Twice, half, three times as far."""
+    factor = float(slots["num"][0]) if "num" in slots else float(slots["ratio"][0])
+    if factor <= 0 or factor == 1:
+        return None
+    return [
+        {"kind": "out", "factor": factor}
+        if factor > 1
+        else {"kind": "in", "factor": rounded(1 / factor)}
+    ]
+
+
+def distance(slots: Slots, said: Said) -> Effects:
+    """Exactly so far from the thing."""
+    return [{"kind": "distance", "px": float(slots["px"][0])}]
+
+
+def spacing(slots: Slots, said: Said) -> Effects:
+    """So far from one robot to the next, or further apart."""
+    if "spacing" in slots or "ratio_apart" in slots:
+        value = {"px": float(slots["px"][0])} if "px" in slots else {"factor": factor_of(slots)}
+        return [{"kind": "spacing", **value}]
+    if "px" in slots:
+        return None
+    factor = factor_of(slots)
+    return [
+        {
+            "kind": "spacing",
+            "factor": rounded(factor if slots["apart"][0] == "wide" else 1 / factor),
+        }
+    ]
+
+
+def rotate(slots: Slots, said: Said) -> Effects:
+    """A turn: clockwise unless said otherwise."""
+    directions = {
+        *slots.get("spin", ()),
+        *({"right": "cw", "left": "ccw"}.get(d, d) for d in slots.get("dir", ())),
+    }
+    if len(directions) > 1 or directions - {"cw", "ccw"}:
+        return None
+    degrees = TURN[much_of(slots)]
+    for name in ("angle", "num", "turned"):
+        if name in slots:
+            degrees = float(slots[name][0])
+    sign = -1 if "ccw" in directions else 1
+    last = _of_kind(said.last, "rotate")
+    if "otherway" in slots or "back" in slots:
+        if not any(name in slots for name in ("angle", "num", "turned", "much")) and last:
+            return _undone(said, [{**last, "degrees": -last["degrees"]}])
+        sign = -1 if last is None or last["degrees"] > 0 else 1
+    elif "more" in slots and not directions and last:
+        sign = 1 if last["degrees"] > 0 else -1
+    return [{"kind": "rotate", "degrees": sign * degrees}]
+
+
+def _of_kind(edits: list[Effect], *kinds: str) -> Effect | None:
+    return next((e for e in reversed(edits) if e["kind"] in kinds), None)
+
+
+def _undone(said: Said, edits: list[Effect]) -> list[Effect]:
+    """The last edit taken back and others made instead; where it cannot be, those on top."""
+    if said.standing.edits and not said.before:
+        return [{"kind": "undo", "steps": 1}, *edits]
+    return edits
+
+
+def mirror(slots: Slots, said: Said) -> Effects:
+    """Left for right, unless said otherwise."""
+    across = {"left": "left-right", "right": "left-right", "up": "top-bottom", "down": "top-bottom"}
+    axis = (slots.get("axis") or [across[d] for d in slots.get("dir", ())] or ["left-right"])[0]
+    return [{"kind": "mirror", "axis": axis}]
+
+
+def scale(slots: Slots, said: Said) -> Effects:
+    """Bigger or smaller."""
+    if "ratio_scale" in slots:
+        return [{"kind": "scale", "factor": float(slots["ratio_scale"][0])}]
+    if slots["scale"][0] == "smaller" and "share" in slots:
+        return [{"kind": "scale", "factor": rounded(1 - float(slots["share"][0]))}]
+    factor = factor_of(slots)
+    return [
+        {
+            "kind": "scale",
+            "factor": rounded(factor if slots["scale"][0] == "bigger" else 1 / factor),
+        }
+    ]
+
+
+def way(slots: Slots, said: Said) -> tuple[float, float] | None:
+    """How far left, right, up or down, px."""
+    vectors = [VECTOR[d] for d in slots["dir"]]
+    length = bare_length(slots)
+    if (
+        len(vectors) > 2
+        or len({abs(x) for x, _ in vectors}) < len(vectors)
+        or ("num" in slots and length is None)
+    ):
+        return None
+    share = float(slots["share"][0]) if "share" in slots else WAY[much_of(slots)]
+    length = round(share * min(said.standing.size)) if length is None else length
+    return sum(x for x, _ in vectors) * length, sum(y for _, y in vectors) * length
+
+
+def shift(slots: Slots, said: Said) -> Effects:
+    """All of it left, right, up or down."""
+    by = way(slots, said)
+    return None if by is None else [{"kind": "shift", "dx": by[0], "dy": by[1]}]
+
+
+def place(slots: Slots, said: Said) -> Effects:
+    """One robot elsewhere: to a point, at a thing, or some way on."""
+    robots = [r for named in slots["robots"] for r in named]
+    point = (
+        slots["point"][0] if "point" in slots else said.standing.place if "there" in slots else None
+    )
+    if point is not None:
+        if len(robots) > 1:
+            return ask(f"Only one robot can stand at a point. Which of {listed(robots)}?")
+        return [{"kind": "place", "robot": robots[0], "to": list(point)}]
+    if slots.has("there", "other", "thing"):
+        to = where(slots, said, f"robot {robots[0]} to {{}}")
+        if isinstance(to, list):
+            return to
+        alone: Effect = {"kind": "place", "robot": robots[0], "target": to}
+        return [{"kind": "target", "to": to, "robots": robots} if len(robots) > 1 else alone]
+    if "dir" in slots:
+        by = way(slots, said)
+        return (
+            None if by is None else [{"kind": "place", "robot": r, "by": list(by)} for r in robots]
+        )
+    ways, length = set(slots.get("radial", ())), bare_length(slots)
+    if len(ways) != 1:
+        return None
+    length = round(WAY[much_of(slots)] * min(said.standing.size)) if length is None else length
+    return [{"kind": "place", "robot": r, "by": {next(iter(ways)): length}} for r in robots]
+
+
+def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Effect]:
+    """The id of the thing meant, its words after "?" where it has to be found, or a question."""
+    standing = said.standing
+    if "thing" in slots:
+        return str(slots["thing"][0])
+    if "there" in slots and standing.pointed:
+        return standing.pointed[0]
+    others = standing.others()
+    if len(others) == 1:
+        return others[0]
+    if others:
+        return ask(f"Which thing is meant: {' or '.join(others)}?", *map(option.format, others))
+    if "there" in slots:
+        return ask(f'Which thing or place is meant in "{said.words}"? Point at it, or name it.')
+    return OTHER
+
+
+def listed(numbers: Sequence[object]) -> str:
+    """Numbers or names in a sentence."""
+    *most, last = map(str, numbers)
+    return f"{', '.join(most)} and {last}" if most else last

@@ -1,0 +1,370 @@
+"""From a frame to edits of who stands where: numbers, teams, sides, gaps and arrangements."""
+
+import re
+
+from ...tools.formation.contract import MAX_ROBOTS
+from .followup_edits import (
+    DEGREES,
+    OPPOSITE,
+    RINGS,
+    SIDE_OF,
+    Effect,
+    Effects,
+    Said,
+    ask,
+    bare_length,
+    factor_of,
+    listed,
+    place,
+    refuse,
+    rounded,
+    where,
+)
+from .followup_frames import Slots
+
+PLACING = re.compile(
+    r"\b(?:put|place|surround|position|station|arrange|set|have|ring|encircle)\b", re.IGNORECASE
+)
+"""With a number of robots and a thing, such a word makes a new instruction."""
+SHARES = {"half": 2, "third": 3, "quarter": 4}
+LIKE_A_RING = ("around", "cage", "corners", "shape")
+"""Arrangements about a thing, which "around" the next one keeps."""
+
+
+def whole(slots: Slots) -> int | None:
+    """The number said, where it is one of robots."""
+    number = slots.get("num", [0])[0]
+    return int(number) if number == int(number) and number > 0 else None
+
+
+def add_some(slots: Slots, said: Said) -> Effects:
+    """So many more."""
+    n = whole(slots)
+    if n is not None and said.count + n > MAX_ROBOTS:
+        return refuse(
+            f"{said.count + n:,} robots are too many; at most {MAX_ROBOTS:,} can be placed."
+        )
+    return None if n is None else [{"kind": "add", "n": n}]
+
+
+def remove_some(slots: Slots, said: Said) -> Effects:
+    """So many fewer, or a share of them."""
+    n = said.count // SHARES[slots["portion"][0]] if "portion" in slots else whole(slots)
+    if n is None:
+        return None
+    if n >= said.count:
+        return refuse(
+            f"There are {said.count} robots; at most {said.count - 1} of them can be taken away."
+        )
+    return [{"kind": "remove", "n": n}]
+
+
+def leave(slots: Slots, said: Said) -> Effects:
+    """Robots that are named leave; the others close up unless their places stay empty."""
+    robots = [r for named in slots["robots"] for r in named]
+    if len(set(robots)) >= said.count:
+        return refuse("All robots would leave: nothing would be left to place.")
+    slots.has("rest", "closeup")  # closing up is what the others do anyway
+    return [{"kind": "skip" if "empty" in slots else "remove", "robots": robots}]
+
+
+def count(slots: Slots, said: Said) -> Effects:
+    """So many in all; as many as needed, or as fit."""
+    n = (
+        round(said.count * float(slots["ratio_count"][0]))
+        if "ratio_count" in slots
+        else whole(slots)
+    )
+    if n is not None and n > MAX_ROBOTS:
+        return refuse(f"{n:,} robots are too many; at most {MAX_ROBOTS:,} can be placed.")
+    if n == said.count:
+        return [{"kind": "talk", "about": "already"}]
+    return None if n is None else [{"kind": "count", "robots": n}]
+
+
+def needed(slots: Slots, said: Said) -> Effects:
+    """As many as close the ring."""
+    return [{"kind": "count", "robots": "needed"}]
+
+
+def fit(slots: Slots, said: Said) -> Effects:
+    """As many as there is room for."""
+    spaced: list[Effect] = (
+        [{"kind": "spacing", "px": float(slots["px"][0])}] if "px" in slots else []
+    )
+    return [*spaced, {"kind": "count", "robots": "fit"}]
+
+
+def how_many_more(slots: Slots, said: Said) -> Effects:
+    """More, but not how many."""
+    return ask(
+        "How many more robots?",
+        "one more robot",
+        "two more robots",
+        f"make it {2 * said.count} robots",
+    )
+
+
+def how_many_fewer(slots: Slots, said: Said) -> Effects:
+    """Fewer, but not how many."""
+    return ask("How many robots fewer?", "take one robot away", "take two robots away")
+
+
+def swap(slots: Slots, said: Said) -> Effects:
+    """Two robots take each other's place."""
+    robots = [r for named in slots.get("robots", ()) for r in named] + [
+        int(n) for n in slots.get("num", ())
+    ]
+    strange = [r for r in robots if str(r) not in said.standing.robots]
+    if strange:
+        return refuse(f"There is no robot {strange[0]}; there are {listed(said.standing.robots)}.")
+    if len(robots) != 2:
+        return ask(f"Which two robots swap? Of {listed(said.standing.robots)} two.")
+    if robots[0] == robots[1]:
+        return refuse(f"Robot {robots[0]} cannot swap with itself: name two robots.")
+    return [{"kind": "swap", "a": robots[0], "b": robots[1]}]
+
+
+def target(slots: Slots, said: Said) -> Effects:
+    """The same around another thing."""
+    to = where(slots, said)
+    if isinstance(to, list):
+        return to
+    moved: Effect = {"kind": "target", "to": to}
+    relation = slots.get("relation", ["around"])[0]
+    kept = relation == said.standing.relation or (
+        relation == "around" and said.standing.relation in LIKE_A_RING
+    )
+    if "same" in slots or "relation" not in slots or kept:
+        return [moved]
+    return (
+        [moved, {"kind": "arrange", "demands": _group(relation, slots)}]
+        if relation != "shape"
+        else None
+    )
+
+
+def split(slots: Slots, said: Said) -> Effects:
+    """Some there, the rest here."""
+    named = [r for robots in slots.get("robots", ()) for r in robots]
+    n = whole(slots)
+    if "portion" in slots:
+        n = max(said.count // SHARES[slots["portion"][0]], 1)
+    elif "split" in slots or ("rest" in slots and n is None and not named):
+        n = said.count // 2
+    slots.has("merge", "here", "rest")
+    relation = (slots.get("relation") or ["around"])[0]
+    if relation not in ("around", said.standing.relation):
+        return None
+    if named and not slots.has("rest", "portion", "split"):
+        return place(slots, said)
+    fresh = (
+        "robotword" in slots.keys()
+        and PLACING.search(said.words)
+        and not slots.has("rest", "here", "stay")
+    )
+    if not named and (n is None or n > said.count or fresh):
+        return None
+    if "there" not in slots and "other" not in slots and "thing" not in slots:
+        return (
+            split_ask(slots, said)
+            if "split" in slots or len(slots.get("portion", ())) > 1
+            else None
+        )
+    to = where(slots, said, f"{listed(named) if named else n} of them to {{}}")
+    if isinstance(to, list):
+        return to
+    some: Effect = {"kind": "target", "to": to, "robots": named or n}
+    if n == said.count and not named:
+        return [{"kind": "target", "to": to}]
+    return [some | {"stay": True} if "stay" in slots else some]
+
+
+def split_ask(slots: Slots, said: Said) -> Effects:
+    """Two teams, but not where the second is to stand."""
+    others = said.standing.others()
+    if len(others) == 1:
+        return [{"kind": "target", "to": others[0], "robots": said.count // 2}]
+    options = [f"half of them to {t}, the rest here" for t in others]
+    return ask(
+        "Two teams: what is the second one to stand around? Point at it, or name it.", *options
+    )
+
+
+def merge(slots: Slots, said: Said) -> Effects:
+    """All in one team again."""
+    if len(said.standing.groups) < 2:
+        return [{"kind": "talk", "about": "already"}]
+    to = (slots.get("thing") or slots.get("current") or [None])[0]
+    return [{"kind": "merge"} | ({} if to is None else {"to": to})]
+
+
+def sides(slots: Slots, said: Said) -> Effects:
+    """Only on one side, or one side left free."""
+    named = [SIDE_OF.get(s, s) for s in (*slots.get("flank", ()), *slots.get("side", ()))]
+    without = "neg" in slots or "free" in slots
+    if not named or len(set(named)) < len(named) or ("only" in slots and without):
+        return None
+    if said.standing.relation in RINGS and not {"long", "short"} & {*named}:
+        return [{"kind": "sides", "without" if without else "only": named}]
+    if len(named) > 1 or " half" in named[0] or without:
+        return None
+    return [{"kind": "side", "side": named[0]}]
+
+
+def opposite(slots: Slots, said: Said) -> Effects:
+    """The side opposite of the one that robots are on, or of the one that is open."""
+    group = said.standing.groups[0]
+    opening = group.get("opening_towards")
+    if opening in OPPOSITE and (said.standing.relation in RINGS):
+        return [{"kind": "opening", "towards": OPPOSITE[opening]}]
+    if "gap" in slots:
+        return None
+    if group.get("side") in ("left", "right", "top", "bottom"):
+        return [{"kind": "side", "side": OPPOSITE[group["side"]]}]
+    parts = [str(p).partition(" ") for p in group.get("sides") or ()]
+    if len(parts) != 1:
+        return ask(
+            f'Opposite of what, in "{said.words}"?',
+            *(f"only on the {s} side" for s in ("left", "right", "top", "bottom")),
+        )
+    side, space, half = parts[0]
+    return [{"kind": "sides", "only": [f"{OPPOSITE[side]}{space}{half}"]}]
+
+
+def not_that_side(slots: Slots, said: Said) -> Effects:
+    """The side last named left free."""
+    last = next((e for e in reversed(said.last) if "only" in e), None)
+    named = list(last["only"]) if last else list(said.standing.groups[0].get("sides") or ())
+    if not named:
+        return ask(
+            "Which side is to be free?",
+            *(f"leave the {s} side free" for s in ("left", "right", "top", "bottom")),
+        )
+    return [{"kind": "sides", "without": named}]
+
+
+def gap(slots: Slots, said: Said) -> Effects:
+    """An opening towards something, wider or narrower, or on the other side."""
+    opening: Effect = {"kind": "opening"}
+    slots.has("gap")
+    if "opposite" in slots or "otherway" in slots:
+        return opposite(slots, said)
+    if "there" in slots or "other" in slots or "thing" in slots:
+        to = where(slots, said, "leave a gap towards {}")
+        if isinstance(to, list):
+            return to
+        opening["towards"] = to
+    facing = [SIDE_OF[d] for d in (*slots.get("dir", ()), *slots.get("side", ())) if d in SIDE_OF]
+    if len(set(facing)) > 1 or (facing and "towards" in opening):
+        return None
+    if facing:
+        opening["towards"] = facing[0]
+    stands = said.standing.groups[0].get("opening") is not None
+    change = {"bigger": "wider", "smaller": "narrower"}.get(*[slots.get("scale", [""])[0]] * 2)
+    change = slots.get("wide", [change])[0] if "wide" in slots else change
+    change = "wider" if "more" in slots and not change and not facing else change
+    change = "narrower" if "less" in slots else change
+    if change in ("wider", "narrower"):
+        if not stands:
+            return ask(
+                "No gap is left in the ring yet. Where should one be?",
+                *(f"leave a gap to the {s}" for s in ("left", "right", "top", "bottom")),
+            )
+        sign = 1 if change == "wider" else -1
+        width = said.standing.groups[0]["opening"] + sign * slots["px"][0] if "px" in slots else 0.0
+        return [
+            opening
+            | ({"px": width} if width > 0 else {"factor": rounded(factor_of(slots) ** sign)})
+        ]
+    length = bare_length(slots)
+    return [opening | ({} if length is None else {"px": length})]
+
+
+def wider(slots: Slots, said: Said) -> Effects:
+    """Wider alone: the gap, where there is one."""
+    if said.standing.groups[0].get("opening") is not None:
+        return gap(slots, said)
+    if slots["wide"][0] == "wider":
+        return ask("What should be wider?", "further out", "further apart")
+    return ask("What should be narrower?", "closer", "closer together")
+
+
+def close(slots: Slots, said: Said) -> Effects:
+    """The whole ring again, without an opening."""
+    return [{"kind": "close"}]
+
+
+def opened(slots: Slots, said: Said) -> Effects:
+    """A cage becomes a ring that is open."""
+    return [{"kind": "open"}] if said.standing.relation == "cage" else [{"kind": "opening"}]
+
+
+def cage(slots: Slots, said: Said) -> Effects:
+    """Nothing gets out."""
+    return [{"kind": "escape-proof"}]
+
+
+def heading(slots: Slots, said: Said) -> Effects:
+    """Which way robots look."""
+    slots.has("turn")
+    if "unface" in slots:
+        return [{"kind": "heading", "to": None}]
+    if "there" in slots or "other" in slots or "thing" in slots:
+        to = where(slots, said, "face {}")
+        return to if isinstance(to, list) else [{"kind": "heading", "to": to}]
+    if "dir" in slots:
+        return [{"kind": "heading", "to": DEGREES[slots["dir"][0]]}]
+    if "otherway" in slots:
+        now = said.standing.groups[0].get("heading")
+        return (
+            [{"kind": "heading", "to": "away" if now == "towards" else "towards"}]
+            if now in ("towards", "away")
+            else None
+        )
+    if "inward" in slots:
+        to = slots["inward"][0]
+        backs = "backs" in slots["face"]
+        return [
+            {"kind": "heading", "to": {"towards": "away", "away": "towards"}[to] if backs else to}
+        ]
+    return [{"kind": "heading", "to": float(slots.get("angle", slots.get("num", [0]))[0])}]
+
+
+def keepout(slots: Slots, said: Said) -> Effects:
+    """Robots stay off another thing."""
+    if not slots.has("thing", "there", "other"):
+        return ask(
+            f'Which thing is to be kept clear of in "{said.words}"? Point at it, or name it.'
+        )
+    to = where(slots, said, "keep clear of {}")
+    return to if isinstance(to, list) else [{"kind": "keep-out", "ids": [to]}]
+
+
+def arrange(slots: Slots, said: Said) -> Effects:
+    """Another arrangement of the same robots."""
+    named = list(dict.fromkeys(slots["relation"]))
+    named = [r for r in named if r != "around"] or named
+    if len(named) != 1 or named[0] == "shape":
+        return None
+    relation = named[0]
+    edits: list[Effect] = []
+    if relation == "between" or slots.has("thing", "there", "other"):
+        if relation == "between":
+            return None
+        moved = target(slots, said)
+        return moved
+    if relation == said.standing.relation and "px" not in slots and "flank" not in slots:
+        return [{"kind": "talk", "about": "already"}]
+    edits.append({"kind": "arrange", "demands": _group(relation, slots)})
+    if "px" in slots:
+        edits.append({"kind": "distance", "px": float(slots["px"][0])})
+    return edits
+
+
+def _group(relation: str, slots: Slots) -> Effect:
+    """The fields of the group of an arrangement."""
+    group: Effect = {"relation": relation}
+    if relation == "along":
+        group["side"] = SIDE_OF.get(side := str(slots.get("flank", ["long"])[0]), side)
+    return group | ({"closure": "ring"} if relation == "cage" else {})

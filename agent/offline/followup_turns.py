@@ -1,0 +1,288 @@
+"""From a frame to what a turn does beside edits, and to edits that follow from the last ones."""
+
+from typing import Any
+
+from .followup_edits import (
+    FACTOR,
+    OPPOSITE,
+    TURN,
+    WAY,
+    Effect,
+    Effects,
+    Said,
+    ask,
+    factor_of,
+    much_of,
+    offset,
+    refuse,
+    rounded,
+)
+from .followup_frames import Slots
+
+RELATIVE = (
+    "out",
+    "in",
+    "rotate",
+    "shift",
+    "scale",
+    "spacing",
+    "place",
+    "add",
+    "remove",
+    "mirror",
+    "swap",
+)
+"""Kinds that are done again on top of themselves."""
+MOVES = "undo", "further out", "closer", "turn it 30 degrees"
+
+
+def undo(slots: Slots, said: Said) -> Effects:
+    """So many steps back."""
+    steps = int(slots.get("num", slots.get("twice", [1]))[0])
+    if said.standing.steps < steps:
+        there = said.standing.steps
+        why = (
+            "Nothing was changed yet"
+            if not there
+            else f"Only {there} change{'s' * (there > 1)} can be taken back"
+        )
+        return refuse(f"{why}: there is no plan before that. Say what to change instead.")
+    return [{"kind": "undo", "steps": steps}]
+
+
+def redo(slots: Slots, said: Said) -> Effects:
+    """So many steps forward again."""
+    steps = int(slots.get("num", slots.get("twice", [1]))[0])
+    if said.standing.redo < steps:
+        return refuse("There is nothing to make again: nothing was taken back. Say what to change.")
+    return [{"kind": "undo", "steps": -steps}]
+
+
+def first(slots: Slots, said: Said) -> Effects:
+    """The first plan."""
+    return [{"kind": "undo", "to": "first"}]
+
+
+def restart(slots: Slots, said: Said) -> Effects:
+    """All over again: what is to be done is asked."""
+    return ask(
+        "Starting over: which thing, which arrangement and how many robots?",
+        "back to the first one",
+    )
+
+
+def go(slots: Slots, said: Said) -> Effects:
+    """The robots move."""
+    return [{"kind": "go"}]
+
+
+def hold(slots: Slots, said: Said) -> Effects:
+    """Nothing moves until go."""
+    return [{"kind": "hold"}]
+
+
+def stay(slots: Slots, said: Said) -> Effects:
+    """Robots that are named stay where they are."""
+    return [{"kind": "stay", "robots": [r for named in slots["robots"] for r in named]}]
+
+
+def rest_stays(slots: Slots, said: Said) -> Effects:
+    """All but those named before stay where they are."""
+    return [{"kind": "rest"}]
+
+
+def again(slots: Slots, said: Said) -> Effects:
+    """The last change once more."""
+    edits = [e for e in said.last if e["kind"] in RELATIVE and "to" not in e]
+    return edits or None
+
+
+def more(slots: Slots, said: Said) -> Effects:
+    """More of the last change; without an amount as much again."""
+    last = next(
+        (e for e in reversed(said.last) if e["kind"] in (*RELATIVE, "opening", "distance")), None
+    )
+    if last is None:
+        return ask("More of what?", "a bit further out", "a bit closer", "one more robot")
+    amount = _again(last, slots, said)
+    return None if amount is None else [amount]
+
+
+def _again(last: Effect, slots: Slots, said: Said) -> Effect | None:
+    kind, size = last["kind"], min(said.standing.size)
+    much = much_of(slots)
+    length = float(slots["px"][0]) if "px" in slots else None
+    if kind in ("out", "in"):
+        if length is None and not much and "share" not in slots:
+            return last
+        return (offset(Slots({**slots, "radial": [kind]}), said) or [None])[0]
+    if kind == "rotate":
+        sign = 1 if last["degrees"] > 0 else -1
+        turned = slots.get(
+            "angle", slots.get("num", [TURN[much] if much else abs(last["degrees"])])
+        )[0]
+        return {"kind": "rotate", "degrees": sign * float(turned)}
+    if kind in ("shift", "place") and ("to" not in last and "target" not in last):
+        way = length if length is not None else round(WAY[much] * size) if much else None
+        return _further(last, way)
+    if kind in ("scale", "spacing") and "factor" in last:
+        factor = FACTOR[much] if much else None
+        up = last["factor"] > 1
+        return {
+            "kind": kind,
+            "factor": last["factor"] if factor is None else rounded(factor if up else 1 / factor),
+        }
+    if kind == "opening":
+        return {"kind": kind, "factor": factor_of(slots)} if length is None else None
+    number = slots.get("num", [None])[0]
+    if kind in ("add", "remove") and "n" in last and length is None:
+        return last if number is None else {"kind": kind, "n": int(number)}
+    return None
+
+
+def _further(last: Effect, way: float | None) -> Effect | None:
+    """As far again in the direction of a move, or so far."""
+    if way is None:
+        return last
+    if last["kind"] == "place" and isinstance(last["by"], dict):
+        return last | {"by": dict.fromkeys(last["by"], way)}
+    dx, dy = (last["dx"], last["dy"]) if last["kind"] == "shift" else last["by"]
+    length = max(abs(dx), abs(dy))
+    if not length:
+        return None
+    x, y = rounded(dx / length * way), rounded(dy / length * way)
+    return last | ({"dx": x, "dy": y} if last["kind"] == "shift" else {"by": [x, y]})
+
+
+def less(slots: Slots, said: Said) -> Effects:
+    """Half of the last change taken back, however it is said."""
+    slots.has("much")
+    last = next((e for e in reversed(said.last) if e["kind"] in RELATIVE), None)
+    halved = None if last is None else _scaled(last, -0.5)
+    if halved is None:
+        return ask("Less of what?", "a bit closer", "take one robot away")
+    return [halved]
+
+
+def _scaled(edit: Effect, share: float) -> Effect | None:
+    """An edit that does a share of another; a negative one takes so much of it back."""
+    kind = edit["kind"]
+    if kind in ("out", "in", "scale", "spacing"):
+        back = {"out": "in", "in": "out"}.get(kind, kind)
+        if "factor" not in edit:
+            return (
+                {"kind": back, "px": rounded(edit["px"] * abs(share))}
+                if "px" in edit and kind != "spacing"
+                else None
+            )
+        factor = edit["factor"]
+        if kind == "in":
+            kept = 1 / factor
+            return {"kind": back, "factor": rounded((kept + (1 - kept) * -share) / kept)}
+        left = 1 + (factor - 1) * (1 + share)
+        return {"kind": back, "factor": rounded(factor / left if kind == "out" else left / factor)}
+    names = {"rotate": ("degrees",), "shift": ("dx", "dy")}.get(kind)
+    if names:
+        return {"kind": kind, **{n: rounded(edit[n] * share) for n in names}}
+    if kind == "place" and "by" in edit:
+        by: Any = edit["by"]
+        if isinstance(by, dict):
+            return edit | {
+                "by": {{"out": "in", "in": "out"}[k]: rounded(v * -share) for k, v in by.items()}
+            }
+        return edit | {"by": [rounded(v * share) for v in by]}
+    if kind in ("add", "remove") and edit.get("n", 0) > 1:
+        return {"kind": {"add": "remove", "remove": "add"}[kind], "n": edit["n"] // 2}
+    return None
+
+
+def otherway(slots: Slots, said: Said) -> Effects:
+    """The last change the other way; with an amount, so much of it back."""
+    last = next(
+        (e for e in reversed(said.last) if e["kind"] in (*RELATIVE, "opening", "sides", "heading")),
+        None,
+    )
+    if last is None:
+        return ask('"The other way" of what?', "turn it left", "turn it right")
+    if "much" in slots:
+        return less(slots, said)
+    other = _turned(last)
+    if other is None:
+        return None
+    taken_back: list[Effect] = (
+        [{"kind": "undo", "steps": 1}] if said.standing.edits and not said.before else []
+    )
+    return [*taken_back, other] if last["kind"] in RELATIVE else [other]
+
+
+def _turned(edit: Effect) -> Effect | None:
+    """An edit the other way round."""
+    kind = edit["kind"]
+    if kind in ("out", "in"):
+        return edit | {"kind": {"out": "in", "in": "out"}[kind]}
+    if kind == "mirror":
+        return edit | {
+            "axis": {"left-right": "top-bottom", "top-bottom": "left-right"}[edit["axis"]]
+        }
+    if kind in ("scale", "spacing") and "factor" in edit:
+        return edit | {"factor": rounded(1 / edit["factor"])}
+    if kind == "opening" and edit.get("towards") in OPPOSITE:
+        return {"kind": kind, "towards": OPPOSITE[edit["towards"]]}
+    if kind == "sides" and len(edit.get("only", ())) == 1 and edit["only"][0] in OPPOSITE:
+        return edit | {"only": [OPPOSITE[edit["only"][0]]]}
+    if kind == "heading" and edit["to"] in ("towards", "away"):
+        return edit | {"to": {"towards": "away", "away": "towards"}[edit["to"]]}
+    return _scaled(edit, -1.0) if kind in ("rotate", "shift", "place") else None
+
+
+def toofar(slots: Slots, said: Said) -> Effects:
+    """Too far, too close: half of the last change back, where it went there; else a bit."""
+    last = next((e for e in reversed(said.last) if e["kind"] in RELATIVE), None)
+    way = {"far": "out", "near": "in"}[slots["toofar"][0]]
+    if last is not None and (
+        last["kind"] == way or (way == "out" and last["kind"] in ("rotate", "shift", "place"))
+    ):
+        return less(slots, said)
+    return [{"kind": {"out": "in", "in": "out"}[way], "factor": FACTOR["bit"]}]
+
+
+def bare(slots: Slots, said: Said) -> Effects:
+    """An amount alone: what it is of is asked."""
+    if "px" in slots:
+        px = f"{slots['px'][0]:g} px"
+        return ask(f"{px} of what?", f"{px} away from it", f"{px} further out", f"{px} closer")
+    if "num" in slots:
+        n = f"{slots['num'][0]:g}"
+        return ask(
+            f"{n} of what?", f"make it {n} robots", f"{n} more robots", f"turn it {n} degrees"
+        )
+    return ask(f'What should change, in "{said.words}"?', *MOVES[1:])
+
+
+def refuse_checks(slots: Slots, said: Said) -> Effects:
+    """Nothing moves uncertified."""
+    return refuse(
+        "Nothing moves without its checks; say what should change, and it is checked at once."
+    )
+
+
+def refuse_through(slots: Slots, said: Said) -> Effects:
+    """No robot goes through the thing."""
+    return refuse(
+        "Robots do not go through a thing, they drive around it. Say where they should stand, and go."
+    )
+
+
+def asked(slots: Slots, said: Said, about: str) -> Effects:
+    """A question of the person's, answered by measures."""
+    robots = [r for named in slots.get("robots", ()) for r in named]
+    query: Effect = {"kind": "query", "about": about}
+    if about == "distance" and ("spacing" in slots or "apart" in slots):
+        query["about"] = "spacing"
+    if about == "nearest":
+        query["most"] = slots["nearest"][0] if slots["nearest"] else "nearest"
+    return [
+        query
+        | ({"robots": robots} if robots else {})
+        | ({"thing": slots["thing"][0]} if "thing" in slots else {})
+    ]

@@ -1,0 +1,81 @@
+"""What stands when a later turn begins, as the planner is told it: the plan, robots and things."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A plan that stands, and what was done to it last.
+
+    Attributes:
+        plan: its id.
+        contract: of the plan, as JSON; lengths px.
+        robots: ids in the order of positions.
+        deployed: whether the robots stand there.
+        words, edits: what was said last that changed the plan, and the changes; none at first.
+        things: ids and labels of what was measured.
+        steps, redo: how many changes can be taken back, and how many made again.
+        centre: of each thing, px.
+        pointed: ids of what this turn points at; `place`: the point, where it is one.
+        size: of the picture, px.
+        metres_per_pixel: of the picture; None where it has no scale.
+    """
+
+    plan: str
+    contract: Mapping[str, Any]
+    robots: tuple[str, ...]
+    deployed: bool = False
+    words: str = ""
+    edits: tuple[Mapping[str, Any], ...] = ()
+    things: tuple[tuple[str, str], ...] = ()
+    steps: int = 0
+    redo: int = 0
+    centre: Mapping[str, tuple[float, float]] | None = None
+    pointed: tuple[str, ...] = ()
+    place: tuple[float, float] | None = None
+    size: tuple[int, int] = (0, 0)
+    metres_per_pixel: float | None = None
+
+    @classmethod
+    def of(cls, facts: Mapping[str, Any], **told: Any) -> "Standing":
+        """From the line `Standing` of a turn's first message, and what else the turn is told."""
+        last = facts.get("last") or {}
+        return cls(
+            plan=facts["plan"],
+            contract=facts["contract"],
+            robots=tuple(facts["robots"]),
+            deployed=facts.get("deployed", False),
+            words=last.get("words", ""),
+            edits=tuple(last.get("edits") or ()),
+            things=tuple((t["id"], t.get("label", "")) for t in facts.get("things", ())),
+            steps=facts.get("undo", 0),
+            redo=facts.get("redo", 0),
+            centre={
+                t["id"]: (t["centre"][0], t["centre"][1])
+                for t in facts.get("things", ())
+                if "centre" in t
+            },
+            **told,
+        )
+
+    @property
+    def groups(self) -> list[dict[str, Any]]:
+        """The groups of the contract."""
+        return list(self.contract["groups"])
+
+    @property
+    def relation(self) -> str:
+        """Of the first group."""
+        return str(self.groups[0]["relation"])
+
+    @property
+    def targets(self) -> list[str]:
+        """Ids of what the groups are about, in order, once each."""
+        return list(dict.fromkeys(t for group in self.groups for t in group.get("targets", ())))
+
+    def others(self) -> list[str]:
+        """Things known that no group is about; those pointed at in this turn come first."""
+        known = [*self.pointed, *(name for name, _ in self.things)]
+        return [t for t in dict.fromkeys(known) if t not in self.targets]
