@@ -28,6 +28,8 @@ NOTHING_SAID = "Say what to do first, such as surround the coin with 6 robots."
 HELD = "The robots are held where they are. Say what to change, or go to drive on."
 STOP = frozenset({"stop", "halt", "freeze", "stop now", "stop it", "emergency stop"})
 """Words that hold the robots at once, whoever else would have read them."""
+DROPS = frozenset({"query", "talk", "undo", "hold"})
+"""Kinds of what is said that are no answer to a question, which is dropped for them."""
 
 
 @dataclass
@@ -66,10 +68,11 @@ class Session:
             return await self.astop()
         show, pointed = options.get("show"), (*self.pointed, *options.get("pointed", ()))
         run = self.run
-        if run is not None and isinstance(run.outcome, Paused) and not pointed:
-            return self._keep(await self._answered(run, words, show))
-        if run is not None and isinstance(run.outcome, Paused):  # the answer is a point
-            words = f"{run.report.instruction} {words}".strip()
+        if run is not None and isinstance(run.outcome, Paused):
+            if not pointed and read_followup(words, self._standing(run)).kind not in DROPS:
+                return self._keep(await self._answered(run, words, show))
+            if pointed:  # the answer is a point
+                words = f"{run.report.instruction} {words}".strip()
         settings = await self._for_turn(words)
         self.pointed = ()
         if run is None:
