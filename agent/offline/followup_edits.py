@@ -6,6 +6,7 @@ edits, or what else a turn does (undo, go, hold, query, talk, ask, refuse); None
 frame does not fit what stands.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +22,9 @@ TURN = {"bit": 15.0, "": 45.0, "big": 90.0}
 """Degrees."""
 WAY = {"bit": 0.05, "": 0.1, "big": 0.2}
 """Of the picture's shorter side."""
+TEAM = re.compile(
+    r"\b(?:them|they|all|every\w*|robots|ring|circle|row|team|formation|whole)\b", re.IGNORECASE
+)
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
@@ -90,7 +94,7 @@ def much_of(slots: Slots) -> str:
 def bare_length(slots: Slots) -> float | None:
     """The length in px; a number without a unit is one unless it is small."""
     if "px" in slots:
-        return float(slots["px"][0])
+        return float(slots["px"][0]) if slots["px"][0] > 0 else None
     number = slots.get("num", [0])[0]
     return float(number) if number >= LEAST_BARE else None
 
@@ -112,7 +116,8 @@ def offset(slots: Slots, said: Said) -> Effects:
     """Further out or in: by px, a share, or a factor of the distance."""
     ways = set(slots["radial"])
     length = bare_length(slots)
-    if len(ways) > 1 or ("num" in slots and length is None):
+    slots.has("away")
+    if len(ways) > 1 or (slots.has("num", "px") and length is None):
         return None
     kind = ways.pop()
     if length is not None:
@@ -219,7 +224,8 @@ def way(slots: Slots, said: Said) -> tuple[float, float] | None:
     if (
         len(vectors) > 2
         or len({abs(x) for x, _ in vectors}) < len(vectors)
-        or ("num" in slots and length is None)
+        or (slots.has("num", "px") and length is None)
+        or "in" in slots.get("radial", ())
     ):
         return None
     share = float(slots["share"][0]) if "share" in slots else WAY[much_of(slots)]
@@ -228,9 +234,14 @@ def way(slots: Slots, said: Said) -> tuple[float, float] | None:
 
 
 def shift(slots: Slots, said: Said) -> Effects:
-    """All of it left, right, up or down."""
+    """All of it left, right, up or down; after a word about one robot, that one."""
     by = way(slots, said)
-    return None if by is None else [{"kind": "shift", "dx": by[0], "dy": by[1]}]
+    if by is None:
+        return None
+    placed = [e["robot"] for e in said.last if e["kind"] == "place"]
+    if placed and len(placed) == len(said.last) and not TEAM.search(said.words):
+        return [{"kind": "place", "robot": r, "by": list(by)} for r in placed]
+    return [{"kind": "shift", "dx": by[0], "dy": by[1]}]
 
 
 def place(slots: Slots, said: Said) -> Effects:
@@ -239,11 +250,13 @@ def place(slots: Slots, said: Said) -> Effects:
     point = (
         slots["point"][0] if "point" in slots else said.standing.place if "there" in slots else None
     )
-    if point is not None:
+    if point is not None and not (len(robots) > 1 and "there" in slots and said.standing.pointed):
         if len(robots) > 1:
             return ask(f"Only one robot can stand at a point. Which of {listed(robots)}?")
         return [{"kind": "place", "robot": robots[0], "to": list(point)}]
     if slots.has("there", "other", "thing"):
+        if "there" in slots and not (said.standing.pointed or said.standing.others()):
+            return ask(f'Which place is meant in "{said.words}"? Point at it, or say it as x,y.')
         to = where(slots, said, f"robot {robots[0]} to {{}}")
         if isinstance(to, list):
             return to
@@ -273,8 +286,6 @@ def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Eff
         return others[0]
     if others:
         return ask(f"Which thing is meant: {' or '.join(others)}?", *map(option.format, others))
-    if "there" in slots:
-        return ask(f'Which thing or place is meant in "{said.words}"? Point at it, or name it.')
     return OTHER
 
 

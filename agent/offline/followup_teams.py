@@ -23,16 +23,19 @@ from .followup_edits import (
 from .followup_frames import Slots
 
 PLACING = re.compile(
-    r"\b(?:put|place|surround|position|station|arrange|set|have|ring|encircle)\b", re.IGNORECASE
+    r"(?=.*\b(?:robot|bot|drone|rover)s?\b).*\b(?:put|place|surround|position|station|arrange)\b",
+    re.IGNORECASE | re.DOTALL,
 )
-"""With a number of robots and a thing, such a word makes a new instruction."""
+"""Robots, a number of them, a thing and such a word make a new instruction."""
 SHARES = {"half": 2, "third": 3, "quarter": 4}
 LIKE_A_RING = ("around", "cage", "corners", "shape")
 """Arrangements about a thing, which "around" the next one keeps."""
 
 
 def whole(slots: Slots) -> int | None:
-    """The number said, where it is one of robots."""
+    """The number said, where it is one of robots; "a robot" is one."""
+    if "num" not in slots and "lone" in slots:
+        return 1
     number = slots.get("num", [0])[0]
     return int(number) if number == int(number) and number > 0 else None
 
@@ -130,6 +133,15 @@ def target(slots: Slots, said: Said) -> Effects:
     to = where(slots, said)
     if isinstance(to, list):
         return to
+    if "neg" in slots and "current" not in slots and len(slots.get("other", ())) < 2:
+        return None
+    if "between" in slots.get("relation", ()):
+        ends = [*slots.get("current", ()), to]
+        return (
+            [{"kind": "arrange", "demands": {"relation": "between", "targets": ends}}]
+            if len(ends) == 2
+            else None
+        )
     moved: Effect = {"kind": "target", "to": to}
     relation = slots.get("relation", ["around"])[0]
     kept = relation == said.standing.relation or (
@@ -148,6 +160,8 @@ def split(slots: Slots, said: Said) -> Effects:
     """Some there, the rest here."""
     named = [r for robots in slots.get("robots", ()) for r in robots]
     n = whole(slots)
+    if len(set(slots.get("num", ()))) > 1:
+        return None
     if "portion" in slots:
         n = max(said.count // SHARES[slots["portion"][0]], 1)
     elif "split" in slots or ("rest" in slots and n is None and not named):
@@ -158,11 +172,7 @@ def split(slots: Slots, said: Said) -> Effects:
         return None
     if named and not slots.has("rest", "portion", "split"):
         return place(slots, said)
-    fresh = (
-        "robotword" in slots.keys()
-        and PLACING.search(said.words)
-        and not slots.has("rest", "here", "stay")
-    )
+    fresh = PLACING.search(said.words) and not slots.has("rest", "here", "stay")
     if not named and (n is None or n > said.count or fresh):
         return None
     if "there" not in slots and "other" not in slots and "thing" not in slots:
@@ -174,6 +184,8 @@ def split(slots: Slots, said: Said) -> Effects:
     to = where(slots, said, f"{listed(named) if named else n} of them to {{}}")
     if isinstance(to, list):
         return to
+    if to in said.standing.targets:
+        return None
     some: Effect = {"kind": "target", "to": to, "robots": named or n}
     if n == said.count and not named:
         return [{"kind": "target", "to": to}]
@@ -197,6 +209,21 @@ def merge(slots: Slots, said: Said) -> Effects:
         return [{"kind": "talk", "about": "already"}]
     to = (slots.get("thing") or slots.get("current") or [None])[0]
     return [{"kind": "merge"} | ({} if to is None else {"to": to})]
+
+
+def merge_to(slots: Slots, said: Said) -> Effects:
+    """All around one thing: one team again, where there are several."""
+    if len(said.standing.groups) < 2:
+        return target(slots, said)
+    slots.has("back", "relation")
+    return [{"kind": "merge", "to": slots["thing"][0]}]
+
+
+def add_one(slots: Slots, said: Said) -> Effects:
+    """Another one: a robot, where robots were added last."""
+    if any(e["kind"] == "add" for e in said.last):
+        return [{"kind": "add", "n": 1}]
+    return ask("Another robot, or another thing?", "one more robot", "around the other one")
 
 
 def sides(slots: Slots, said: Said) -> Effects:
@@ -281,6 +308,11 @@ def gap(slots: Slots, said: Said) -> Effects:
     return [opening | ({} if length is None else {"px": length})]
 
 
+def reopened(slots: Slots, said: Said) -> Effects:
+    """The gap that is there, towards something else."""
+    return gap(slots, said) if said.standing.groups[0].get("opening") is not None else None
+
+
 def wider(slots: Slots, said: Said) -> Effects:
     """Wider alone: the gap, where there is one."""
     if said.standing.groups[0].get("opening") is not None:
@@ -292,6 +324,7 @@ def wider(slots: Slots, said: Said) -> Effects:
 
 def close(slots: Slots, said: Said) -> Effects:
     """The whole ring again, without an opening."""
+    slots.has("relation")
     return [{"kind": "close"}]
 
 
@@ -349,11 +382,10 @@ def arrange(slots: Slots, said: Said) -> Effects:
         return None
     relation = named[0]
     edits: list[Effect] = []
-    if relation == "between" or slots.has("thing", "there", "other"):
-        if relation == "between":
-            return None
-        moved = target(slots, said)
-        return moved
+    if slots.has("thing", "there", "other"):
+        return target(slots, said)
+    if relation == "between":
+        return None
     if relation == said.standing.relation and "px" not in slots and "flank" not in slots:
         return [{"kind": "talk", "about": "already"}]
     edits.append({"kind": "arrange", "demands": _group(relation, slots)})

@@ -16,6 +16,7 @@ from .followup_edits import (
     offset,
     refuse,
     rounded,
+    shift,
 )
 from .followup_frames import Slots
 
@@ -237,6 +238,9 @@ def _turned(edit: Effect) -> Effect | None:
 
 def toofar(slots: Slots, said: Said) -> Effects:
     """Too far, too close: half of the last change back, where it went there; else a bit."""
+    if "dir" in slots:
+        back = {"left": "right", "right": "left", "up": "down", "down": "up"}[slots["dir"][0]]
+        return shift(Slots({"dir": [back], "much": ["bit"]}), said)
     last = next((e for e in reversed(said.last) if e["kind"] in RELATIVE), None)
     way = {"far": "out", "near": "in"}[slots["toofar"][0]]
     if last is not None and (
@@ -250,12 +254,11 @@ def bare(slots: Slots, said: Said) -> Effects:
     """An amount alone: what it is of is asked."""
     if "px" in slots:
         px = f"{slots['px'][0]:g} px"
-        return ask(f"{px} of what?", f"{px} away from it", f"{px} further out", f"{px} closer")
+        moves = (f"{px} further out", f"{px} closer") if slots["px"][0] > 0 else ()
+        return ask(f"{px} of what?", f"{px} away from it", *moves)
     if "num" in slots:
         n = f"{slots['num'][0]:g}"
-        return ask(
-            f"{n} of what?", f"make it {n} robots", f"{n} more robots", f"turn it {n} degrees"
-        )
+        return ask(f"{n} of what?", f"make it {n} in all", f"{n} more", f"turn it {n} degrees")
     return ask(f'What should change, in "{said.words}"?', *MOVES[1:])
 
 
@@ -271,6 +274,15 @@ def refuse_through(slots: Slots, said: Said) -> Effects:
     return refuse(
         "Robots do not go through a thing, they drive around it. Say where they should stand, and go."
     )
+
+
+def units(slots: Slots, said: Said) -> Effects:
+    """Lengths in metres, which take a scale."""
+    if said.standing.metres_per_pixel is None:
+        return refuse(
+            "The picture has no scale, so lengths are px; give it with --metres-per-pixel."
+        )
+    return [{"kind": "query", "about": "distance"}]
 
 
 def asked(slots: Slots, said: Said, about: str) -> Effects:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from . import followup_edits, followup_teams, followup_turns
 from .accounting import read_instruction
 from .drafting import contract_of
+from .drawn_forms import form_in
 from .followup_edits import Effect, Effects, Said, ask
 from .followup_frames import Frame, Slots, frames
 from .followup_words import Chunk, chunks_of, rules, spelled
@@ -34,6 +35,8 @@ WITHOUT_PLAN = (
 RENAMED: dict[str, Callable[[Slots, Said], Effects]] = {
     "open": followup_teams.opened,
 }
+INSTRUCTING = ("arrange", "target", "close", "cage", "count", "split", "sides", "gap", "distance")
+"""Frames of what may be said when no plan stands: an instruction."""
 AMOUNTS = ("px", "angle", "share", "much", "num", "m")
 SAME = (
     *AMOUNTS,
@@ -127,6 +130,7 @@ class _Reader:
         self.words, self.there = spelled(words), standing is not None
         self.standing = standing or NOTHING
         self.led = ""
+        self.excepted: tuple[int, ...] = ()
 
     def read(self) -> Followup:
         """The follow-up; see the module."""
@@ -147,20 +151,27 @@ class _Reader:
         if impossible:
             return Followup("refuse", text=impossible)
         chunks = self._without_lead(chunks)
-        if all(map(_is_empty, chunks)):
+        greeted = ("hello" in self.led or "thanks" in self.led) and all(
+            set(c.kinds) <= SLIGHT for c in chunks
+        )
+        if greeted or all(map(_is_empty, chunks)):
             return self._said_nothing()
+        chunks = self._without_excepted(chunks)
         clauses = self._corrected(chunks) or self._clauses(chunks, ())
         if clauses is None:
             return self._otherwise(chunks)
         if not self.there and any(c.frame not in WITHOUT_PLAN for c in clauses):
-            return Followup("instruction", text=self.words)
+            whole = all(c.frame in INSTRUCTING for c in clauses)
+            return Followup(
+                "instruction" if whole else "refuse", text=self.words if whole else NO_PLAN
+            )
         return self._gathered(clauses)
 
     def _resolved(self, chunk: Chunk) -> Chunk:
         """A thing as its id, where it is known; one that the plan is about as `current`."""
         kinds = dict(chunk.kinds)
         text = self.words[chunk.start : chunk.end].lower()
-        if (self.standing.pointed or self.standing.place) and text in ("that", "this"):
+        if (self.standing.pointed or self.standing.place) and text in ("that", "this", "here"):
             kinds["there"] = ""
         if "lone" in kinds and len(self.standing.robots) == 1:
             kinds["team"] = ""
@@ -246,6 +257,21 @@ class _Reader:
             )
             self.led += f"{self.words[chunk.start : chunk.end].lower()} "
         return []
+
+    def _without_excepted(self, chunks: list[Chunk]) -> list[Chunk]:
+        """The phrases but for "except robot 3", which `excepted` keeps."""
+        at = next(
+            (
+                k
+                for k, c in enumerate(chunks[:-1])
+                if "except" in c.kinds and "robots" in chunks[k + 1].kinds
+            ),
+            None,
+        )
+        if at is None:
+            return chunks
+        self.excepted = tuple(chunks[at + 1].kinds["robots"])
+        return [*chunks[:at], *chunks[at + 2 :]]
 
     def _said_nothing(self) -> Followup:
         """Talk, or yes and no to nothing that was asked."""
@@ -401,10 +427,10 @@ class _Reader:
         for at in range(len(clauses) - 1, -1, -1):
             chunks = list(clauses[at].chunks)
             for new in after:
-                same = [k for k, c in enumerate(chunks) if set(c.kinds) & set(new.kinds) & {*SAME}]
+                same = [k for k, c in enumerate(chunks) if _stands_for(new, c)]
                 if same:
                     chunks[same[-1]] = new
-                elif set(new.kinds) & {*AMOUNTS}:
+                elif set(new.kinds) & {*AMOUNTS} or self._steers(clauses[at], new):
                     chunks.append(new)
                 else:
                     break
@@ -413,6 +439,9 @@ class _Reader:
                 if clause is not None and clause.frame == clauses[at].frame:
                     return [*clauses[:at], clause, *clauses[at + 1 :]]
         return None
+
+    def _steers(self, clause: _Clause, new: Chunk) -> bool:
+        return clause.frame == "rotate" and bool({"dir", "spin"} & set(new.kinds))
 
     def _gathered(self, clauses: Sequence[_Clause]) -> Followup:
         """All that the clauses come to."""
@@ -435,6 +464,8 @@ class _Reader:
         contrary = {e["kind"] for e in edits} >= {"out", "in"} and not any(
             "group" in e for e in edits
         )
+        if sum(e["kind"] == "target" and "robots" not in e for e in edits) > 1:
+            return Followup("ask", text=f'"{self.words}" names several things. Around which one?')
         if contrary:
             return Followup(
                 "ask",
@@ -445,7 +476,7 @@ class _Reader:
             last = self.standing.edits[0]["kind"] if self.standing.edits else ""
             alike = {edits[0]["kind"], last} <= {"out", "in"} or edits[0]["kind"] == last
             undo = int(alike and last in followup_turns.RELATIVE)
-        stays = [r for e in effects if e["kind"] == "stay" for r in e["robots"]]
+        stays = [r for e in effects if e["kind"] == "stay" for r in e["robots"]] + [*self.excepted]
         return self._settled(effects, edits, undo, stays)
 
     def _settled(
@@ -513,12 +544,24 @@ class _Reader:
             or reading.unscaled
             or reading.background
         )
-        settled = clear and reading.sure and reading.relation not in ("ask", "several") and named
+        settled = (
+            clear
+            and not any("neg" in c.kinds for c in chunks)
+            and reading.sure
+            and reading.relation not in ("ask", "several")
+            and named
+        )
         things = any("thing" in c.kinds for c in chunks)
         if settled and (reading.robots or things) and (things or reading.things):
             return Followup("instruction", text=text)
+        first, last = form_in(text)[1]
+        inside = text[first:last].lower()
+        strange = any(
+            "unknown" in c.kinds and c.kinds["unknown"] not in inside for c in chunks
+        )
         if (
             settled
+            and not strange
             and not things
             and reading.relation != "between"
             and (reading.form is not None or reading.relation != "shape")
@@ -648,6 +691,12 @@ def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
 def _is_empty(chunk: Chunk) -> bool:
     """Whether a phrase says nothing by itself."""
     return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= SLIGHT
+
+
+def _stands_for(new: Chunk, old: Chunk) -> bool:
+    """Whether a phrase can be put in the place of another: both say the same kind of thing."""
+    amounts = bool(set(new.kinds) & {*AMOUNTS}) and bool(set(old.kinds) & {*AMOUNTS})
+    return amounts or bool(set(new.kinds) & set(old.kinds) & {*SAME})
 
 
 def _parts(chunks: Sequence[Chunk]) -> list[list[Chunk]]:

@@ -1,0 +1,113 @@
+"""Follow-ups as operators type them to the edits, answers and questions that they mean."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+import yaml
+from formup.agent.offline.followups import Followup, read_followup
+from formup.agent.offline.standing import Standing
+from formup.tools.formation.editing.edit_kinds import Edit
+from pydantic import TypeAdapter
+
+EDIT: TypeAdapter[Any] = TypeAdapter(Edit)
+TABLE = yaml.safe_load(Path(__file__).with_name("followups.yaml").read_text("utf-8"))
+ROWS = [(scene, *row) for scene, rows in TABLE["rows"].items() for row in rows]
+MEANT = [row for row in ROWS if isinstance(row[2], dict) and "talk" not in row[2]]
+UNKNOWN = "zorvel"
+"""A word of no list: it is never left out."""
+
+
+@cache
+def standing(scene: str) -> Standing:
+    """What stands in a scene of the table."""
+    given = dict(TABLE["scenes"][scene])
+    count, groups = given.pop("robots"), given.pop("groups")
+    things = tuple((name, label) for name, label in given.pop("things"))
+    for name in ("edits", "pointed", "place", "size"):
+        if name in given:
+            given[name] = tuple(given[name])
+    given["centre"] = {name: tuple(at) for name, at in given["centre"].items()}
+    robots = tuple(str(k + 1) for k in range(count))
+    return Standing(contract={"groups": groups}, robots=robots, things=things, **given)
+
+
+def read(scene: str, words: str) -> dict[str, Any] | str:
+    """What is read, in the form of the table."""
+    followup = read_followup(words, standing(scene))
+    if followup.kind in ("ask", "refuse", "instruction"):
+        return followup.kind
+    if followup.kind == "talk":
+        return {"talk": followup.about}
+    names = ("undo", "to", "edits", "stay", "go", "hold", "query", "rest")
+    found = {name: getattr(followup, name) for name in names}
+    return {name: _plain(value) for name, value in found.items() if value}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _plain(v) for name, v in value.items()}
+    return [_plain(v) for v in value] if isinstance(value, list | tuple) else value
+
+
+@pytest.mark.parametrize(("scene", "words", "meant"), ROWS)
+def test_what_is_meant(scene: str, words: str, meant: dict[str, Any] | str) -> None:
+    assert read(scene, words) == meant
+
+
+def test_there_are_enough_of_each_kind() -> None:
+    quiet = [row for row in ROWS if row not in MEANT or {"query", "hold"} & set(row[2])]
+    assert len(ROWS) >= 500
+    assert len(quiet) >= 150
+    said = {edit["kind"] for row in MEANT for edit in row[2].get("edits", ())}
+    models = get_args(get_args(Edit)[0])
+    assert said == {k for m in models for k in get_args(m.model_fields["kind"].annotation)}
+
+
+@pytest.mark.parametrize(("scene", "words", "meant"), MEANT)
+def test_edits_are_ones_that_the_tool_takes(scene: str, words: str, meant: dict[str, Any]) -> None:
+    for edit in read_followup(words, standing(scene)).edits:
+        way = edit.get("by")
+        EDIT.validate_python(edit | ({"by": [1.0, 1.0]} if isinstance(way, dict) else {}))
+
+
+@pytest.mark.parametrize(("scene", "words", "meant"), MEANT)
+def test_an_unknown_word_is_never_left_out(scene: str, words: str, meant: dict[str, Any]) -> None:
+    spoken = words.split()
+    for at in {0, len(spoken) // 2, len(spoken)}:
+        more = " ".join([*spoken[:at], UNKNOWN, *spoken[at:]])
+        followup = read_followup(more, standing(scene))
+        kept = UNKNOWN in repr(followup)
+        assert kept or followup.kind in ("ask", "refuse"), more
+
+
+@pytest.mark.parametrize(("scene", "words", "meant"), [r for r in ROWS if r[2] == "ask"])
+def test_options_answer_the_question(scene: str, words: str, meant: str) -> None:
+    for option in read_followup(words, standing(scene)).options:
+        assert read_followup(option, standing(scene)).kind not in ("ask", "refuse"), option
+
+
+@pytest.mark.parametrize(
+    ("words", "kind"),
+    [
+        ("go", "go"),
+        ("undo", "refuse"),
+        ("thanks", "talk"),
+        ("what can you do", "talk"),
+        ("further out", "refuse"),
+        ("robot 3 left", "refuse"),
+        ("surround the coin with 6 robots", "instruction"),
+        ("fill it", "instruction"),
+    ],
+)
+def test_what_fits_when_no_plan_stands(words: str, kind: str) -> None:
+    assert read_followup(words, None).kind == kind
+
+
+def test_what_is_not_understood_is_quoted() -> None:
+    followup = read_followup("further out and paint it red", standing("first"))
+    assert isinstance(followup, Followup)
+    assert '"further out" is clear' in followup.text
+    assert '"paint"' in followup.text
+    assert followup.options == ("further out",)
