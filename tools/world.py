@@ -6,6 +6,7 @@ down, pixel centres at whole numbers.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import shapely
@@ -277,20 +278,22 @@ class World(Value):
             ToolError: it names a target that is not there.
         """
         outlines = {name: self.outline(name) for name in contract.target_ids}
-        others = others_than(contract, outlines, self._others())
-        return Site(outlines, *self.picture.size, self.metres_per_pixel, others)
+        whole = self.whole_site
+        others = others_than(contract, outlines, whole.others)
+        return replace(whole, outlines=outlines, others=others)
 
+    @property
     def whole_site(self) -> Site:
-        """All outlines that a contract could refer to, and what else there is in the picture."""
-        outlines = {t.id: t.outline for t in self.targets}
-        outlines |= {k.id: k.outline for k in self.keep_out if k.hard}
-        return Site(outlines, *self.picture.size, self.metres_per_pixel, self._others())
-
-    def _others(self) -> tuple[Other, ...]:
-        """All things that robots keep off where they can."""
+        """Every outline and everything in the picture, whatever a contract may come to name."""
+        hard = {k.id: k.outline for k in self.keep_out if k.hard}
+        outlines = {t.id: t.outline for t in self.targets} | hard
         things = [Other(t.id, t.label, t.outline.filled) for t in self.targets]
-        soft = (k for k in self.keep_out if not k.hard)
-        return (*things, *(Other(k.id, k.reason, k.outline.filled, k.confidence) for k in soft))
+        things += [
+            Other(k.id, k.reason, k.outline.filled, k.confidence)
+            for k in self.keep_out
+            if not k.hard
+        ]
+        return Site(outlines, *self.picture.size, self.metres_per_pixel, tuple(things))
 
     def outline(self, name: str) -> Outline:
         """The outline of a target, or of a region that no robot may enter.

@@ -80,7 +80,7 @@ def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]
     Raises:
         ToolError: an edit makes no sense, or what comes of it is not certified: nothing changed.
     """
-    made = edited_all(plan, edits, world.whole_site(), world.version_of, stay)
+    made = edited_all(plan, edits, world.whole_site, world.version_of, stay)
     verdict = made.plan.verdict
     if not verdict.certified:
         findings = [finding.sentence for finding in verdict.findings]

@@ -88,7 +88,7 @@ class Draft:
         Raises:
             ToolError: nobody is left, or there is no such group.
         """
-        left = [_counted(part) for part in parts if len(part.points)]
+        left = [_in_step(part) for part in parts if len(part.points)]
         if not left:
             raise ToolError("Nobody would be left: at least one robot has to stay.")
         stands = [Stand(part.group, part.points) for part in left]
@@ -149,7 +149,7 @@ def _suits(edit: Edit, group: Group) -> bool:
     return group.relation != "at"
 
 
-def _counted(part: Part) -> Part:
+def _in_step(part: Part) -> Part:
     """A group that says how many robots it has, and where those at points of their own are."""
     points = pairs(part.points) if part.group.relation == "at" else None
     return replace(part, group=part.valid_group(robots=len(part.points), points=points))

@@ -168,6 +168,7 @@ def test_as_many_as_close_the_ring_and_as_many_as_fit() -> None:
     assert not after(fit.plan, {"kind": "add", "n": 1}).plan.verdict.certified
 
 
+ROW: list[tuple[int, int]] = [(60 + 40 * k, 60) for k in range(8)]
 DEMANDS: list[dict[str, Any]] = [
     {"relation": "inside"},
     {"relation": "cage"},
@@ -176,7 +177,7 @@ DEMANDS: list[dict[str, Any]] = [
     {"relation": "between", "targets": ("t1", "t2")},
     {"relation": "shape", "shape": {"kind": "circle", "where": "around"}},
     {"relation": "shape", "line": (100, 60, 900, 60)},
-    {"relation": "at", "points": [(60 + 40 * k, 60) for k in range(8)]},
+    {"relation": "at", "points": ROW},
 ]
 
 
@@ -222,7 +223,7 @@ def test_one_robot_goes_elsewhere_and_nobody_else_moves(dx: float, dy: float, na
     assert groups(found)[-1][0] == "at"
     assert any("Robot 9 stands by itself" in note for note in found.plan.verdict.notes)
     if not found.plan.verdict.certified:
-        on_it = bool(shapely.intersects_xy(BOX.filled, *places(found)["9"]))
+        on_it = BOX.filled.covers(shapely.Point(places(found)["9"]))
         assert on_it or any(f.kind == "too_close" for f in found.plan.verdict.findings)
         assert {f.robot for f in found.plan.verdict.findings} <= {9, *map(int, FLEET)}
 
