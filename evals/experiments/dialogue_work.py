@@ -1,8 +1,4 @@
-"""Holds a dialogue with an agent, turn by turn, as a front end would, and grades every turn.
-
-Words that come while a question is open answer it; robots are allowed to move in the turn that
-says so and in no other.
-"""
+"""Holds a dialogue with an agent, turn by turn, as a front end does, and grades every turn."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from ...agent.agent import Agent, Run
-from ...agent.outcomes import Paused
+from ...agent.conversation import Session
 from ...tools.context import Settings
 from ...tools.perception.image import Picture
 from ...tools.perception.target_prompt import TargetPrompt
 from ..grading.dialogue import TurnGrade, grade_turn
 from ..grading.dialogue_states import NOTHING, State, case_of
-from ..tasks.task import Dialogue, Task, Turn
+from ..tasks.task import Dialogue, Task
 from .pointing import Pointing
 
 
@@ -59,7 +55,6 @@ def hold(
     agent: Agent,
     picture: Picture,
     task: Task,
-    dialogue: Dialogue,
     settings: Settings,
     pointing: Pointing,
     trace: Path | None,
@@ -69,35 +64,23 @@ def hold(
     Raises:
         ModelError, FleetError, OSError: as running an agent does.
     """
+    dialogue = task.dialogue
+    assert dialogue is not None
+    talk = Session(agent, picture)
     runs, states, grades = list[Run](), [NOTHING], list[TurnGrade]()
-    still = settings.model_copy(update={"may_deploy": False})
     for turn in dialogue.turns:
-        fixed = still.model_copy(update={"may_deploy": turn.expect == "go"})
-        if runs:
-            run = _said(agent, runs[-1], turn, fixed.model_copy(update={"robots": None}))
+        if talk.run is None:
+            still = settings.model_copy(update={"may_deploy": False})
+            shown: dict[str, Any] = pointing._asdict()
+            talk.run = agent.run(picture, turn.words, **shown, settings=still, trace=trace)
         else:
-            run = agent.run(
-                picture,
-                turn.words,
-                pointed=pointing.pointed,
-                targets=pointing.targets,
-                settings=fixed,
-                trace=trace,
-            )
-        runs.append(run)
-        after = state_of(run)
-        case = case_of(dialogue, states, after, task.metres_per_pixel)
-        grades.append(grade_turn(turn, case))
+            prompts = () if turn.point is None else (TargetPrompt(points=(turn.point,)),)
+            talk.say(turn.words, pointed=prompts)
+        runs.append(talk.run)
+        after = state_of(talk.run)
+        grades.append(grade_turn(turn, case_of(dialogue, states, after, task.metres_per_pixel)))
         states.append(after)
     return Held(runs, states[1:], grades)
-
-
-def _said(agent: Agent, run: Run, turn: Turn, settings: Settings) -> Run:
-    asked = isinstance(run.outcome, Paused) and run.outcome.call.name == "ask_user"
-    if asked and turn.point is None:
-        return agent.resume(run, answer=turn.words)
-    pointed = () if turn.point is None else (TargetPrompt(points=(turn.point,)),)
-    return agent.say(run, turn.words, pointed=pointed, settings=settings)
 
 
 def state_of(run: Run) -> State:

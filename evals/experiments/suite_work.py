@@ -101,7 +101,7 @@ class SuiteWork:
         """The row of a dialogue: it succeeds if every turn does; gcr is the share of those."""
         agent, settings, shown, trace = self._begin(task, arm, trial)
         picture = _picture(self.pictures[task.id])
-        held = hold(agent, picture, task, dialogue, settings, shown, trace)
+        held = hold(agent, picture, task, settings, shown, trace)
         cost = _cost(held.runs, agent, arm)
         lost = next(filter(None, map(_lost, held.runs)), None)
         if lost is not None:
