@@ -1,12 +1,11 @@
 """The agent: a model, the tools and the loop put together for a session about a picture."""
 
-import asyncio
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from ..prompts import PromptLibrary
 from ..tools.builtin import TOOLS
@@ -17,6 +16,7 @@ from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.tool import Tool
 from ..tools.world import Target, World, to_json_values
+from .conversation import Session, in_own_loop
 from .first_message import check_turn, first_message, numbered_anew
 from .limits import DEFAULT_LIMITS, Limits
 from .loop import ANYTHING, Approval
@@ -27,7 +27,15 @@ from .outcomes import Cancelled, Outcome, Paused, Stopped
 from .policy import Policy
 from .providers.registry import model_named
 from .report import Report, make_report
-from .session import LogRecorder, Run, Show, answered_by, picture_facts
+from .session import (
+    LogRecorder,
+    Run,
+    RunOptions,
+    SayOptions,
+    Show,
+    answered_by,
+    picture_facts,
+)
 from .session_start import FORMAT
 from .store.folder import FolderLog
 from .store.folder_store import FolderSession
@@ -37,22 +45,6 @@ from .wrappers.two_stages import offered, prompt_named, staged
 
 if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
-
-
-class SayOptions(TypedDict, total=False):
-    """What may be given with words; see `Agent.asay`."""
-
-    pointed: Sequence[TargetPrompt]
-    keep_out: Sequence[TargetPrompt]
-    settings: Settings | None
-    show: Show | None
-
-
-class RunOptions(SayOptions, total=False):
-    """What may be given with the first words; see `Agent.arun`."""
-
-    targets: Sequence[Target]
-    trace: Path | StoredSession | None
 
 
 class Agent:
@@ -162,6 +154,29 @@ class Agent:
         with closing(LogRecorder(log, context.services.artefacts, None, show)) as recorder:
             recorder.event("session", self._facts(picture, context) if log else {})
             return await self._turn(context, (), instruction, pointed, recorder, stored)
+
+    def start(
+        self,
+        picture: Picture,
+        *,
+        pointed: Sequence[TargetPrompt] = (),
+        keep_out: Sequence[TargetPrompt] = (),
+        settings: Settings | None = None,
+        stored: StoredSession | None = None,
+        auto: bool = False,
+    ) -> Session:
+        """Begin a conversation about a picture: `session.say("...")`, turn after turn.
+
+        Args:
+            picture: where.
+            pointed: the things meant, t1 first, if the person points.
+            keep_out: what no robot may enter.
+            settings: what the person fixed.
+            stored: a new session of a store, to be written to.
+            auto: whether simulated robots move as soon as a plan is certified, instead of at "go".
+        """
+        fixed, pointed, kept = settings or Settings(), tuple(pointed), tuple(keep_out)
+        return Session(self, picture, fixed, pointed, kept, stored, auto)
 
     def say(self, run: Run, words: str, **options: Unpack[SayOptions]) -> Run:
         """The next turn of a session; the synchronous door to `asay`.
@@ -350,12 +365,7 @@ class Agent:
             finally:
                 await self.aclose()
 
-        try:
-            asyncio.get_running_loop()
-        except RuntimeError:
-            return asyncio.run(closing())
-        run.close()
-        raise InputError("An event loop runs here already: await agent.arun(...) or aresume(...).")
+        return in_own_loop(closing())
 
 
 def _reopened(run: Run, show: Show | None) -> LogRecorder:

@@ -6,21 +6,21 @@ here and nowhere else, for every model alike.
 
 import asyncio
 import copy
-from collections.abc import Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import Any, Unpack
+from typing import Any, Protocol, Unpack
 
 from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
-from .agent import Agent, SayOptions
 from .first_message import standing
+from .model import Model
 from .offline.followups import read_followup
 from .offline.standing import Standing
 from .outcomes import Paused
-from .session import Run, Show
+from .session import Run, SayOptions, Show
 from .store.protocol import StoredSession
 from .wrappers.commands import Commands
 
@@ -30,6 +30,31 @@ STOP = frozenset({"stop", "halt", "freeze", "stop now", "stop it", "emergency st
 """Words that hold the robots at once, whoever else would have read them."""
 DROPS = frozenset({"query", "talk", "undo", "hold"})
 """Kinds of what is said that are no answer to a question, which is dropped for them."""
+
+
+class TurnTaker(Protocol):
+    """What works on turns: an `Agent`, whose methods these are."""
+
+    model: Model
+
+    @property
+    def arun(self) -> Callable[..., Awaitable[Run]]:
+        """See `Agent.arun`."""
+        ...
+
+    @property
+    def asay(self) -> Callable[..., Awaitable[Run]]:
+        """See `Agent.asay`."""
+        ...
+
+    @property
+    def aresume(self) -> Callable[..., Awaitable[Run]]:
+        """See `Agent.aresume`."""
+        ...
+
+    async def aclose(self) -> None:
+        """See `Agent.aclose`."""
+        ...
 
 
 @dataclass
@@ -48,7 +73,7 @@ class Session:
         run: the last turn; None before the first.
     """
 
-    agent: Agent
+    agent: TurnTaker
     picture: Picture
     settings: Settings = field(default_factory=Settings)
     pointed: tuple[TargetPrompt, ...] = ()
@@ -76,8 +101,15 @@ class Session:
         settings = await self._for_turn(words)
         self.pointed = ()
         if run is None:
-            given = {"pointed": pointed, "keep_out": self.keep_out, "settings": settings}
-            made = self.agent.arun(self.picture, words, trace=self.stored, show=show, **given)
+            made = self.agent.arun(
+                self.picture,
+                words,
+                pointed=pointed,
+                keep_out=self.keep_out,
+                settings=settings,
+                trace=self.stored,
+                show=show,
+            )
         else:
             keep = options.get("keep_out", ())
             made = self.agent.asay(

@@ -15,6 +15,7 @@ from ..tools.errors import StorageError
 from ..tools.perception.image import Picture
 from ..tools.store import write_whole
 from ..tools.world import World
+from ..tools.world_changes import with_changes
 from .session import load_run, model_name
 from .session_start import read_session
 from .store.folder import PICTURES, log_path, suffix_of
@@ -87,7 +88,7 @@ def _turns(events: Sequence[Event]) -> Iterator[Sequence[Event]]:
 
 def _after(world: World, turn: Sequence[Event]) -> World:
     for event in turn:
-        world = world.with_changes(event.data["changes"]) if event.kind == "world" else world
+        world = with_changes(world, event.data["changes"]) if event.kind == "world" else world
     return world
 
 

@@ -48,9 +48,14 @@ class Service:
             Its id.
         """
         stored = self.store.create(name)
-        given = {"pointed": tuple(pointed), "keep_out": tuple(keep_out), "stored": stored}
-        session = Session(self.agent, picture, settings or Settings(), auto=self.auto, **given)
-        self._sessions[stored.id] = session
+        self._sessions[stored.id] = self.agent.start(
+            picture,
+            pointed=pointed,
+            keep_out=keep_out,
+            settings=settings,
+            stored=stored,
+            auto=self.auto,
+        )
         return stored.id
 
     def reopen(self, session: str, picture: Picture | None = None) -> Session:

@@ -556,9 +556,7 @@ class _Reader:
             return Followup("instruction", text=text)
         first, last = form_in(text)[1]
         inside = text[first:last].lower()
-        strange = any(
-            "unknown" in c.kinds and c.kinds["unknown"] not in inside for c in chunks
-        )
+        strange = any("unknown" in c.kinds and c.kinds["unknown"] not in inside for c in chunks)
         if (
             settled
             and not strange

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from formup.agent.agent import Agent
+from formup.agent.fold import fold, read_messages
 from formup.agent.limits import Limits
 from formup.agent.messages import Call, Reply, Result, Usage, turn_of
 from formup.agent.model import Request
 from formup.agent.outcomes import Answered, Paused, Stopped
 from formup.agent.policy import Policy
 from formup.agent.providers.registry import model_named
-from formup.agent.session import Run, fold, load_run, read_messages
+from formup.agent.session import Run, load_run
 from formup.agent.store.folder import FolderArtefacts, read_events
 from formup.agent.wrappers.doubles import FunctionModel, ScriptedModel
 from formup.agent.wrappers.replay import ReplayModel

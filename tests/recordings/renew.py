@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from formup.agent.agent import Agent
+from formup.agent.fold import read_messages
 from formup.agent.messages import Reply
 from formup.agent.model import Request
-from formup.agent.session import read_messages
 from formup.agent.store.folder import read_events
 from formup.agent.store.protocol import Event
 from formup.agent.wrappers.replay import ReplayModel

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 from formup.agent.agent import Agent
+from formup.agent.fold import read_messages
 from formup.agent.limits import Limits
 from formup.agent.messages import History, Result
 from formup.agent.outcomes import Answered, Outcome, Stopped
-from formup.agent.session import Run, read_messages
+from formup.agent.session import Run
 from formup.agent.store.folder import PICTURES, FolderArtefacts, log_path, read_events
 from formup.tools.builtin import TOOLS
 from formup.tools.context import Context

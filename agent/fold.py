@@ -1,0 +1,137 @@
+"""What folds out of the events of a log: messages, world, settings, and the steps undo takes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..tools.context import Artefacts, Settings
+from ..tools.errors import InputError
+from ..tools.world import Step, World
+from ..tools.world_changes import after_turns, with_changes
+from .messages import HISTORY, History, paired
+from .store.protocol import Event
+
+GOES_ON = ("turn", "resume", "message")
+"""Events after which a turn that had ended is under way again."""
+
+
+@dataclass(frozen=True)
+class State:
+    """What folds out of the events of a log.
+
+    Attributes:
+        facts: what the session began with: model, prompts, limits, policy, picture.
+        words: of the last turn.
+        began: the world when that turn began.
+        steps: those that undo went through then.
+        seconds: how long that turn has run, pauses aside.
+        end: how it ended; None where it was killed.
+    """
+
+    facts: Mapping[str, Any]
+    settings: Settings
+    words: str
+    world: World
+    began: World
+    steps: tuple[Step, ...]
+    messages: History
+    seconds: float
+    end: Mapping[str, Any] | None
+
+
+def stepped(steps: tuple[Step, ...], before: int, step: Step, undone: int) -> tuple[Step, ...]:
+    """The steps undo goes through, after a turn; one that took steps back adds none.
+
+    Args:
+        before: how many steps were taken back when the turn began.
+        step: at its end.
+        undone: how many steps were taken back then.
+    """
+    if undone or step.current in (None, steps[-1].current):
+        return steps
+    return (*steps[: len(steps) - before], step)
+
+
+def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
+    """The state after all events.
+
+    Raises:
+        InputError: nothing was said, or a picture of a message is missing.
+        ValidationError, KeyError, TypeError, ValueError: they are damaged.
+    """
+    facts = events[0].data
+    start = World.model_validate({"picture": facts["picture"]["facts"]})
+    turns: list[list[Mapping[str, Any]]] = []
+    settings, words, end = Settings(), "", None
+    lines: list[Mapping[str, Any]] = []
+    seconds = last = 0.0
+    for event in _begun(events[1:]):
+        if event.kind in ("turn", "resume"):
+            seconds = 0.0 if event.kind == "turn" else seconds + last
+        last = event.seconds
+        if event.kind == "turn":
+            settings = Settings.model_validate(event.data["settings"])
+            words = event.data["words"]
+            turns.append([])
+        elif event.kind == "approval" and event.data["plan_id"]:
+            settings = settings.model_copy(update={"approved": event.data["plan_id"]})
+        elif event.kind == "world":
+            turns[-1].append(event.data["changes"])
+        elif event.kind == "message":
+            lines.append(event.data)
+        end = event.data if event.kind == "end" else end
+        end = None if event.kind in GOES_ON else end
+    if not words:
+        raise InputError("It was broken off before anything began; run again.")
+    began, steps = _steps_before(start, turns)
+    world = with_changes(began, *turns[-1])
+    latest = [name for name in (world.current, *list(world.plans)[-1:]) if name]
+    if any(world.plans[name].plan.id != name for name in latest):  # others as they are used
+        raise InputError("Its plans were altered after formup wrote them; make them again.")
+    messages = paired(read_messages(lines, artefacts))
+    return State(facts, settings, words, world, began, steps, messages, seconds + last, end)
+
+
+def _steps_before(
+    start: World, turns: Sequence[Sequence[Mapping[str, Any]]]
+) -> tuple[World, tuple[Step, ...]]:
+    """The world when the last turn began, and the steps undo went through then.
+
+    The first step is what was there with the first words, before anything was planned.
+    """
+    said, *rest = turns[0][:1], turns[0][1:], *turns[1:]
+    began, ends = after_turns(start, [said, *rest[:-1]])
+    (first, undone), *later = ends
+    steps = (first,)
+    for step, now in later:
+        steps, undone = stepped(steps, undone, step, now), now
+    return began, steps
+
+
+def _begun(events: Sequence[Event]) -> Sequence[Event]:
+    """The events but for turns that were broken off before their first message."""
+    kept: list[Event] = []
+    turn: int | None = None
+    for event in events:
+        if event.kind == "turn":
+            kept = kept[:turn]
+            turn = len(kept)
+        elif event.kind == "message":
+            turn = None
+        kept.append(event)
+    return kept[:turn]
+
+
+def read_messages(lines: Sequence[Mapping[str, Any]], artefacts: Artefacts | None) -> History:
+    """Messages from the data of their events; without artefacts their images are left out.
+
+    Raises:
+        StorageError: an image is missing, or not what it was.
+        ValidationError: they are no messages.
+    """
+    found: list[dict[str, Any]] = []
+    for line in lines:
+        images = [artefacts.get(i["sha256"]) for i in line["images"]] if artefacts else []
+        facts = {k: v for k, v in line.items() if k != "images"}
+        found.append(facts | ({} if line["role"] == "assistant" else {"images": images}))
+    return HISTORY.validate_python(found)
