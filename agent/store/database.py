@@ -7,6 +7,7 @@ back when the process ends.
 
 import hashlib
 import secrets
+import sqlite3
 import time
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -126,14 +127,13 @@ class DatabaseStore:
                 stack.callback(file.close)
                 stack.callback(_unlink, path)
                 return stack
-            connection = self._engine.connect()
-            connection.detach()  # when it is gone, so is the lock
-            stack.callback(connection.close)
+            connection = stack.enter_context(self._engine.connect())
             number = _lock_number(session)
-            if not connection.scalar(select(func.pg_try_advisory_lock(number))):
+            taken = connection.scalar(select(func.pg_try_advisory_lock(number)))
+            connection.commit()  # the lock is the connection's, and gone when that is
+            if not taken:
                 stack.close()
                 return None
-            connection.commit()
             stack.callback(_unlock, connection, number)
             return stack
 
@@ -154,7 +154,7 @@ class DatabaseStore:
     def _as_storage_errors(self) -> Generator[None]:
         try:
             yield
-        except (SQLAlchemyError, OSError) as error:
+        except (SQLAlchemyError, sqlite3.Error, OSError) as error:
             cause = error.orig if isinstance(error, DBAPIError) else error
             first = str(cause).strip().partition("\n")[0]  # further lines may show what was said
             raise StorageError(f"{self.label} cannot be used: {first}.") from None
@@ -339,9 +339,10 @@ def _lock_number(session: str) -> int:
 
 
 def _unlock(connection: Connection, number: int) -> None:
-    """At once: a server takes a while to see that a connection is closed."""
-    with suppress(SQLAlchemyError):
+    try:
         connection.scalar(select(func.pg_advisory_unlock(number)))
+    except SQLAlchemyError:
+        connection.invalidate()  # nobody shall be given it with the lock
 
 
 def _unlink(path: Path) -> None:

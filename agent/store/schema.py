@@ -4,6 +4,7 @@ One schema with its version: made where there is none of it, refused where it is
 part of it. SQLite waits its turn before it reads (BEGIN IMMEDIATE), PostgreSQL by locked rows.
 """
 
+import sqlite3
 import time
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from sqlalchemy import (
     select,
     text,
 )
-from sqlalchemy.exc import ArgumentError, NoSuchModuleError, OperationalError
+from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
 from ...tools.errors import InputError, StorageError
 
@@ -133,7 +134,13 @@ def _sqlite(address: URL) -> Engine:
 
 def _postgresql(address: URL) -> Engine:
     waits = {"connect_timeout": PATIENCE, "options": f"-c lock_timeout={PATIENCE}s"}
-    return create_engine(address, hide_parameters=True, pool_pre_ping=True, connect_args=waits)
+    return create_engine(
+        address,
+        hide_parameters=True,
+        pool_pre_ping=True,
+        max_overflow=-1,  # each session that is written holds one
+        connect_args=waits,
+    )
 
 
 def prepare(engine: Engine, label: str) -> None:
@@ -141,7 +148,7 @@ def prepare(engine: Engine, label: str) -> None:
 
     Raises:
         StorageError: there are others, or only some of them.
-        SQLAlchemyError: the database cannot be used.
+        SQLAlchemyError, sqlite3.Error: the database cannot be used.
     """
     if engine.dialect.name == "sqlite":
         _write_ahead(engine)
@@ -186,12 +193,11 @@ def _write_ahead(engine: Engine) -> None:
     while True:
         try:
             with engine.connect() as connection:
-                raw = connection.connection.dbapi_connection
-                assert raw is not None
-                raw.cursor().execute("PRAGMA journal_mode = WAL")
+                raw = connection.connection.cursor()
+                raw.execute("PRAGMA journal_mode = WAL")
+                raw.close()
             return
-        except Exception as error:
-            locked = "locked" in str(error)
-            if not locked or time.monotonic() > until:
-                raise OperationalError("PRAGMA", None, error) from None  # type: ignore[arg-type]
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error) or time.monotonic() > until:
+                raise
             time.sleep(0.01)

