@@ -15,14 +15,14 @@ from shapely.geometry import LineString
 from ...errors import ToolError
 from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import along_curve, corner_points, nearest
-from ..contract import MAX_LENGTH, OUTSIDE, SideName, exact_clearance
+from ..contract import MAX_LENGTH, OUTSIDE, SideName, exact_clearance, has_default_clearance
 from ..placement.figure import figure_of
 from ..placement.pitch import pitch_places
 from ..placement.ring_parts import opening_way
 from .edit_forms import DECIMALS, Affine, form_after
 from .edit_kinds import Mirror, Offset, Rotate, Scale, Shift, SideOnly
 from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
-from .respacing import Track, feet_on, moved_out, pushed, track, track_at
+from .respacing import Track, feet_on, moved_out, pushed, respaced, track, track_at
 
 QUARTERS: tuple[SideName, ...] = ("left", "top", "right", "bottom")
 """Clockwise as seen."""
@@ -61,7 +61,13 @@ def _offset(part: Part, edit: Offset) -> Part:
         greatest = MAX_LENGTH
     if group.radius is not None:
         return _resized(part, (group.radius + by) / group.radius, (least, greatest))
-    return part.to(_beyond(part, here, by, (least, greatest)), clearance=(least, greatest))
+    moved = part.to(_beyond(part, here, by, (least, greatest)), clearance=(least, greatest))
+    if here is None or group.pitch is not None or moved.certified or not part.certified:
+        return moved
+    there = track_at(moved.group, part.site, part.radius, here.offset + by)
+    slots, takes = respaced(there, moved.points, len(moved.points))
+    even = replace(moved, points=slots[takes])
+    return even if even.certified else moved
 
 
 def _pushed(part: Part, edit: Offset) -> Part:
@@ -171,8 +177,18 @@ def _edges_after(part: Part, there: Affine) -> tuple[int, ...]:
 
 
 def _shifted(part: Part, edit: Shift) -> Part:
-    centre = part.centre
-    return rigid(part, np.eye(2), centre, centre + np.array([edit.dx, edit.dy]))
+    """As it stands; a usual distance from the target makes room for that, a named one does not."""
+    group, centre = part.group, part.centre
+    there = rigid(part, np.eye(2), centre, centre + np.array([edit.dx, edit.dy]))
+    usual = has_default_clearance(group, part.site.outlines, part.site.room, part.radius)
+    if group.clearance is None or group.relation not in OUTSIDE or not usual:
+        return there
+    off, (least, greatest) = _edges_off(there), group.clearance
+    if off.min() <= 0:
+        return there
+    least, greatest = min(least, float(off.min())), max(greatest, float(off.max()))
+    clearance = (math.floor(least * 1e3) / 1e3, math.ceil(greatest * 1e3) / 1e3)
+    return there.to(there.points, clearance=clearance)
 
 
 def scaled(part: Part, edit: Scale) -> Part:

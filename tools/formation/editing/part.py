@@ -88,9 +88,9 @@ class Part:
 
     def track(self, count: int) -> Track:
         """The curve its robots stand on, and would if there were `count`."""
-        if self.group.relation in ON_CURVE:
-            return track(self.group, self.points, self.site, self.radius)
         group = self.group.model_copy(update={"robots": count})
+        if self.group.relation in ON_CURVE:
+            return track(group, self.points, self.site, self.radius)
         return Track(Point(), 0.0, reference_curve(group, self.site, self.radius))
 
     def valid_group(self, **update: object) -> Group:

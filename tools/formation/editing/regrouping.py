@@ -156,8 +156,10 @@ def _going(draft: Draft, edit: Target) -> IntArray:
     points = np.concatenate([part.points for part in mine]) if mine else np.empty((0, 2))
     free = (was >= 0) & ~np.isin(was, list(draft.held))
     count = edit.robots or 0
+    if not free.any():
+        raise ToolError(f"The robots are at {edit.to} already.")
     if count > free.sum():
-        raise ToolError(f"{count} robots cannot go to {edit.to}: {free.sum()} can.")
+        raise ToolError(f"{count} robots cannot go to {edit.to}: only {free.sum()} could.")
     away = distances(draft.site.outlines[edit.to].filled, points[free])
     return was[free][np.argsort(away, kind="stable")[:count]]
 
@@ -165,7 +167,9 @@ def _going(draft: Draft, edit: Target) -> IntArray:
 def merged(draft: Draft, edit: Merge) -> Draft:
     """Groups of one relation as one, with those who stand at points of their own."""
     first = next((p for p in draft.parts if p.group.relation != "at"), draft.parts[0])
-    alike = [p for p in draft.parts if p.group.relation in (first.group.relation, "at")]
+    rings = ("around", "cage") if first.group.relation in ("around", "cage") else ()
+    same = {first.group.relation, "at", *rings}
+    alike = [p for p in draft.parts if p.group.relation in same]
     if len(alike) < 2 and edit.to is None:
         raise ToolError("There is nothing to merge: no two groups have the same arrangement.")
     others = [p for p in draft.parts if all(p is not a for a in alike)]

@@ -228,3 +228,23 @@ def test_what_is_left_of_the_way_round_in_the_picture_is_enough_for_sides() -> N
     found = edited(plan, edit, site, lambda _: "s")
     assert found.plan.verdict.certified
     assert shapely.box(0, 0, 999, 424).covers(shapely.multipoints(points(found)))
+
+
+@given(st.floats(-14, 14), st.floats(-14, 14), st.sampled_from(["around", "cage"]))
+@MANY
+def test_a_usual_distance_makes_room_for_a_shift_and_a_named_one_does_not(
+    dx: float, dy: float, relation: str
+) -> None:
+    found = after(standing(relation), {"kind": "shift", "dx": dx, "dy": dy})
+    assert found.plan.verdict.certified
+    named = after(standing(relation, clearance=(19, 21)), {"kind": "shift", "dx": 12})
+    assert {f.kind for f in named.plan.verdict.findings} == {"too_near", "too_far"}
+
+
+@given(st.integers(4, 10), st.integers(1, 3))
+@MANY
+def test_a_ring_with_an_opening_keeps_it_with_fewer_and_with_more(n: int, k: int) -> None:
+    plan = standing(n=n, opening_towards="left")
+    for edit in ({"kind": "remove", "n": k}, {"kind": "add", "n": k}):
+        if edit["kind"] == "add" or n - k > 1:
+            assert after(plan, edit).plan.verdict.findings == ()

@@ -375,7 +375,7 @@ def test_edits_one_after_another_are_one_change() -> None:
     [
         ({"kind": "merge"}, "nothing to merge"),
         ({"kind": "target", "to": "t1"}, "at t1 already"),
-        ({"kind": "target", "to": "t2", "robots": 9}, "9 robots cannot go to t2: 8 can"),
+        ({"kind": "target", "to": "t2", "robots": 9}, "9 robots cannot go to t2: only 8 could"),
         ({"kind": "place", "robot": 99, "by": [1, 1]}, "no robot 99"),
         ({"kind": "count", "robots": 3, "group": 2}, "no group 2"),
     ],
