@@ -225,7 +225,6 @@ def way(slots: Slots, said: Said) -> tuple[float, float] | None:
         len(vectors) > 2
         or len({abs(x) for x, _ in vectors}) < len(vectors)
         or (slots.has("num", "px") and length is None)
-        or "in" in slots.get("radial", ())
     ):
         return None
     share = float(slots["share"][0]) if "share" in slots else WAY[much_of(slots)]
@@ -262,13 +261,15 @@ def place(slots: Slots, said: Said) -> Effects:
             return to
         alone: Effect = {"kind": "place", "robot": robots[0], "target": to}
         return [{"kind": "target", "to": to, "robots": robots} if len(robots) > 1 else alone]
+    if slots.has("dir") and slots.has("radial"):
+        return None
     if "dir" in slots:
         by = way(slots, said)
         return (
             None if by is None else [{"kind": "place", "robot": r, "by": list(by)} for r in robots]
         )
     ways, length = set(slots.get("radial", ())), bare_length(slots)
-    if len(ways) != 1:
+    if len(ways) != 1 or (length is None and slots.has("num", "px")):
         return None
     length = round(WAY[much_of(slots)] * min(said.standing.size)) if length is None else length
     return [{"kind": "place", "robot": r, "by": {next(iter(ways)): length}} for r in robots]

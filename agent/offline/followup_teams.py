@@ -136,6 +136,8 @@ def target(slots: Slots, said: Said) -> Effects:
     if "neg" in slots and "current" not in slots and len(slots.get("other", ())) < 2:
         return None
     if "between" in slots.get("relation", ()):
+        if "neg" in slots:
+            return None
         ends = [*slots.get("current", ()), to]
         return (
             [{"kind": "arrange", "demands": {"relation": "between", "targets": ends}}]
@@ -160,7 +162,7 @@ def split(slots: Slots, said: Said) -> Effects:
     """Some there, the rest here."""
     named = [r for robots in slots.get("robots", ()) for r in robots]
     n = whole(slots)
-    if len(set(slots.get("num", ()))) > 1:
+    if len(set(slots.get("num", ()))) > 1 or ("num" in slots and "portion" in slots):
         return None
     if "portion" in slots:
         n = max(said.count // SHARES[slots["portion"][0]], 1)
@@ -171,7 +173,7 @@ def split(slots: Slots, said: Said) -> Effects:
     if relation not in ("around", said.standing.relation):
         return None
     if named and not slots.has("rest", "portion", "split"):
-        return place(slots, said)
+        return None if "num" in slots else place(slots, said)
     fresh = PLACING.search(said.words) and not slots.has("rest", "here", "stay")
     if not named and (n is None or n > said.count or fresh):
         return None
@@ -386,7 +388,7 @@ def arrange(slots: Slots, said: Said) -> Effects:
         return target(slots, said)
     if relation == "between":
         return None
-    if relation == said.standing.relation and "px" not in slots and "flank" not in slots:
+    if relation == said.standing.relation and not slots.has("px", "flank", "side"):
         return [{"kind": "talk", "about": "already"}]
     edits.append({"kind": "arrange", "demands": _group(relation, slots)})
     if "px" in slots:
@@ -398,5 +400,7 @@ def _group(relation: str, slots: Slots) -> Effect:
     """The fields of the group of an arrangement."""
     group: Effect = {"relation": relation}
     if relation == "along":
-        group["side"] = SIDE_OF.get(side := str(slots.get("flank", ["long"])[0]), side)
+        slots.has("onword", "only")
+        said = str((slots.get("flank") or slots.get("side") or ["long"])[0])
+        group["side"] = SIDE_OF.get(said, said)
     return group | ({"closure": "ring"} if relation == "cage" else {})

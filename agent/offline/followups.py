@@ -555,20 +555,15 @@ class _Reader:
         if settled and (reading.robots or things) and (things or reading.things):
             return Followup("instruction", text=text)
         first, last = form_in(text)[1]
-        inside = text[first:last].lower()
-        strange = any("unknown" in c.kinds and c.kinds["unknown"] not in inside for c in chunks)
-        if (
-            settled
-            and not strange
-            and not things
-            and reading.relation != "between"
-            and (reading.form is not None or reading.relation != "shape")
-        ):
-            group = dict(
-                contract_of(reading, reading.robots or len(self.standing.robots), [], [])["groups"][
-                    0
-                ]
-            )
+        drawn = text[first:last].lower()
+        known = {*rules()["common"], *rules()["void"], "relation", "thing"}
+        strange = [
+            c for c in chunks if not (set(c.kinds) & known or self._words_of([c]).lower() in drawn)
+        ]
+        if settled and reading.form is not None and not strange and not things:
+            group = contract_of(reading, reading.robots or len(self.standing.robots), [], [])[
+                "groups"
+            ][0]
             counted: list[Effect] = (
                 [{"kind": "count", "robots": reading.robots}] if reading.robots else []
             )
