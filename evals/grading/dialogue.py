@@ -105,7 +105,8 @@ def _by_kind(turn: Turn, case: Case) -> Iterator[str]:
 
 
 def _new(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
-    """What holds of every new plan; an edit is of the one before and keeps robots' ids."""
+    """What holds of every new plan; an edit is of one that stood (a correction may be of an earlier
+    one) and keeps robots' ids."""
     before, after = case.before, case.after
     if after.plan_id == before.plan_id:
         yield "the plan is the same as before"
@@ -113,7 +114,7 @@ def _new(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
         yield "the plan is not certified"
     if expect == "plan":
         return
-    if after.parent != before.plan_id:
+    if after.parent is None or after.parent not in {state.plan_id for state in case.past}:
         yield f"the plan's parent is {after.parent}, not {before.plan_id}"
     if not counted and set(after.robots) != set(before.robots):
         yield f"the robots are {', '.join(after.robots)}, not {', '.join(before.robots)}"

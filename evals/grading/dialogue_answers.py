@@ -10,7 +10,7 @@ from .dialogue_forms import gaps_around
 from .dialogue_states import Case, distances_to
 
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:,\d{3})*(?:\.\d+)?")
-_NO = re.compile(r"\b(?:no|not|isn't|open|opening|gap)\b", re.IGNORECASE)
+_NO = re.compile(r"\b(?:no|not|isn't|open)\b", re.IGNORECASE)
 PX, SHARE = 3.0, 0.15
 
 
