@@ -1,0 +1,220 @@
+"""Conversations: turns change the plan that stands, go moves robots, stop holds them."""
+
+import asyncio
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formup.agent.agent import Agent
+from formup.agent.conversation import Session
+from formup.agent.messages import Call, Reply
+from formup.agent.outcomes import Cancelled
+from formup.agent.service import Service
+from formup.agent.session import Run
+from formup.agent.store.folder_store import FolderStore
+from formup.agent.wrappers.doubles import FunctionModel
+from formup.tools.context import Settings
+from formup.tools.errors import InputError
+from formup.tools.fleet.protocol import Motion
+from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.target_prompt import TargetPrompt
+
+RED, BLUE = (150, 130, 220, 190), (380, 150, 440, 210)
+
+
+@pytest.fixture(scope="module")
+def picture() -> Picture:
+    pixels = np.full((340, 560, 3), 60, np.uint8)
+    pixels[135:185, 155:215] = (200, 40, 40)
+    pixels[155:205, 385:435] = (40, 60, 210)
+    return picture_from_array(pixels)
+
+
+@pytest.fixture
+def session(picture: Picture) -> Session:
+    """Eight robots around the red thing; nobody has moved."""
+    made = Agent().start(picture, pointed=[TargetPrompt(box=RED)], settings=Settings(robots=8))
+    assert made.say("Surround it").report.status == "planned"
+    return made
+
+
+def distance(run: Run) -> float:
+    verdict = run.report.verdict
+    assert verdict is not None
+    return float(verdict.measures["min_clearance_px"])
+
+
+def test_robots_move_at_go_and_not_before(session: Session, drives: list[Motion]) -> None:
+    before = session.run
+    assert before is not None
+    further = session.say("a bit further out")
+    assert further.report.status == "planned"
+    assert further.report.parent == before.report.plan_id
+    assert distance(further) == pytest.approx(1.25 * distance(before), rel=0.05)
+    assert not drives
+    went = session.say("go")
+    assert went.report.status == "deployed"
+    assert drives
+    assert went.report.plan_id == further.report.plan_id
+    closer = session.say("closer again")
+    assert closer.report.status == "planned", "go holds for its turn"
+
+
+def test_at_once_where_a_person_wants_that_but_not_while_held(picture: Picture) -> None:
+    auto = Agent().start(
+        picture, pointed=[TargetPrompt(box=RED)], settings=Settings(robots=6), auto=True
+    )
+    assert auto.say("Surround it").report.status == "deployed"
+    assert auto.say("don't move yet").report.status == "answered"
+    assert auto.say("a bit further out").report.status == "planned"
+    assert auto.say("go").report.status == "deployed"
+    assert auto.say("closer").report.status == "deployed"
+
+
+def test_undo_redo_and_edits_are_turns_that_ask_no_model(session: Session) -> None:
+    first = session.run
+    assert first is not None
+    asked: list[int] = []
+
+    def model(request: object) -> Reply:
+        asked.append(1)
+        return Reply(text="?")
+
+    session.agent = Agent(FunctionModel(model))
+    second = session.edit({"kind": "rotate", "degrees": 10})
+    assert second.report.parent == first.report.plan_id
+    back = session.undo()
+    assert back.report.status == "planned"
+    assert (back.report.plan_id, back.report.positions) == (
+        first.report.plan_id,
+        first.report.positions,
+    )
+    assert "do not move back" in back.report.message
+    again = session.undo(-1)
+    assert again.report.plan_id == second.report.plan_id
+    assert session.undo(to="first").report.plan_id == first.report.plan_id
+    nothing = session.undo(steps=4)
+    assert nothing.report.plan_id == first.report.plan_id
+    assert "nothing to undo" in nothing.report.message
+    assert session.go().report.status == "deployed"
+    assert asked == []
+
+
+def test_a_new_plan_after_going_back_takes_the_place_of_what_was_undone(session: Session) -> None:
+    first = session.run
+    assert first is not None
+    session.edit({"kind": "out", "px": 5})
+    session.undo()
+    third = session.edit({"kind": "out", "px": 9})
+    assert session.undo(-1).report.plan_id == third.report.plan_id
+    assert session.undo().report.plan_id == first.report.plan_id
+
+
+def test_a_fork_leaves_the_other_as_it_was(session: Session) -> None:
+    other = session.fork()
+    changed = other.say("a bit further out")
+    assert session.run is not None
+    assert session.run.report.plan_id == changed.report.parent
+    assert session.say("turn it 20 degrees").report.parent == changed.report.parent
+
+
+def test_a_question_is_dropped_for_what_is_no_answer_to_it(session: Session) -> None:
+    asked = session.say("move the flurb")
+    assert asked.report.status == "question"
+    told = session.say("how far is robot 4?")
+    assert told.report.status == "answered"
+    assert told.report.plan_id == asked.report.plan_id
+
+
+def test_what_is_pointed_at_answers_which(session: Session) -> None:
+    moved = session.say("the same around this one", pointed=[TargetPrompt(box=BLUE)])
+    assert moved.report.status == "planned"
+    assert moved.report.contract is not None
+    assert moved.report.contract.groups[0].targets == ("t2",)
+    assert moved.report.robots == tuple(str(i) for i in range(1, 9))
+
+
+def test_it_works_inside_a_running_event_loop(session: Session) -> None:
+    async def notebook() -> Run:
+        return session.say("a bit further out")
+
+    assert asyncio.run(notebook()).report.status == "planned"
+
+
+def test_commands_before_anything_was_said_are_refused(picture: Picture) -> None:
+    empty = Agent().start(picture)
+    for command in (empty.undo, empty.go):
+        with pytest.raises(InputError, match="Say what to do first"):
+            command()
+
+
+def test_stop_holds_the_robots_until_go_with_the_model_unreachable(
+    session: Session, drives: list[Motion]
+) -> None:
+    session.agent = Agent("openai:nobody", base_url="http://127.0.0.1:9/v1")
+    held = session.say("Stop!")
+    assert "held" in held.report.message
+    session.agent = Agent()
+    assert session.say("a bit further out").report.status == "planned"
+    assert not drives
+    assert session.say("go").report.status == "deployed"
+
+
+class TestService:
+    """Many conversations, one turn at a time in each."""
+
+    def test_a_stored_conversation_goes_on_in_another_process(
+        self, picture: Picture, tmp_path: Path
+    ) -> None:
+        async def talk() -> tuple[str, Run]:
+            service = Service(Agent(), FolderStore(tmp_path))
+            name = service.open(
+                picture, settings=Settings(robots=8), pointed=[TargetPrompt(box=RED)]
+            )
+            await service.say(name, "Surround it")
+            last = await service.say(name, "a bit further out")
+            await service.close()
+            return name, last
+
+        async def go_on(name: str) -> tuple[Run, Run]:
+            service = Service(Agent(), FolderStore(tmp_path))
+            service.reopen(name)
+            back = await service.undo(name)
+            fork = service.fork(name, 1)
+            forked = await service.say(fork, "turn it 15 degrees")
+            assert len(service.events(name)) > 5
+            await service.close()
+            return back, forked
+
+        name, last = asyncio.run(talk())
+        back, forked = asyncio.run(go_on(name))
+        assert back.report.plan_id == last.report.parent
+        assert forked.report.parent == back.report.plan_id
+
+    def test_stop_passes_while_a_turn_is_under_way(self, picture: Picture, tmp_path: Path) -> None:
+        box = {"id": "t1", "box": RED}
+        group = {"relation": "around", "targets": ["t1"], "robots": 6}
+        arguments = {"contract": {"groups": [group]}, "targets": [box]}
+
+        class Slow:
+            name = "slow"
+
+            async def reply(self, request: object) -> Reply:
+                await asyncio.sleep(60)
+                return Reply(calls=(Call(id="1", name="propose_formation", arguments=arguments),))
+
+        async def talk() -> tuple[Run, Run | None]:
+            service = Service(Agent(Slow()), FolderStore(tmp_path))
+            name = service.open(picture)
+            turn = asyncio.create_task(service.say(name, "Surround it"))
+            await asyncio.sleep(0.2)
+            with pytest.raises(InputError, match="under way") as busy:
+                await service.say(name, "and now?")
+            assert busy.value.kind == "busy"
+            stopped = await service.stop(name)
+            return await turn, stopped
+
+        run, stopped = asyncio.run(talk())
+        assert isinstance(run.outcome, Cancelled)
+        assert stopped is not None
+        assert stopped.report.status == "stopped"
