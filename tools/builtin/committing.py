@@ -51,16 +51,16 @@ async def propose_formation(
     samples: Annotated[tuple[str, ...] | None, FilledBy("sample_inside")] = None,
     tell: str | None = None,
 ) -> ToolResult:
-    """State what the instruction demands; robots are placed so and certified.
+    """State what is demanded; robots are placed so and certified.
 
     Args:
         contract: its robots add up to Robots, or the words' number. unit: of lengths, where
             Metres per pixel is told; places are px. keep_out: further ids no robot may touch.
             reading: only after a doubt, why this is meant.
-        targets: things meant that are not measured yet, or to correct.
-        positions: (x, y) of every robot in order of the groups, to place them yourself.
+        targets: things meant, not measured yet or to correct.
+        positions: (x, y) of all robots in order of the groups, to place them yourself.
         samples: names of samples (s1, ...) to place them at.
-        tell: to the person, where Deploy is false: ends the turn once the plan is certified.
+        tell: to the person, where Deploy is false; ends the turn.
     """
     if positions is not None and samples is not None:
         raise ToolError("propose_formation: give positions or samples, not both.")
@@ -245,7 +245,7 @@ def ask_user(
     candidates: tuple[str, ...] = (),
     contract: SkipJsonSchema[Contract | None] = None,
 ) -> ToolResult:
-    """Ask the person what the instruction leaves open; ends the turn.
+    """Ask the person what is left open; ends the turn.
 
     Args:
         question: one, clear.
@@ -272,7 +272,7 @@ def report_impossible(
     plan_id: str | None = None,
     contract: SkipJsonSchema[Contract | None] = None,
 ) -> ToolResult:
-    """Say that the instruction cannot be carried out; ends the turn.
+    """Say that it cannot be done; ends the turn.
 
     Args:
         reason: one sentence with the numbers.

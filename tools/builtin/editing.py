@@ -5,9 +5,10 @@ Whatever an edit does not name stays as it is, and every robot keeps its number.
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import WithJsonSchema
 
 from ..context import Context
 from ..errors import ToolError
@@ -27,6 +28,11 @@ MOST_MOVES = 12
 """Robots of a reply whose ways are listed; of the others the number and the longest."""
 STAYS = 0.05
 """A robot whose place is nearer than this to the one it had, px, stays."""
+SHORT = {
+    "type": "array",
+    "items": {"type": "object", "properties": {"id": {}, "label": {}, "outline": {}, "box": {}}},
+}
+"""Schema of targets that models are offered; the whole one is told with propose_formation."""
 NOT_MOVED = "robots stay where they are until deploy"
 
 
@@ -35,7 +41,7 @@ async def edit_formation(
     context: Context,
     edits: tuple[Edit, ...],
     plan_id: str | None = None,
-    targets: tuple[TargetPrompt, ...] = (),
+    targets: Annotated[tuple[TargetPrompt, ...], WithJsonSchema(SHORT)] = (),
     stay: tuple[int, ...] = (),
     tell: str | None = None,
 ) -> ToolResult:
@@ -44,7 +50,7 @@ async def edit_formation(
     Args:
         edits: in order.
         plan_id: to change an earlier plan instead.
-        targets: things the edits name that are not measured yet.
+        targets: things the edits name that are not measured yet, as of propose_formation.
         stay: numbers of robots that are not to move.
         tell: as of propose_formation.
     """

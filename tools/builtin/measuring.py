@@ -88,10 +88,10 @@ def check_point(context: Context, target: str, points: tuple[Point, ...]) -> Too
 
 @tool("read")
 def measure(context: Context, a: str | Point, b: str | Point | None = None) -> ToolResult:
-    """Measure nearest and centre distance and direction from a to b; or the plan that stands.
+    """Measure distances and direction from a to b; or the plan: places, distances, openings.
 
     Args:
-        a: id, (x, y), r3 for robot 3; or plan alone: each robot's place and distances, openings.
+        a: id, (x, y) or r3 for robot 3; plan, alone.
         b: likewise.
     """
     if a == PLAN:

@@ -220,15 +220,10 @@ class KeepOff(_Edit):
     ids: tuple[str, ...] = Field(min_length=1)
 
 
-_FIELDS: dict[str, tuple[str, ...]] = {
-    "integer": ("group", "n", "a", "b", "robot"),
-    "number": ("px", "factor", "degrees", "dx", "dy"),
-    "string": ("kind", "axis", "side", "target"),
-    "boolean": ("stay",),
-    "object": ("demands",),
-}
-_LISTS = {"only": "string", "without": "string", "ids": "string", "by": "number"}
-_OF_ANY_TYPE: tuple[str, ...] = ("robots", "towards", "to")
+_NAMES = (
+    *("group", "n", "a", "b", "robot", "robots", "px", "factor", "degrees", "dx", "dy", "axis"),
+    *("side", "only", "without", "towards", "demands", "to", "by", "target", "stay", "ids"),
+)
 EDIT_SCHEMA: dict[str, Any] = {
     "type": "object",
     "description": (
@@ -241,9 +236,7 @@ EDIT_SCHEMA: dict[str, Any] = {
         "count or numbers), the rest stay. merge. place: robot to [x, y], by [dx, dy] or target. "
         "heading: to. keep-out: ids. group: which, if several."
     ),
-    "properties": {name: {"type": type_} for type_, names in _FIELDS.items() for name in names}
-    | {name: {"type": "array", "items": {"type": type_}} for name, type_ in _LISTS.items()}
-    | {name: {} for name in _OF_ANY_TYPE},
+    "properties": {"kind": {"type": "string"}, **{name: {} for name in _NAMES}},
     "required": ["kind"],
 }
 """The union in short, as models are offered it; the union itself says what does not fit."""
