@@ -275,6 +275,42 @@ def place(slots: Slots, said: Said) -> Effects:
     return [{"kind": "place", "robot": r, "by": {next(iter(ways)): length}} for r in robots]
 
 
+def heading(slots: Slots, said: Said) -> Effects:
+    """Which way robots look."""
+    slots.has("turn")
+    if "unface" in slots:
+        return [{"kind": "heading", "to": None}]
+    if "there" in slots or "other" in slots or "thing" in slots:
+        to = where(slots, said, "face {}")
+        return to if isinstance(to, list) else [{"kind": "heading", "to": to}]
+    if "dir" in slots:
+        return [{"kind": "heading", "to": DEGREES[slots["dir"][0]]}]
+    if "otherway" in slots:
+        now = said.standing.groups[0].get("heading")
+        return (
+            [{"kind": "heading", "to": "away" if now == "towards" else "towards"}]
+            if now in ("towards", "away")
+            else None
+        )
+    if "inward" in slots:
+        to = slots["inward"][0]
+        backs = "backs" in slots["face"]
+        return [
+            {"kind": "heading", "to": {"towards": "away", "away": "towards"}[to] if backs else to}
+        ]
+    return [{"kind": "heading", "to": float(slots.get("angle", slots.get("num", [0]))[0])}]
+
+
+def keepout(slots: Slots, said: Said) -> Effects:
+    """Robots stay off another thing."""
+    if not slots.has("thing", "there", "other"):
+        return ask(
+            f'Which thing is to be kept clear of in "{said.words}"? Point at it, or name it.'
+        )
+    to = where(slots, said, "keep clear of {}")
+    return to if isinstance(to, list) else [{"kind": "keep-out", "ids": [to]}]
+
+
 def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Effect]:
     """The id of the thing meant, its words after "?" where it has to be found, or a question."""
     standing = said.standing

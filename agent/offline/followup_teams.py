@@ -4,7 +4,6 @@ import re
 
 from ...tools.formation.contract import MAX_ROBOTS
 from .followup_edits import (
-    DEGREES,
     OPPOSITE,
     RINGS,
     SIDE_OF,
@@ -338,42 +337,6 @@ def opened(slots: Slots, said: Said) -> Effects:
 def cage(slots: Slots, said: Said) -> Effects:
     """Nothing gets out."""
     return [{"kind": "escape-proof"}]
-
-
-def heading(slots: Slots, said: Said) -> Effects:
-    """Which way robots look."""
-    slots.has("turn")
-    if "unface" in slots:
-        return [{"kind": "heading", "to": None}]
-    if "there" in slots or "other" in slots or "thing" in slots:
-        to = where(slots, said, "face {}")
-        return to if isinstance(to, list) else [{"kind": "heading", "to": to}]
-    if "dir" in slots:
-        return [{"kind": "heading", "to": DEGREES[slots["dir"][0]]}]
-    if "otherway" in slots:
-        now = said.standing.groups[0].get("heading")
-        return (
-            [{"kind": "heading", "to": "away" if now == "towards" else "towards"}]
-            if now in ("towards", "away")
-            else None
-        )
-    if "inward" in slots:
-        to = slots["inward"][0]
-        backs = "backs" in slots["face"]
-        return [
-            {"kind": "heading", "to": {"towards": "away", "away": "towards"}[to] if backs else to}
-        ]
-    return [{"kind": "heading", "to": float(slots.get("angle", slots.get("num", [0]))[0])}]
-
-
-def keepout(slots: Slots, said: Said) -> Effects:
-    """Robots stay off another thing."""
-    if not slots.has("thing", "there", "other"):
-        return ask(
-            f'Which thing is to be kept clear of in "{said.words}"? Point at it, or name it.'
-        )
-    to = where(slots, said, "keep clear of {}")
-    return to if isinstance(to, list) else [{"kind": "keep-out", "ids": [to]}]
 
 
 def arrange(slots: Slots, said: Said) -> Effects:

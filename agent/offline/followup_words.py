@@ -17,7 +17,7 @@ from ...tools.formation.number_words import SMALL
 from ...tools.formation.quantities import Quantity, quantities_in
 from .descriptions import Description
 from .lexicon import fillers
-from .phrases import HEADS, table
+from .phrases import HEADS
 from .phrases import phrase as thing_phrase
 from .standing import Standing
 
@@ -48,10 +48,6 @@ BEFORE_THINGS = frozenset(
     )
 )
 SIDE_WORDS = ("left", "right", "top", "bottom", "upper", "lower", "leftmost", "rightmost", "middle")
-KEYS = ("qwertyuiop", "asdfghjkl", "zxcvbnm")
-UNITS = ("degrees", "pixels", "metres", "meters")
-LEAST_CORRECTED = 4
-"""Letters of the shortest word in which a slip of the fingers is looked for."""
 
 
 @dataclass(frozen=True)
@@ -89,15 +85,6 @@ def chunks_of(text: str, standing: Standing) -> tuple[Chunk, ...]:
         chunk, at = reader.read(at)
         found.append(chunk)
     return tuple(found)
-
-
-def spelled(text: str) -> str:
-    """The text with words that are a slip of the fingers away from a known one put right."""
-    return re.sub(
-        r"[^\W\d_]+",
-        lambda m: _spelled(m[0].lower()) if _spelled(m[0].lower()) != m[0].lower() else m[0],
-        text,
-    )
 
 
 class _Reader:
@@ -356,51 +343,3 @@ def longest() -> int:
 def known_words() -> frozenset[str]:
     """Every word that is part of a phrase, or of a number."""
     return frozenset(w for words in lexicon() for w in words) | {*SMALL, *word_set("robots")}
-
-
-@cache
-def _spelled(word: str) -> str:
-    """The word, or the one word that says something and that it is a slip of the fingers away from."""
-    known = known_words() | fillers() | {*table()["follow"], *UNITS}
-    if len(word) < LEAST_CORRECTED or word in known or thing_phrase([word], 0) is not None:
-        return word
-    near = [w for w in _telling_words() if len(w) >= LEAST_CORRECTED and _is_slip(word, w)]
-    return near[0] if len(near) == 1 else word
-
-
-@cache
-def _telling_words() -> frozenset[str]:
-    """Words of phrases that are no fillers, and units."""
-    phrases = [
-        words
-        for words, kinds in lexicon().items()
-        if not {"filler", "thanks", "hello"} & set(kinds)
-    ]
-    return frozenset(w for words in phrases for w in words if w.isalpha()) - fillers() | {*UNITS}
-
-
-def _is_slip(typed: str, meant: str) -> bool:
-    """Whether one letter is left out, doubled or added, swapped with its neighbour, or a key off."""
-    if typed[0] != meant[0] or abs(len(typed) - len(meant)) > 1:
-        return False
-    if typed[:-1] == meant:
-        return typed[-1] == meant[-1]
-    if len(typed) != len(meant):
-        short, long = sorted((typed, meant), key=len)
-        return any(long[:k] + long[k + 1 :] == short for k in range(len(long)))
-    off = [k for k in range(len(typed)) if typed[k] != meant[k]]
-    if len(off) == 2:
-        return (
-            off[1] == off[0] + 1
-            and typed[off[0]] == meant[off[1]]
-            and typed[off[1]] == meant[off[0]]
-        )
-    return len(off) == 1 and _are_near(typed[off[0]], meant[off[0]])
-
-
-def _are_near(a: str, b: str) -> bool:
-    """Whether two keys touch."""
-    rows = {letter: (y, x) for y, row in enumerate(KEYS) for x, letter in enumerate(row)}
-    if a not in rows or b not in rows:
-        return False
-    return abs(rows[a][0] - rows[b][0]) <= 1 and abs(rows[a][1] - rows[b][1]) <= 1

@@ -1,0 +1,251 @@
+"""A line said to a plan, parted into clauses so that a frame takes every phrase of each.
+
+A clause may be completed by the one before: "left. no wait, right", "and robot 3 too".
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from . import followup_edits, followup_teams, followup_turns
+from .followup_edits import Effect, Effects, Said, ask
+from .followup_frames import Frame, Slots, frames
+from .followup_things import resolved
+from .followup_words import Chunk, chunks_of, rules
+from .spelling import spelled
+from .standing import Standing
+
+NO_EDITS = ("ask", "refuse", "undo", "go", "hold", "query", "talk", "stay", "rest")
+"""Kinds of effects that change no plan."""
+OF_A_TEAM = ("add", "remove", "side", "sides", "opening", "count", "arrange")
+"""Kinds of edits that are for one group; where there are several it is named, or asked."""
+OF_TEAMS = (
+    *("out", "in", "rotate", "mirror", "shift", "scale", "distance", "spacing", "heading"),
+    *("close", "open", "escape-proof"),
+)
+"""Kinds of edits that are for all groups where none is named."""
+TALK = ("did", "why", "help", "status", "thanks", "hello")
+AMOUNTS = ("px", "angle", "share", "much", "num", "m")
+REPLACED = (
+    *("robots", "dir", "side", "flank", "radial", "thing", "other", "there", "spin", "axis"),
+    *("portion", "scale", "apart", "inward", "point", "relation"),
+)
+"""Kinds of phrases that are put in the place of others of the same kind."""
+LEADING = frozenset(
+    ("no", "neg", "correction", "yes", "filler", "sep", "thanks", "hello", "instead", "certq")
+)
+PURE = frozenset(("filler", "sep", "yes", "thanks", "hello", "correction"))
+SLIGHT = (
+    PURE
+    | {"move", "make", "it", "team", "leavegap", "about", "towards", "side_of"}
+    | {
+        "instead",
+        "robotword",
+    }
+)
+"""Kinds of phrases that say nothing by themselves."""
+OPENERS = r"^(?:(?:so|and|ok|okay|hm+|but|now|well|please|hey|hi|no|yes|then)\b[ ,.]*)+"
+
+
+@dataclass(frozen=True)
+class Clause:
+    """Phrases that one frame takes, the name of the frame, and what it comes to."""
+
+    chunks: tuple[Chunk, ...]
+    frame: str
+    effects: tuple[Effect, ...]
+
+    @property
+    def settled(self) -> bool:
+        """Whether it neither asks nor refuses."""
+        return not any(e["kind"] in ("ask", "refuse") for e in self.effects)
+
+
+class Line:
+    """One line that was said.
+
+    Attributes:
+        words: with slips of the fingers put right.
+        chunks: its phrases, without those that lead into it.
+        led: kinds and words of those: "no", "ok", "and".
+        excepted: robots that it excepts: "all but robot 3".
+    """
+
+    def __init__(self, words: str, standing: Standing) -> None:
+        self.words, self.standing = spelled(words), standing
+        self.led = ""
+        self.excepted: tuple[int, ...] = ()
+        found = [resolved(c, self.words, standing) for c in chunks_of(self.words, standing)]
+        self.chunks = self._without_excepted(self._without_lead(found))
+
+    @property
+    def denies(self) -> bool:
+        """Whether it begins with "no" or the like."""
+        return "no " in self.led or "correction" in self.led
+
+    def words_of(self, chunks: Sequence[Chunk]) -> str:
+        """What was said there."""
+        said = self.words[chunks[0].start : chunks[-1].end] if chunks else ""
+        return " ".join(said.split()).strip(" ,.;!?")
+
+    def read(self) -> list[Clause] | None:
+        """Its clauses; None where phrases are left over."""
+        return self._corrected() or self.clauses(self.chunks)
+
+    def clauses(
+        self, chunks: Sequence[Chunk], before: tuple[Effect, ...] = ()
+    ) -> list[Clause] | None:
+        """The fewest clauses that frames take whole, after those with effects `before`."""
+        first = next((k for k, c in enumerate(chunks) if not _is_pure(c)), len(chunks))
+        chunks = chunks[first:]
+        if all(map(is_empty, chunks)):
+            return []
+        ends = [k for k, c in enumerate(chunks) if k and "sep" in c.kinds] + [len(chunks)]
+        for end in reversed(ends):
+            clause = self._framed(chunks[:end], before)
+            if clause is None:
+                continue
+            rest = self.clauses(chunks[end:], (*before, *clause.effects))
+            if rest is not None:
+                return [clause, *rest]
+        return None
+
+    def _without_lead(self, chunks: Sequence[Chunk]) -> list[Chunk]:
+        for k, chunk in enumerate(chunks):
+            marks = [m for m in ("no", "correction", "yes", "thanks", "hello") if m in chunk.kinds]
+            leads = {"no", "correction", "yes", "sep", "filler"} & set(chunk.kinds)
+            text = self.words[chunk.start : chunk.end].lower()
+            if not (leads and set(chunk.kinds) <= LEADING) or text == "also":
+                return list(chunks[k:])
+            self.led += "".join(f"{m} " for m in (*marks, text))
+        return []
+
+    def _without_excepted(self, chunks: list[Chunk]) -> list[Chunk]:
+        for k, chunk in enumerate(chunks[:-1]):
+            if "except" in chunk.kinds and "robots" in chunks[k + 1].kinds:
+                self.excepted = tuple(chunks[k + 1].kinds["robots"])
+                return [*chunks[:k], *chunks[k + 2 :]]
+        return chunks
+
+    def _framed(self, chunks: Sequence[Chunk], before: tuple[Effect, ...]) -> Clause | None:
+        """The clause, where a frame takes it whole and uses all of it."""
+        asks, only_asks = self._asks()
+        edits = tuple(e for e in before if e["kind"] not in NO_EDITS)
+        said = Said(self.standing, self.words_of(chunks), edits)
+        for frame in frames():
+            if (frame.asks and not asks) or (
+                only_asks and not frame.asks and frame.name not in TALK
+            ):
+                continue
+            slots = frame.slots(chunks)
+            effects = None if slots is None else _built(frame, slots, said)
+            changes = any(e["kind"] not in NO_EDITS for e in effects or ())
+            if effects and slots is not None and not (changes and slots.unused):
+                teamed = tuple(self._of_team(e, chunks, said.words) for e in effects)
+                return Clause(tuple(chunks), frame.name, teamed)
+        return None
+
+    def _asks(self) -> tuple[bool, bool]:
+        """Whether it may be a question, and whether it can be nothing else."""
+        text = re.sub(OPENERS, "", self.words.lower().lstrip("\"' "))
+        word = next(iter(re.findall(r"^[a-z']+", text)), "")
+        polite = any(re.match(rf"{p}\b", text) for p in rules()["polite"])
+        leads = word in rules()["questions"] and not polite
+        marked = self.words.rstrip().endswith("?")
+        either = word in ("can", "could", "would", "will", "may")
+        either = either or (not marked and word in ("have", "do", "is", "are", "any"))
+        return leads or marked, leads and not either
+
+    def _of_team(self, effect: Effect, chunks: Sequence[Chunk], words: str) -> Effect:
+        """The edit for the group whose thing is named; which one is asked where it has to be."""
+        kind, groups = effect["kind"], self.standing.groups
+        if len(groups) < 2:
+            return effect
+        named = [str(c.kinds["current"]) for c in chunks if "current" in c.kinds]
+        found = [k for k, g in enumerate(groups, 1) if named and named[-1] in g.get("targets", ())]
+        if found and kind in (*OF_TEAMS, *OF_A_TEAM):
+            return effect | {"group": found[0]}
+        if kind == "count" or (kind in OF_A_TEAM and "robots" not in effect):
+            options = [f"{words} at {t}" for t in self.standing.targets]
+            return ask(f"There are {len(groups)} teams. Which one?", *options)[0]
+        return effect
+
+    def _corrected(self) -> list[Clause] | None:
+        """What is meant after "no wait", or of what was said last, if this corrects or adds."""
+        marks = [k for k, c in enumerate(self.chunks) if k and {"correction", "no"} & set(c.kinds)]
+        if marks and marks[-1] < len(self.chunks) - 1:
+            first = [c for c in self.chunks[: marks[-1]] if not {"correction", "no"} & set(c.kinds)]
+            after = [c for c in self.chunks[marks[-1] + 1 :] if not is_empty(c)]
+            clauses = self.clauses(first)
+            if clauses is None and any("unknown" in c.kinds for c in first):
+                return None
+            return self._substituted(clauses or [], after) or self.clauses(after)
+        too = any("too" in c.kinds for c in self.chunks) or "and" in self.led.split()
+        return self._of_last_words(too) if self.standing.words and (self.denies or too) else None
+
+    def _of_last_words(self, too: bool) -> list[Clause] | None:
+        """What was said last, with phrases of this line put in."""
+        last = Line(self.standing.words, replace(self.standing, words="", edits=()))
+        clauses = last.clauses(last.chunks)
+        after = [c for c in self.chunks if "too" not in c.kinds and not is_empty(c)]
+        robots_alone = all({"robots", "stay"} & set(c.kinds) for c in after)
+        if not clauses or not after or (not self.denies and not robots_alone):
+            return None
+        found = self._substituted(clauses, after)
+        kinds = {e["kind"] for c in found or () for e in c.effects}
+        if found and self.denies and self.standing.edits and kinds & {*followup_turns.RELATIVE}:
+            return [Clause((), "undo", ({"kind": "undo", "steps": 1},)), *found]
+        return found
+
+    def _substituted(
+        self, clauses: Sequence[Clause], after: Sequence[Chunk]
+    ) -> list[Clause] | None:
+        """The clauses with phrases in the place of others of their kind, the last that fits."""
+        for at in range(len(clauses) - 1, -1, -1):
+            chunks = _with(clauses[at], after)
+            clause = None if chunks is None else self._framed(chunks, ())
+            if clause is not None and clause.frame == clauses[at].frame:
+                return [*clauses[:at], clause, *clauses[at + 1 :]]
+        return None
+
+
+def is_empty(chunk: Chunk) -> bool:
+    """Whether a phrase says nothing by itself."""
+    return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= SLIGHT
+
+
+def _is_pure(chunk: Chunk) -> bool:
+    return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= PURE
+
+
+def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
+    """The phrases of a clause with others put in; None where one has no place there."""
+    chunks = list(clause.chunks)
+    for new in after:
+        kinds = set(new.kinds)
+        amount = kinds & {*AMOUNTS}
+        alike = [
+            k
+            for k, old in enumerate(chunks)
+            if kinds & set(old.kinds) & {*REPLACED} or (amount and set(old.kinds) & {*AMOUNTS})
+        ]
+        if alike:
+            chunks[alike[-1]] = new
+        elif amount or (clause.frame == "rotate" and kinds & {"dir", "spin"}):
+            chunks.append(new)
+        else:
+            return None
+    return chunks
+
+
+def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
+    """What a frame comes to: of the function of its name."""
+    if frame.name.startswith("ask_"):
+        return followup_turns.asked(slots, said, frame.name.removeprefix("ask_"))
+    if frame.name in TALK:
+        return [{"kind": "talk", "about": frame.name}]
+    modules = (followup_edits, followup_teams, followup_turns)
+    build: Callable[[Slots, Said], Effects] = next(
+        getattr(module, frame.name) for module in modules if hasattr(module, frame.name)
+    )
+    return build(slots, said)

@@ -1,0 +1,75 @@
+"""Which thing or robot a phrase of a follow-up names, among what stands."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from .followup_edits import SIDE_OF, listed
+from .followup_words import Chunk
+from .standing import Standing
+
+POINTING = ("that", "this", "here")
+"""Words that mean what is pointed at, where something is."""
+SIDES = {"upper": "top", "lower": "bottom", "leftmost": "left", "rightmost": "right"}
+
+
+def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
+    """A phrase with its thing as an id, where it is known; one of the plan's as `current`."""
+    kinds = dict(chunk.kinds)
+    pointed = bool(standing.pointed) or standing.place is not None
+    if pointed and text[chunk.start : chunk.end].lower() in POINTING:
+        kinds["there"] = ""
+    if "lone" in kinds and len(standing.robots) == 1:
+        kinds["team"] = ""
+    if "thing" in kinds:
+        name = _id_of(str(kinds["thing"]), bool(kinds.pop("other", False)), standing)
+        kinds["thing"] = name
+        if name in standing.targets:
+            kinds["current"] = name
+            if len(standing.groups) < 2:
+                del kinds["thing"]
+    return replace(chunk, kinds=kinds)
+
+
+def _id_of(phrase: str, other: bool, standing: Standing) -> str:
+    """The id of a known thing, or the words after "?" for it to be found."""
+    if re.fullmatch(r"[tc][0-9]+", phrase):
+        return phrase if phrase[0] == "t" else f"?{phrase}"
+    words = set(re.findall(r"[a-z]+", phrase)) - {"one", "the", "thing", "object"}
+    word = next(iter(words), "")
+    side, centre = SIDE_OF.get(SIDES.get(word, word)), standing.centre or {}
+    if len(words) == 1 and side and len(centre) > 1:
+        x, sign = int(side in ("top", "bottom")), -1 if side in ("left", "top") else 1
+        furthest = max(centre, key=lambda t: sign * centre[t][x])
+        return furthest if furthest not in standing.targets else f"?{phrase}"
+    known = [(t, set(re.findall(r"[a-z]+", label.lower()))) for t, label in standing.things]
+    named = [t for t, label in known if words and words <= label]
+    named = [t for t in named if not (other and t in standing.targets)]
+    if len(named) == 1:
+        return named[0]
+    return f"?other {phrase}" if other else f"?{phrase}"
+
+
+def impossible(chunks: Sequence[Chunk], standing: Standing) -> str:
+    """Why what is named is not there or cannot be measured, and what would do; "" where it is."""
+    there = [int(r) for r in standing.robots if r.isdecimal()]
+    known = {*(t for t, _ in standing.things), *standing.pointed, *standing.targets}
+    for chunk in chunks:
+        strange = [r for r in chunk.kinds.get("robots", ()) if r not in there]
+        name = str(chunk.kinds.get("thing", ""))
+        if strange:
+            return f"There is no robot {strange[0]}: there are {_span(there)}. Name one of those."
+        if "m" in chunk.kinds:
+            return (
+                f'"{chunk.kinds["m"]}" cannot be measured: the picture has no scale. Say it in px, '
+                "or give the scale with --metres-per-pixel."
+            )
+        if name.startswith("t") and name not in known:
+            there_are = f"known are {listed(sorted(known))}"
+            return f"There is no {name}: {there_are}. Point at it, or name it in words."
+    return ""
+
+
+def _span(there: Sequence[int]) -> str:
+    whole = len(there) > 1 and there[-1] - there[0] + 1 == len(there)
+    return f"robots {there[0]} to {there[-1]}" if whole else f"robots {listed(there)}"

@@ -1,0 +1,60 @@
+"""Slips of the fingers in what is typed, put right where only one known word can be meant."""
+
+import re
+from functools import cache
+
+from .followup_words import known_words, lexicon
+from .lexicon import fillers
+from .phrases import phrase, table
+
+KEYS = ("qwertyuiop", "asdfghjkl", "zxcvbnm")
+LEAST_CORRECTED = 4
+"""Letters of the shortest word in which a slip is looked for."""
+UNITS = ("degrees", "pixels", "metres", "meters")
+
+
+def spelled(text: str) -> str:
+    """The text with words that are one slip away from a known one put right."""
+    return re.sub(r"[^\W\d_]+", lambda m: _meant(m[0].lower()) or m[0], text)
+
+
+@cache
+def _meant(word: str) -> str | None:
+    """The one word that says something and that this is a slip away from, if it is none itself."""
+    known = known_words() | fillers() | {*table()["follow"], *UNITS}
+    if len(word) < LEAST_CORRECTED or word in known or phrase([word], 0) is not None:
+        return None
+    near = [w for w in _telling_words() if len(w) >= LEAST_CORRECTED and _is_slip(word, w)]
+    return near[0] if len(near) == 1 else None
+
+
+@cache
+def _telling_words() -> frozenset[str]:
+    """Words of phrases that are no fillers, and units."""
+    idle = {"filler", "thanks", "hello"}
+    phrases = [words for words, kinds in lexicon().items() if not idle & set(kinds)]
+    return frozenset(w for words in phrases for w in words if w.isalpha()) - fillers() | {*UNITS}
+
+
+def _is_slip(typed: str, meant: str) -> bool:
+    """Whether a letter is left out, doubled or added, swapped with the next, or a key off."""
+    if typed[0] != meant[0] or abs(len(typed) - len(meant)) > 1:
+        return False
+    if typed[:-1] == meant:
+        return typed[-1] == meant[-1]  # else rather another form of it: "nicer"
+    if len(typed) != len(meant):
+        short, long = sorted((typed, meant), key=len)
+        return any(long[:k] + long[k + 1 :] == short for k in range(len(long)))
+    off = [k for k in range(len(typed)) if typed[k] != meant[k]]
+    if len(off) == 2:
+        a, b = off
+        return b == a + 1 and (typed[a], typed[b]) == (meant[b], meant[a])
+    return len(off) == 1 and _are_near(typed[off[0]], meant[off[0]])
+
+
+def _are_near(a: str, b: str) -> bool:
+    """Whether two keys touch."""
+    rows = {letter: (y, x) for y, row in enumerate(KEYS) for x, letter in enumerate(row)}
+    if a not in rows or b not in rows:
+        return False
+    return max(abs(p - q) for p, q in zip(rows[a], rows[b], strict=True)) <= 1
