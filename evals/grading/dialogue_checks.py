@@ -30,7 +30,7 @@ EVEN = (0.4, 1.6)
 """Gaps of an even ring are within these shares of their mean."""
 SIDE = {"left": 180.0, "right": 0.0, "top": -90.0, "bottom": 90.0}
 """Directions in the picture, degrees clockwise from the right."""
-ON_SIDE, OFF_SIDE = 55.0, 30.0
+ON_SIDE, OFF_SIDE = 60.0, 30.0
 """How far off the middle of a side, degrees, in which a thing's box is a square, a robot is still
 on it, and how near it is not off it."""
 FACING = 40.0
@@ -41,7 +41,7 @@ MEANS = {"further": (1.08, 1e9), "closer": (0.0, 0.93), "same": (0.93, 1.07)}
 SPREADS = {"wider": (1.03, 1e9), "tighter": (0.0, 0.97), "same": (0.95, 1.05)}
 
 
-def _named(wanted: Any, all_of: Sequence[str]) -> list[str]:
+def _numbered(wanted: Any, all_of: Sequence[str]) -> list[str]:
     """Robots by number, or all of them."""
     return list(all_of) if wanted == "all" else [str(name) for name in wanted]
 
@@ -71,7 +71,7 @@ def leave(case: Case, wanted: Sequence[int]) -> Iterator[str]:
 
 def stay(case: Case, wanted: Any) -> Iterator[str]:
     """These have not moved: numbers, or all that were there before and still are."""
-    for name in _named(wanted, case.kept):
+    for name in _numbered(wanted, case.kept):
         if name not in case.after.at:
             yield f"robot {name} is gone"
         elif (far := float(np.linalg.norm(case.moved(name)))) > UNMOVED:
@@ -97,7 +97,7 @@ def at(case: Case, wanted: Mapping[int, Sequence[float]]) -> Iterator[str]:
 
 def shift(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
     """Robots went `by` [dx, dy], or `towards` a side, degrees or a thing, by `least` px or more."""
-    for name in _named(wanted.get("robots", "all"), case.kept):
+    for name in _numbered(wanted.get("robots", "all"), case.kept):
         if name not in case.kept:
             yield f"robot {name} is gone"
             continue
