@@ -27,7 +27,7 @@ PNG = b"\x89PNG"
 
 
 def asked(number: int, words: str, standing: Any, *, shown: bool = False) -> User:
-    lines = {
+    lines: dict[str, Any] = {
         "Instruction": words,
         "Robots": None,
         "Pointed at": [],

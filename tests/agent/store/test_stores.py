@@ -154,7 +154,7 @@ def test_eight_writers_of_one_session_leave_no_gap(store: Store) -> None:
                 log = mine.write(known)
             except StorageError as error:  # another has it, or has been quicker
                 assert error.kind in ("busy", "gone_on")
-                time.sleep(random.random() / 50)
+                time.sleep(random.random() / 8)
                 known += len(mine.events(known)) if error.kind == "gone_on" else 0
                 continue
             known = log.append("message", {"writer": writer, "number": number})
