@@ -20,6 +20,7 @@ from ..perception.target_prompt import Box
 from ..world import World
 from .canvas import CERTIFIED, FINDING, INK, MET, PARTIAL, Canvas, Colour, Labels
 from .captions import draw_bars, draw_footer, make_page
+from .change import draw_moves, moves_between
 from .escape_path import draw_escape
 from .marks import (
     directions,
@@ -66,7 +67,9 @@ NEAR = 2.0
 """Robots more than so many long sides of the picture away are not led lines to."""
 
 
-def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.Image:
+def draw_plan(
+    picture: Picture, world: World, plan: Plan, title: str, before: Plan | None = None
+) -> Image.Image:
     """The photograph with the contract, the robots and the verdict.
 
     Areas where robots' centres may stand are tinted; other things that robots stand on or drive
@@ -79,6 +82,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
         world: what the plan was made in.
         plan: certified or not; robots at no finite place are left out.
         title: usually the instruction; in any language, of any length.
+        before: the plan that an edit made this one from: arrows show who moves.
 
     Returns:
         RGB, the photograph's long side 1200 to 1500 px, with a title above and a footer below.
@@ -98,7 +102,7 @@ def draw_plan(picture: Picture, world: World, plan: Plan, title: str) -> Image.I
         draw_escape(canvas, plan.verdict.escape, site)
     labels, met = Labels(canvas.photo), world.met(plan.id)
     draw_met(canvas, met.values())
-    _draw_robots(canvas, world, plan, labels)
+    _draw_robots(canvas, world, plan, labels, before)
     for name, outline in met.items():
         _draw_tag(canvas, name, outline.bounds, MET, labels)
     if drivable:
@@ -158,8 +162,10 @@ def _near_picture(points: FloatArray, site: Site) -> NDArray[np.bool_]:
     return np.all(np.abs(points) <= NEAR * max(site.room), axis=1)
 
 
-def _draw_robots(canvas: Canvas, world: World, plan: Plan, labels: Labels) -> None:
-    """Discs and the robots' numbers; the labels learn where they are."""
+def _draw_robots(
+    canvas: Canvas, world: World, plan: Plan, labels: Labels, before: Plan | None = None
+) -> None:
+    """Discs and the robots' numbers, who moves; the labels learn where robots are."""
     contract, points = plan.formation.contract, plan.formation.points
     site, names = world.site(contract), plan.formation.robot_of_place
     near = _near_picture(points, site)
@@ -178,6 +184,7 @@ def _draw_robots(canvas: Canvas, world: World, plan: Plan, labels: Labels) -> No
         for robot in encounter.robots if encounter.how != "over" else ():
             canvas.circle(shown[robot], 1.7 * radius, MET, max(0.3 * radius, 1.2))
     if near.all():
+        draw_moves(canvas, moves_between(before, plan), radius)
         draw_headings(canvas, points, plan.formation.place_headings, radius)
     draw_robots(canvas, shown, radius, flagged)
     away = dict(zip(names, directions(contract, site, points), strict=True))
