@@ -1,33 +1,28 @@
 """The command line: `formup run`, `resume`, `deploy`, `trace`, `tools`, `eval`, `prompts`."""
 
-from collections.abc import Generator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from ..agent.agent import Agent
-from ..agent.model import Model
 from ..agent.outcomes import Answered, Paused
 from ..agent.session import load_run, prompt_name
 from ..agent.store.folder import log_path, read_events
-from ..agent.wrappers.telemetry import environment_tracer
 from ..prompts import PromptLibrary
 from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
 from . import arguments, deploy, evaluate, prompts, tools, trace
 from . import options as o
+from .agents import agent_of, tracer_of_environment
 from .run_files import Folder, write_files
 from .starts import starts as read_starts
 from .stated import decided
 from .terminal import say
 from .terminal_session import TerminalSession
-
-if TYPE_CHECKING:
-    from opentelemetry.trace import Tracer
 
 app = typer.Typer(
     name="formup",
@@ -105,7 +100,7 @@ def run(
     things = arguments.pointed(point, box, outline, target), arguments.kept_out(keep_out)
     who, given = decided(contract, *things, fixed, model=model, planner=planner)
     picture, keep = load_picture(image), arguments.recording(record)
-    with _agent(*who, base_url, prompt, prompts, limit, policy) as agent, Folder(out) as home:
+    with agent_of(*who, base_url, prompt, prompts, limit, policy) as agent, Folder(out) as home:
         made = agent.run(picture, instruction, trace=home.trace, **given)
         raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
 
@@ -129,7 +124,7 @@ def resume(
     path = log_path(folder)
     left = load_run(path, None if image is None else load_picture(image))
     start = read_events(path)[0].data
-    with _tracer() as tracer, Folder(path.parent, resumed=True) as home:
+    with tracer_of_environment() as tracer, Folder(path.parent, resumed=True) as home:
         agent = Agent(
             model or start["model"],
             base_url=base_url or (None if model else start["base_url"]),
@@ -166,48 +161,3 @@ def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
                 f"{prompt.name} is not what this run was begun with; put its text back, or run "
                 "again."
             )
-
-
-@contextmanager
-def _agent(
-    model: str | Model,
-    planner: str | None,
-    base_url: str | None,
-    prompt: str | None,
-    prompts: Path | None,
-    limit: list[str] | None,
-    policies: list[str] | None,
-) -> Generator[Agent, None, None]:
-    """The agent that was chosen; the offline planner goes without a prompt."""
-    limits, policy = arguments.limits(limit), arguments.policy(policies)
-    with _tracer() as tracer:
-        agent = Agent(
-            model,
-            base_url=base_url,
-            planner=planner,
-            prompt=prompt,
-            library=PromptLibrary(prompts),
-            limits=limits,
-            policy=policy,
-            tracer=tracer,
-        )
-        if agent.model.name == "offline" and agent.prompt is not None:
-            say(
-                "formup: the offline planner is rules and reads no prompt; "
-                f"{agent.prompt.name} is not used.",
-                error=True,
-            )
-            agent = Agent(model, limits=limits, policy=policy, tracer=tracer)
-        yield agent
-
-
-@contextmanager
-def _tracer() -> "Generator[Tracer | None, None, None]":
-    """For spans, if the environment asks for them; a run does not fail for the want of one."""
-    with ExitStack() as stack:
-        tracer = None
-        try:
-            tracer = stack.enter_context(environment_tracer())
-        except InputError as error:
-            say(f"formup: no spans are sent: {error}", error=True)
-        yield tracer

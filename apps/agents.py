@@ -1,0 +1,62 @@
+"""The agent that options choose, with its spans sent where the environment says."""
+
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..agent.agent import Agent
+from ..agent.model import Model
+from ..agent.wrappers.telemetry import environment_tracer
+from ..prompts import PromptLibrary
+from ..tools.errors import InputError
+from . import arguments
+from .terminal import say
+
+if TYPE_CHECKING:
+    from opentelemetry.trace import Tracer
+
+
+@contextmanager
+def agent_of(
+    model: str | Model,
+    planner: str | None,
+    base_url: str | None,
+    prompt: str | None,
+    prompts: Path | None,
+    limit: list[str] | None,
+    policies: list[str] | None,
+) -> Generator[Agent, None, None]:
+    """The agent that was chosen; the offline planner goes without a prompt."""
+    limits, policy = arguments.limits(limit), arguments.policy(policies)
+    with tracer_of_environment() as tracer:
+        agent = Agent(
+            model,
+            base_url=base_url,
+            planner=planner,
+            prompt=prompt,
+            library=PromptLibrary(prompts),
+            limits=limits,
+            policy=policy,
+            tracer=tracer,
+        )
+        if agent.model.name == "offline" and agent.prompt is not None:
+            say(
+                "formup: the offline planner is rules and reads no prompt; "
+                f"{agent.prompt.name} is not used.",
+                error=True,
+            )
+            agent = Agent(model, limits=limits, policy=policy, tracer=tracer)
+        yield agent
+
+
+@contextmanager
+def tracer_of_environment() -> "Generator[Tracer | None, None, None]":
+    """For spans, if the environment asks for them; a run does not fail for the want of one."""
+    with ExitStack() as stack:
+        tracer = None
+        try:
+            tracer = stack.enter_context(environment_tracer())
+        except InputError as error:
+            say(f"formup: no spans are sent: {error}", error=True)
+        yield tracer
