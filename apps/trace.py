@@ -1,8 +1,7 @@
 """`formup trace FILE`: a run as it went, for reading."""
 
 import json
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
@@ -26,31 +25,51 @@ COLUMN = 8
 
 def show_trace(file: o.TraceFile) -> None:
     """Show a session step by step: what was said and called, times, tokens, cost, pictures."""
-    events = read_session(file)
+    root = log_path(file).parent
+    pictures = FolderArtefacts(root / PICTURES)
+
+    def where(sha256: str) -> str:
+        return str(root / (pictures.name(sha256) or "missing"))
+
+    show_events(read_session(file), where, str(file), f"formup resume {file} goes on")
+
+
+def show_events(
+    events: Sequence[Event], where: Callable[[str], str], name: str, how_on: str
+) -> None:
+    """Show the events of a session.
+
+    Args:
+        where: a picture with a hash is.
+        name: what the session is called in an error.
+        how_on: how one goes on with it where it was broken off.
+
+    Raises:
+        InputError: they are damaged.
+    """
     try:
-        _show(file, *events)
+        _show(where, how_on, *events)
     except (AttributeError, IndexError, KeyError, TypeError, ValueError):
-        raise InputError(f"{file} is damaged; it is no whole session that formup wrote.") from None
+        raise InputError(f"{name} is damaged; it is no whole session that formup wrote.") from None
 
 
-def _show(file: Path, start: Event, *events: Event) -> None:
+def _show(where: Callable[[str], str], how_on: str, start: Event, *events: Event) -> None:
     console = Console(highlight=False)
     prompt = prompt_name(start.data["prompt"])
     with_prompt = f", prompt {prompt}" if prompt else ""
     picture = start.data["picture"]
     size = f"{picture['facts']['width']} x {picture['facts']['height']} px"
-    where = picture["path"] or "a picture"
-    console.print(styled(f"{model_name(start.data)}{with_prompt}, on {where}, {size}"))
-    pictures = FolderArtefacts(log_path(file).parent / PICTURES)
+    lay = picture["path"] or "a picture"
+    console.print(styled(f"{model_name(start.data)}{with_prompt}, on {lay}, {size}"))
     turns = [i for i, event in enumerate(events) if event.kind == "turn"]
     for first, after in zip(turns, [*turns[1:], len(events)], strict=True):
         console.print(styled(events[first].data["words"], style="bold"))
-        console.print(_steps(events[first:after], pictures))
+        console.print(_steps(events[first:after], where))
         last = [e for e in events[first:after] if e.kind in ("end", "resume")][-1:]
-        console.print(_end(last[0] if last else events[after - 1], file))
+        console.print(_end(last[0] if last else events[after - 1], how_on))
 
 
-def _steps(events: Sequence[Event], pictures: FolderArtefacts) -> Table:
+def _steps(events: Sequence[Event], where: Callable[[str], str]) -> Table:
     """A row for each message, with the time since the one before and what it cost, if anything."""
     counts = any(any(_spent(event.data)) for event in events)
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="cyan")
@@ -65,7 +84,7 @@ def _steps(events: Sequence[Event], pictures: FolderArtefacts) -> Table:
             before = 0.0
         if event.kind == "message":
             spent = _spent(event.data) if counts else ()
-            shown = styled("\n").join(_step(event.data, pictures))
+            shown = styled("\n").join(_step(event.data, where))
             table.add_row(f"{now:.2f} s", f"{now - before:.2f} s", *spent, shown)
             before = now
     return table
@@ -78,7 +97,7 @@ def _spent(message: Mapping[str, Any]) -> tuple[str, str]:
     return f"{used[0]:,}+{used[1]:,}" if any(used) else "", f"{cost:.4f}" if cost else ""
 
 
-def _step(message: Mapping[str, Any], pictures: FolderArtefacts) -> list[Text]:
+def _step(message: Mapping[str, Any], where: Callable[[str], str]) -> list[Text]:
     """A message as lines: who, what it says, calls, pictures."""
     lines: list[Text] = []
     text = _short(message.get("text", ""))
@@ -95,16 +114,13 @@ def _step(message: Mapping[str, Any], pictures: FolderArtefacts) -> list[Text]:
         error = (f"{message['error']}: ", "red") if message.get("error") else ""
         named = (f"{message['name']} ", "cyan")
         lines.append(styled(("result  ", "bold"), named, error, text))
-    names = [pictures.name(image["sha256"]) or "missing" for image in message["images"]]
-    root = pictures.folder.parent
-    lines += [styled(("picture ", "bold"), str(root / name)) for name in names]
-    return lines
+    files = [where(image["sha256"]) for image in message["images"]]
+    return lines + [styled(("picture ", "bold"), file) for file in files]
 
 
-def _end(last: Event, file: Path) -> Text:
+def _end(last: Event, how_on: str) -> Text:
     if last.kind != "end":
-        text = f"broken off; formup resume {file} goes on"
-        return styled(("killed: ", "bold red"), text)
+        return styled(("killed: ", "bold red"), f"broken off; {how_on}")
     end = last.data
     usage, style = end["usage"], STATUS_STYLE.get(end["status"], "bold")
     counts = (
