@@ -13,6 +13,12 @@ def say(text: object, *, error: bool = False, end: str = "\n") -> None:
     print(visible(str(text)), end=end, file=stream, flush=True)
 
 
+def draw(escapes: str) -> None:
+    """Send a picture of ours to the terminal, as escape sequences."""
+    sys.stdout.write(escapes)
+    sys.stdout.flush()
+
+
 def under(text: str, column: int) -> str:
     """Lines after the first moved to a column, where none passes for a line of ours."""
     return text.replace("\n", "\n" + " " * column)

@@ -1,0 +1,130 @@
+"""Pictures in a terminal: by kitty's protocol or sixels where it says it can, else half blocks."""
+
+import base64
+import os
+import re
+import select
+import sys
+import time
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from typing import Literal
+
+import numpy as np
+from PIL import Image
+from rich.color import Color
+from rich.console import Console, ConsoleOptions
+from rich.segment import Segment
+from rich.style import Style
+
+from .terminal import draw
+
+Way = Literal["kitty", "sixel", "blocks", "none"]
+PATIENCE = 0.5
+"""Seconds a terminal has to say what it can; most take a thousandth of that."""
+WIDEST, CELL = 100, (8, 16)
+"""Columns a picture takes at most; pixels of a cell where the terminal does not say."""
+CHUNK = 4096
+KITTY, SIXEL = re.compile(rb"\x1b_Gi=31;OK"), re.compile(rb"\x1b\[\?(?:\d+;)*4(?:;\d+)*c")
+ENDS = re.compile(rb"\x1b\[\?[\d;]*c")
+ASK = "\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[c"
+"""May I send a picture by kitty's protocol; and, which any terminal answers, what are you?"""
+
+
+def way_of_terminal(console: Console) -> Way:
+    """How the terminal shows pictures, by its own answer."""
+    if not console.is_terminal or console.is_dumb_terminal or console.color_system is None:
+        return "none"
+    said = _asked()
+    return "kitty" if KITTY.search(said) else "sixel" if SIXEL.search(said) else "blocks"
+
+
+def show_picture(
+    console: Console,
+    way: Way,
+    page: Image.Image,
+    small: Callable[[tuple[int, int]], Image.Image],
+) -> None:
+    """Show a picture in the terminal.
+
+    Args:
+        page: as it is in the file.
+        small: draws it anew for few pixels, given the greatest width and height.
+    """
+    columns, rows = min(console.width, WIDEST), max(console.height - 4, 8)
+    if way == "blocks":
+        console.print(_HalfBlocks(small((columns, 2 * rows))))
+    elif way != "none":
+        width, height = columns * CELL[0], rows * CELL[1]
+        fitting = page.copy()
+        fitting.thumbnail((width, height), Image.Resampling.LANCZOS)
+        draw((_kitty(fitting) if way == "kitty" else _sixels(fitting)) + "\n")
+
+
+class _HalfBlocks:
+    """Two pixels a cell, the upper one in the colour of the letter."""
+
+    def __init__(self, image: Image.Image) -> None:
+        self._rows = np.asarray(image.convert("RGB"))
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
+        for top, bottom in zip(self._rows[::2], self._rows[1::2], strict=False):
+            for upper, lower in zip(top.tolist(), bottom.tolist(), strict=True):
+                style = Style(color=Color.from_rgb(*upper), bgcolor=Color.from_rgb(*lower))
+                yield Segment("▀", style)
+            yield Segment.line()
+
+
+def _kitty(image: Image.Image) -> str:
+    file = BytesIO()
+    image.save(file, "PNG")
+    data = base64.standard_b64encode(file.getvalue()).decode()
+    chunks = [data[i : i + CHUNK] for i in range(0, len(data), CHUNK)]
+    keys = ["f=100,a=T,", *[""] * (len(chunks) - 1)]
+    more = [1] * (len(chunks) - 1) + [0]
+    parts = zip(keys, more, chunks, strict=True)
+    return "".join(f"\x1b_G{key}m={m};{chunk}\x1b\\" for key, m, chunk in parts)
+
+
+def _sixels(image: Image.Image) -> str:
+    """Bands of six rows, a pass for each colour in a band."""
+    flat = image.convert("RGB").quantize(255)
+    pixels, palette = np.asarray(flat), np.array(flat.getpalette()).reshape(-1, 3)
+    shares = (palette * 100 / 255).round().astype(int).tolist()
+    parts = [f'\x1bPq"1;1;{image.width};{image.height}']
+    parts += [f"#{i};2;{r};{g};{b}" for i, (r, g, b) in enumerate(shares)]
+    for top in range(0, image.height, 6):
+        band = pixels[top : top + 6]
+        bits = 1 << np.arange(len(band))[:, None]
+        passes = (f"#{c}{_runs(((band == c) * bits).sum(axis=0))}" for c in np.unique(band))
+        parts.append("$".join(passes) + "-")
+    return "".join(parts) + "\x1b\\"
+
+
+def _runs(columns: np.ndarray) -> str:
+    """Columns of six pixels as letters, equal neighbours counted."""
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(columns)) + 1, [len(columns)]])
+    runs = zip(columns[starts[:-1]].tolist(), np.diff(starts).tolist(), strict=True)
+    return "".join(f"!{n}{chr(63 + c)}" if n > 3 else chr(63 + c) * n for c, n in runs)
+
+
+def _asked() -> bytes:
+    """What the terminal answers."""
+    try:
+        import termios
+        import tty
+
+        keyboard = sys.stdin.fileno()
+        before = termios.tcgetattr(keyboard)
+    except (ImportError, OSError, ValueError):
+        return b""
+    said, until = b"", time.monotonic() + PATIENCE
+    try:
+        tty.setcbreak(keyboard)
+        draw(ASK)
+        while not ENDS.search(said) and (left := until - time.monotonic()) > 0:
+            if select.select([keyboard], [], [], left)[0]:
+                said += os.read(keyboard, 1024)
+    finally:
+        termios.tcsetattr(keyboard, termios.TCSANOW, before)
+    return said
