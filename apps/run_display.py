@@ -65,11 +65,12 @@ def show_report(console: Console, report: Report, folder: str) -> None:
         )
     if report.contract is not None and not (report.files or {}).get("contract"):
         for group in report.contract.groups:
-            _line(console, "contract", _group(group, _scale(report)))
+            _line(console, "contract", group_words(group, _scale(report)))
         if report.contract.keep_out:
             _line(console, "", f"kept off: {', '.join(report.contract.keep_out)}")
     if report.verdict is not None:
-        _certificate(console, report)
+        for name, text in certificate_lines(report):
+            _line(console, name, text)
     if report.arrival is not None:
         _arrival(console, report)
     console.print(
@@ -133,7 +134,8 @@ def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
     console.print(table)
 
 
-def _group(group: Group, scale: float | None) -> str:
+def group_words(group: Group, scale: float | None) -> str:
+    """What a group demands, in a line."""
     noun = "robot" if group.robots == 1 else "robots"
     words = [
         f"{group.robots} {noun} {PLACES.get(group.relation, group.relation)}",
@@ -198,20 +200,18 @@ def _measures(measures: dict[str, Measure], scale: float | None) -> str:
     return ", ".join(words)
 
 
-def _certificate(console: Console, report: Report) -> None:
+def certificate_lines(report: Report) -> list[tuple[str, str]]:
+    """What a certificate says, as texts with what they are."""
     verdict = report.verdict
     assert verdict is not None
-    measures = _measures(verdict.measures, _scale(report))
-    if report.partial is not None:
-        _line(console, "partial", report.partial.sentence)
+    lines = [] if report.partial is None else [("partial", report.partial.sentence)]
     head = "certified" if verdict.certified else "NOT CERTIFIED"
-    _line(console, head, f"plan {report.plan_id}: {measures}")
-    for finding in verdict.findings[:MAX_ROWS]:
-        _line(console, "finding", finding.sentence)
+    measures = _measures(verdict.measures, _scale(report))
+    lines.append((head, f"plan {report.plan_id}: {measures}"))
+    lines += [("finding", finding.sentence) for finding in verdict.findings[:MAX_ROWS]]
     if len(verdict.findings) > MAX_ROWS:
-        _line(console, "", f"and {len(verdict.findings) - MAX_ROWS} more findings")
-    for note in verdict.notes:
-        _line(console, "note", note)
+        lines.append(("", f"and {len(verdict.findings) - MAX_ROWS} more findings"))
+    return lines + [("note", note) for note in verdict.notes]
 
 
 def _arrival(console: Console, report: Report) -> None:

@@ -100,7 +100,7 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
         if animate(folder.path / "deploy.gif", run.context, node.plan, title):
             files["animation"] = "deploy.gif"
     if report.candidates:
-        files["picture"] = folder.draw("question.png", _choices(run))
+        files["picture"] = folder.draw("question.png", draw_choices(run))
     elif standing:
         files["picture"] = "plan.png"
     elif node is not None:
@@ -115,13 +115,39 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
     return files
 
 
+def write_turn(folder: Folder, turn: int, run: Run, before: Plan | None) -> dict[str, str | None]:
+    """Write what a turn of a chat has changed; names as of `write_files`, with the turn's number.
+
+    Args:
+        before: the plan that stood then; arrows show who moves.
+
+    Raises:
+        StorageError: something cannot be written.
+    """
+    files: dict[str, str | None] = dict.fromkeys(("plan", "picture", "animation", "trace"))
+    picture, world, report = run.context.picture, run.world, run.report
+    title, node = report.instruction, world.plans.get(report.plan_id or "")
+    if report.candidates:
+        files["picture"] = folder.draw(f"question-{turn}.png", draw_choices(run))
+    elif node is not None:
+        drawn = draw_plan(picture, world, node.plan, title, before)
+        data = plan_file(world, node.plan.id, title, picture)
+        files["picture"] = folder.draw(f"plan-{turn}.png", drawn)
+        files["plan"] = folder.write(f"plan-{turn}.json", data)
+        film = f"deploy-{turn}.gif"
+        moved = report.arrival is not None
+        if moved and animate(folder.path / film, run.context, node.plan, title):
+            files["animation"] = film
+    return files
+
+
 def _is_standing(folder: Folder, run: Run, node: PlanNode) -> bool:
     """Whether a plan is of an earlier turn, not driven to in this one, and its files are there."""
     there = all((folder.path / name).exists() for name in ("plan.json", "plan.png"))
     return there and node is run.began.plans.get(node.plan.id) and run.report.arrival is None
 
 
-def _choices(run: Run) -> Any:
+def draw_choices(run: Run) -> Any:
     """The picture with what a question offers and nothing else."""
     asked = [choice["id"] for choice in run.report.candidates or ()]
     targets = tuple(t for t in run.world.targets if t.id in asked)
