@@ -123,6 +123,12 @@ def _line(console: Console, name: str, text: str) -> None:
     console.print(styled((f"{name:>12}  ", "cyan"), under(text, COLUMN)))
 
 
+def choice_words(choice: Mapping[str, Any]) -> str:
+    """What a question offers, by the number it bears in the picture."""
+    box = ", ".join(f"{v:.0f}" for v in choice["box"])
+    return f"{choice['id'].removeprefix('c')}: {choice['label']}, box ({box})"
+
+
 def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
     """What a question offers; candidates by the number they bear in the picture."""
     table = Table(box=None, padding=(0, 2), pad_edge=False, header_style="cyan")
@@ -211,7 +217,7 @@ def certificate_lines(report: Report) -> list[tuple[str, str]]:
     lines += [("finding", finding.sentence) for finding in verdict.findings[:MAX_ROWS]]
     if len(verdict.findings) > MAX_ROWS:
         lines.append(("", f"and {len(verdict.findings) - MAX_ROWS} more findings"))
-    return lines + [("note", note) for note in verdict.notes]
+    return lines + [("note", note) for note in verdict.notes if note not in report.message]
 
 
 def _arrival(console: Console, report: Report) -> None:

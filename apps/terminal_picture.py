@@ -6,7 +6,7 @@ import re
 import select
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from io import BytesIO
 from typing import Literal
 
@@ -20,10 +20,13 @@ from rich.style import Style
 from .terminal import draw
 
 Way = Literal["kitty", "sixel", "blocks", "none"]
+Names = Mapping[str, tuple[float, float]]
+"""Short texts and where they stand, as shares of the picture's width and height."""
 PATIENCE = 0.5
 """Seconds a terminal has to say what it can; most take a thousandth of that."""
 WIDEST, CELL = 100, (8, 16)
 """Columns a picture takes at most; pixels of a cell where the terminal does not say."""
+WRITTEN = Style(color=Color.from_rgb(255, 255, 255), bgcolor=Color.from_rgb(0, 92, 184), bold=True)
 CHUNK = 4096
 KITTY, SIXEL = re.compile(rb"\x1b_Gi=31;OK"), re.compile(rb"\x1b\[\?(?:\d+;)*4(?:;\d+)*c")
 ENDS = re.compile(rb"\x1b\[\?[\d;]*c")
@@ -44,34 +47,48 @@ def show_picture(
     way: Way,
     page: Image.Image,
     small: Callable[[tuple[int, int]], Image.Image],
+    names: Names,
 ) -> None:
     """Show a picture in the terminal.
 
     Args:
         page: as it is in the file.
         small: draws it anew for few pixels, given the greatest width and height.
+        names: what is written into that.
     """
-    columns, rows = min(console.width, WIDEST), max(console.height - 4, 8)
+    columns, rows = min(console.width, WIDEST), max(console.height // 2, 8)
     if way == "blocks":
-        console.print(_HalfBlocks(small((columns, 2 * rows))))
+        console.print(_HalfBlocks(small((columns, 2 * rows)), names))
     elif way != "none":
-        width, height = columns * CELL[0], rows * CELL[1]
         fitting = page.copy()
-        fitting.thumbnail((width, height), Image.Resampling.LANCZOS)
+        fitting.thumbnail((columns * CELL[0], rows * CELL[1]), Image.Resampling.LANCZOS)
         draw((_kitty(fitting) if way == "kitty" else _sixels(fitting)) + "\n")
 
 
 class _HalfBlocks:
-    """Two pixels a cell, the upper one in the colour of the letter."""
+    """Two pixels a cell, the upper one in the colour of the letter, and names over them."""
 
-    def __init__(self, image: Image.Image) -> None:
-        self._rows = np.asarray(image.convert("RGB"))
+    def __init__(self, image: Image.Image, names: Names) -> None:
+        self._pixels = np.asarray(image.convert("RGB"))
+        rows, columns = len(self._pixels) // 2, image.width
+        self._letters: dict[tuple[int, int], str] = {}
+        for name, (x, y) in names.items():
+            row, column = int(y * rows), int(x * columns) - (len(name) - 1) // 2
+            fits = 0 <= row < rows and 0 <= column <= columns - len(name)
+            cells = [(row, column + i) for i in range(len(name))]
+            if fits and not any(cell in self._letters for cell in cells):
+                self._letters |= dict(zip(cells, name, strict=True))
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
-        for top, bottom in zip(self._rows[::2], self._rows[1::2], strict=False):
-            for upper, lower in zip(top.tolist(), bottom.tolist(), strict=True):
-                style = Style(color=Color.from_rgb(*upper), bgcolor=Color.from_rgb(*lower))
-                yield Segment("▀", style)
+        pairs = zip(self._pixels[::2], self._pixels[1::2], strict=False)
+        for row, (top, bottom) in enumerate(pairs):
+            for column, colours in enumerate(zip(top.tolist(), bottom.tolist(), strict=True)):
+                upper, lower = (Color.from_rgb(*colour) for colour in colours)
+                letter = self._letters.get((row, column))
+                if letter is None:
+                    yield Segment("▀", Style(color=upper, bgcolor=lower))
+                else:
+                    yield Segment(letter, WRITTEN)
             yield Segment.line()
 
 

@@ -23,6 +23,8 @@ ANSWERS: dict[bytes, Way] = {
     b"\x1b[?1;2c": "blocks",
     b"\x1b[?64;14;24c": "blocks",
 }
+NAMES = {"12": (0.51, 0.5), "7": (1.2, 0.5), "100": (0.999, 0)}
+"""The last two do not fit."""
 ASKING = """
 from formup.apps.terminal_picture import way_of_terminal
 from rich.console import Console
@@ -40,7 +42,7 @@ def page() -> Image.Image:
 
 def sent(way: Way, page: Image.Image, capsys: pytest.CaptureFixture[str]) -> str:
     console = Console(width=80, height=30, force_terminal=True)
-    show_picture(console, way, page, lambda room: page.resize((room[0], room[1] // 2 * 2)))
+    show_picture(console, way, page, lambda room: page.resize(room), {})
     return capsys.readouterr().out
 
 
@@ -89,9 +91,10 @@ def test_half_blocks_have_two_pixels_a_cell(page: Image.Image) -> None:
     console = Console(width=40, height=20, color_system="truecolor", force_terminal=True)
     cells: list[Segment] = []
     console.print = lambda shown: cells.extend(console.render(shown))  # type: ignore[method-assign]
-    show_picture(console, "blocks", page, lambda room: page.resize((40, 22), 0))
+    show_picture(console, "blocks", page, lambda room: page.resize((40, 22), 0), NAMES)
     rows = [cells[i : i + 40] for i in range(0, len(cells), 41)]
     assert len(rows) == 11
+    assert "".join(cell.text for cell in rows[5]) == "▀" * 20 + "12" + "▀" * 18
     first, last = rows[0][0].style, rows[-1][-1].style
     assert first is not None and last is not None
     assert first.color is not None and first.color.triplet == (200, 40, 40)
