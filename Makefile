@@ -49,7 +49,7 @@ wordings: .venv/.ready-dev
 # The tools, placing and checking, who takes which place, cages, each beside the bare library calls;
 # long sessions.
 bench: .venv/.ready-dev
-	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions; do \
+	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions bench_turns; do \
 	  echo "== $$what"; $(BIN)/python -m formup.benchmarks.$$what || exit 1; echo; \
 	done
 

@@ -51,7 +51,7 @@ class RunOptions(SayOptions, total=False):
     trace: Path | StoredSession | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """A session as far as its last turn came.
 
@@ -81,6 +81,10 @@ class Run:
     def world(self) -> World:
         """All that is known and decided."""
         return self.outcome.world
+
+    def __repr__(self) -> str:
+        """In short: a run holds the whole conversation."""
+        return f"Run({self.report.status!r}, plan_id={self.report.plan_id!r})"
 
     @property
     def steps(self) -> tuple[Step, ...]:

@@ -1,0 +1,58 @@
+"""What a turn of a conversation takes offline: an edit of 30 robots in a picture of 2 megapixels.
+
+CPU time of the whole process, the first turns and the later ones side by side; drawing the picture
+and encoding it is printed beside.
+"""
+
+import time
+from io import BytesIO
+from statistics import median
+
+import numpy as np
+
+from ..agent.agent import Agent
+from ..tools.context import Settings
+from ..tools.draw import draw_plan
+from ..tools.perception.image import Picture, picture_from_array
+from ..tools.perception.target_prompt import TargetPrompt
+
+SIZE, ROBOTS = (1100, 1840), 30
+BOX = (780, 420, 1060, 680)
+WORDS = ("a bit further out", "turn it 10 degrees", "a bit closer", "turn it back 10 degrees")
+ROUNDS = (1, 10, 50)
+"""Turns whose cost is shown: the median of four from each of these rounds on."""
+
+
+def _picture() -> Picture:
+    rng = np.random.default_rng(7)
+    pixels = rng.integers(85, 105, (*SIZE, 3), dtype=np.uint8)
+    x0, y0, x1, y1 = BOX
+    pixels[y0 + 10 : y1 - 10, x0 + 10 : x1 - 10] = (190, 40, 40)
+    return picture_from_array(pixels)
+
+
+def main() -> None:
+    """Print what turns take."""
+    settings = Settings(robots=ROBOTS)
+    session = Agent().start(_picture(), pointed=[TargetPrompt(box=BOX)], settings=settings)
+    session.say("Surround it")
+    spent: list[float] = []
+    for turn in range(4 * max(ROUNDS)):
+        began = time.process_time()
+        run = session.say(WORDS[turn % len(WORDS)])
+        spent.append(1000 * (time.process_time() - began))
+        assert run.report.status == "planned", run.report.message
+    print(f"{ROBOTS} robots, {SIZE[1]} x {SIZE[0]} px; CPU of an edit turn, ms")
+    for first in ROUNDS:
+        cost = median(spent[4 * (first - 1) : 4 * first])
+        print(f"  turn {4 * first - 3:>4} {cost:7.1f}   {cost / median(spent[:4]):.2f} x the first")
+    run = session.run
+    assert run is not None
+    began = time.process_time()
+    image = draw_plan(run.context.picture, run.world, run.world.plan().plan, "")
+    image.save(BytesIO(), "PNG")
+    print(f"  drawing and encoding {1000 * (time.process_time() - began):7.1f}")
+
+
+if __name__ == "__main__":
+    main()
