@@ -122,13 +122,13 @@ def _rotated(part: Part, edit: Rotate) -> Part:
         points = here.at(here.stations(part.points) + arc)
         return part.to(here.settled(points, distances(here.base, part.points)))
     if part.group.opens or part.group.sides is not None:
-        turned = part.valid_group(**_turned(part, edit.degrees))
+        turned = part.valid_group(**_ring_turned(part, edit.degrees))
         return part.on_ring(turned)
     c, s = np.cos(np.radians(edit.degrees)), np.sin(np.radians(edit.degrees))
     return rigid(part, np.array([[c, s], [-s, c]]), part.centre, part.centre)
 
 
-def _turned(part: Part, degrees: float) -> dict[str, object]:
+def _ring_turned(part: Part, degrees: float) -> dict[str, object]:
     """Where the opening or the sides of a ring are after a turn.
 
     Raises:

@@ -89,23 +89,23 @@ def edited_all(
     """
     with search_budget():
         start = draft_of(plan, site)
-        draft = settled(_after(holding(start, stay), edits), start)
+        draft = settled(_edited_by(holding(start, stay), edits), start)
         if moved_in(draft, start):
-            draft = _after(held(start, stay), edits)
+            draft = _edited_by(held(start, stay), edits)
         if astray := moved_in(draft, start):
             names = " and ".join(map(str, astray))
             raise ToolError(f"Robot {names} cannot stay where it is and take part in that.")
         contract = draft.agreed()
         after = make_plan(contract, site, version(contract), draft.points)
         after = _off_others(after, draft, plan.formation.points, edits)
-    after = after.model_copy(update={"verdict": _named(after.verdict, draft)})
+    after = after.model_copy(update={"verdict": _called_by_id(after.verdict, draft)})
     was = draft.was
     names = plan.formation.robot_of_place
     robots = tuple(None if i < 0 else names[i] for i in map(int, was))
     return Edited(plan=after, parent=plan.id, diff=_diff(plan, after, was), robots=robots)
 
 
-def _after(draft: Draft, edits: Sequence[Edit]) -> Draft:
+def _edited_by(draft: Draft, edits: Sequence[Edit]) -> Draft:
     for edit in edits:
         if edit.kind in TEAM_RULES:
             draft = TEAM_RULES[edit.kind](draft, edit)
@@ -143,7 +143,7 @@ def _off_others(plan: Plan, draft: Draft, before: FloatArray, edits: Sequence[Ed
     return again if again.verdict.certified else plan
 
 
-def _named(verdict: Verdict, draft: Draft) -> Verdict:
+def _called_by_id(verdict: Verdict, draft: Draft) -> Verdict:
     """The verdict in which robots are called as the person calls them, with the draft's notes."""
     used = set(draft.numbers)
     free = (n for n in count(1) if n not in used)
