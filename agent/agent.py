@@ -17,13 +17,13 @@ from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.tool import Tool
 from ..tools.world import Target, World, to_json_values
 from .conversation import Session, in_own_loop
-from .first_message import check_turn, first_message, numbered_anew
+from .first_message import check_turn, first_message, in_new_picture, pointed_at
 from .limits import DEFAULT_LIMITS, Limits
 from .loop import ANYTHING, Approval
 from .loop import run as run_loop
 from .messages import History, closed
 from .model import Model
-from .outcomes import Cancelled, Outcome, Paused, Stopped
+from .outcomes import Cancelled, Paused
 from .policy import Policy
 from .providers.registry import model_named
 from .report import Report, make_report
@@ -31,9 +31,10 @@ from .session import (
     LogRecorder,
     Run,
     RunOptions,
-    SayOptions,
     Show,
+    TurnOptions,
     answered_by,
+    end_facts,
     picture_facts,
 )
 from .session_start import FORMAT
@@ -178,7 +179,7 @@ class Agent:
         fixed, pointed, kept = settings or Settings(), tuple(pointed), tuple(keep_out)
         return Session(self, picture, fixed, pointed, kept, stored, auto)
 
-    def say(self, run: Run, words: str, **options: Unpack[SayOptions]) -> Run:
+    def say(self, run: Run, words: str, **options: Unpack[TurnOptions]) -> Run:
         """The next turn of a session; the synchronous door to `asay`.
 
         Raises:
@@ -194,6 +195,7 @@ class Agent:
         pointed: Sequence[TargetPrompt] = (),
         keep_out: Sequence[TargetPrompt] = (),
         settings: Settings | None = None,
+        picture: Picture | None = None,
         show: Show | None = None,
     ) -> Run:
         """The next turn of a session: what the person says after a turn has ended.
@@ -205,6 +207,7 @@ class Agent:
             keep_out: what no robot may enter from now on, beside what there was.
             settings: what the person fixes from now on; as before if left out, but for the number
                 of robots, their starts and approvals, which hold for one turn.
+            picture: another one from now on, which voids all plans.
 
         Raises:
             InputError: something given cannot be used.
@@ -214,14 +217,19 @@ class Agent:
         fixed = fixed.model_copy(update={"approved": None})
         world = run.world.having(doubted=None)
         context = replace(run.context, world=world, settings=fixed, steps=run.steps).check()
-        pointed = numbered_anew(pointed, world)
+        if picture is not None:
+            context = in_new_picture(context, picture)
+        pointed = pointed_at(pointed, context.world)
         check_turn(context, words, pointed)
         context = context.at(with_keep_outs(context, keep_out))
         messages = closed(run.outcome.messages, "No result: the person interrupted it, or went on.")
         with closing(_reopened(run, show)) as recorder:
             for message in messages[len(run.outcome.messages) :]:
                 recorder.message(message, run.world)
-            return await self._turn(context, messages, words, pointed, recorder, run.stored)
+            if picture is not None:
+                recorder.event("picture", picture_facts(picture, context.services.artefacts))
+            turn = context, messages, words, pointed, recorder, run.stored
+            return await self._turn(*turn, fresh=picture is not None)
 
     def resume(
         self,
@@ -281,12 +289,15 @@ class Agent:
         pointed: Sequence[TargetPrompt],
         recorder: LogRecorder,
         stored: StoredSession | None,
+        *,
+        fresh: bool = False,
     ) -> Run:
         """Begin a turn and let the loop work on it."""
         recorder.event("turn", {"words": words, "settings": to_json_values(context.settings)})
         world = context.world.having(pointed=tuple(pointed))
         context = replace(context, world=world, words=words)
-        first = first_message(context, messages, seen=getattr(self.model, "sees", False))
+        sees = getattr(self.model, "sees", False)
+        first = first_message(context, messages, seen=sees, fresh=fresh)
         recorder.message(first, world)
         blank = Report(status="stopped", message="", instruction=words, model=self.model.name)
         left = Cancelled((*messages, first), world)
@@ -321,7 +332,7 @@ class Agent:
             report = make_report(outcome, context, left.began, self.model.name, seconds)
             report = report.model_copy(update=self._prompts())
             recorder.world(outcome.world)
-            recorder.event("end", _end(outcome, report))
+            recorder.event("end", end_facts(outcome, report))
             if recorder.problem is not None:
                 text = f"{report.message} The log ends before this: {recorder.problem}"
                 report = report.model_copy(update={"message": text})
@@ -381,18 +392,3 @@ def _reopened(run: Run, show: Show | None) -> LogRecorder:
             raise StorageError(f"{run.stored.label} {lost}")
         log = run.stored.write(run.events)
     return LogRecorder(log, run.context.services.artefacts, run.world, show)
-
-
-def _end(outcome: Outcome, report: Report) -> dict[str, Any]:
-    """The event that ends a turn."""
-    facts = {
-        "outcome": type(outcome).__name__.lower(),
-        "status": report.status,
-        "message": report.message,
-        "usage": report.usage.model_dump(),
-    }
-    if isinstance(outcome, Stopped):
-        facts |= {"kind": outcome.kind, "reason": outcome.reason}
-    if isinstance(outcome, Paused):
-        facts |= {"call": outcome.call.id, "plan_id": outcome.plan_id}
-    return facts

@@ -6,7 +6,7 @@ here and nowhere else, for every model alike.
 
 import asyncio
 import copy
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, Unpack
@@ -28,6 +28,7 @@ NOTHING_SAID = "Say what to do first, such as surround the coin with 6 robots."
 HELD = "The robots are held where they are. Say what to change, or go to drive on."
 STOP = frozenset({"stop", "halt", "freeze", "stop now", "stop it", "emergency stop"})
 """Words that hold the robots at once, whoever else would have read them."""
+YES, NO = frozenset({"y", "yes", "approve", "approved"}), frozenset({"n", "no", "nope"})
 DROPS = frozenset({"query", "talk", "undo", "hold"})
 """Kinds of what is said that are no answer to a question, which is dropped for them."""
 
@@ -122,6 +123,7 @@ class Session:
         words: str,
         *calls: tuple[str, dict[str, Any]],
         text: str = "",
+        picture: Picture | None = None,
         show: Show | None = None,
     ) -> Run:
         """A turn that asks no model: calls of tools by the person.
@@ -130,21 +132,32 @@ class Session:
             words: what it is called in the log, such as /undo.
             calls: names of tools and their arguments.
             text: what is said where there are none.
+            picture: another one from now on.
 
         Raises:
             InputError: nothing was said yet.
         """
-        agent, run = copy.copy(self.agent), self._run
-        agent.model = Commands(calls, text)
+        agent, run = self._commanded(calls, text), self._run
         moves = any(name == "deploy" for name, _ in calls)
         settings = self._fixed(run).model_copy(update={"may_deploy": moves})
-        return self._keep(await agent.asay(run, words, settings=settings, show=show))
+        self.picture = picture or self.picture
+        return self._keep(
+            await agent.asay(run, words, settings=settings, picture=picture, show=show)
+        )
 
     async def aundo(self, steps: int = 1, to: str | None = None) -> Run:
         """Go back to the plan before, `steps` below 0 forward again; robots stay where they are."""
         arguments = {"steps": steps} if to is None else {"to": to}
         words = f"/undo {to or steps}" if steps > 0 or to else f"/redo {-steps}"
         return await self.aact(words, ("undo", arguments))
+
+    async def aimage(self, picture: Picture) -> Run:
+        """Go on with another picture: plans are void, things are measured where they were."""
+        run = self._run
+        again = ", ".join(t.id for t in run.world.targets)
+        text = f"It is {picture.name} from now on. Plans made before are void; say what to do."
+        text += f" {again} will be looked for where it was." if again else ""
+        return await self.aact(f"/image {picture.name}", text=text, picture=picture)
 
     async def aedit(self, *edits: dict[str, Any]) -> Run:
         """Change the plan that stands, by edits as `edit_formation` takes them."""
@@ -170,7 +183,7 @@ class Session:
         if waits != plan_id:
             what = f"plan {waits} waits" if waits else "no plan waits for approval"
             raise InputError(f"{plan_id} cannot be approved: {what}.")
-        return self._keep(await self.agent.aresume(run, approve=True, show=show))
+        return self._keep(await self._commanded().aresume(run, approve=True, show=show))
 
     async def astop(self) -> Run:
         """Hold all robots where they are; they drive on after the next go."""
@@ -209,6 +222,10 @@ class Session:
         """See `ago`."""
         return self._sync(self.ago(plan_id))
 
+    def image(self, picture: Picture) -> Run:
+        """See `aimage`."""
+        return self._sync(self.aimage(picture))
+
     @property
     def _run(self) -> Run:
         if self.run is None:
@@ -225,8 +242,22 @@ class Session:
         assert isinstance(outcome, Paused)
         if outcome.call.name == "ask_user":
             return await self.agent.aresume(run, answer=words, show=show)
-        yes = read_followup(words, self._standing(run)).go or words.strip().lower() in ("y", "yes")
-        return await self.agent.aresume(run, approve=yes, answer=None if yes else words, show=show)
+        if words.strip(" .!").lower() in NO:
+            return await self._commanded().aresume(run, approve=False, answer=words, show=show)
+        read = read_followup(words, self._standing(run))
+        yes = read.go or read.kind == "go" or words.strip(" .!").lower() in YES
+        if yes and outcome.plan_id is not None:
+            return await self.aapprove(outcome.plan_id, show)
+        settings = await self._for_turn(words)
+        return await self.agent.asay(run, words, settings=settings, show=show)
+
+    def _commanded(
+        self, calls: Sequence[tuple[str, dict[str, Any]]] = (), text: str = ""
+    ) -> TurnTaker:
+        """The agent with the person's own calls in its model's place."""
+        agent = copy.copy(self.agent)
+        agent.model = Commands(calls, text)
+        return agent
 
     def _standing(self, run: Run | None) -> Standing | None:
         """What follow-ups are read by."""

@@ -10,8 +10,9 @@ from ..tools.context import Context
 from ..tools.draw import draw_view, view_scale
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import MAX_ROBOTS
+from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
-from ..tools.world import World, to_json_values
+from ..tools.world import Target, World, to_json_values
 from .messages import History, User
 
 MOST_NUMBERED = 40
@@ -46,22 +47,23 @@ class Task:
     size: tuple[int, int] = (0, 0)
 
 
-def first_message(context: Context, before: History, *, seen: bool) -> User:
+def first_message(context: Context, before: History, *, seen: bool, fresh: bool = False) -> User:
     """What is asked, and for a model that sees the picture it is asked about.
 
     Args:
         context: with the person's words and the picture.
         before: the conversation so far, in which the picture has been shown.
         seen: whether the model sees.
+        fresh: whether the picture is another than before.
     """
-    if not seen or before:
+    if not seen or (before and not fresh):
         return User(text=task_text(context, follows=bool(before)))
     numbered = context.candidates()[:MOST_NUMBERED] if context.settings.numbered else ()
     image = draw_view(context.picture, context.world, candidates=numbered)
     scale = view_scale(context.picture)
     how = "" if scale == 1 else f", shown at {scale:.3g} times its size: read the rulers"
     how += ", numbers are candidates: 3 is c3" if numbered else ""
-    return User(text=task_text(context, how), images=(image,))
+    return User(text=task_text(context, how, follows=bool(before)), images=(image,))
 
 
 def task_text(context: Context, how: str = "", *, follows: bool = False) -> str:
@@ -139,9 +141,42 @@ def _size(words: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def numbered_anew(pointed: Sequence[TargetPrompt], world: World) -> list[TargetPrompt]:
-    """What is pointed at in a later turn: another thing than the targets there are."""
-    used, numbered = {target.id for target in world.targets}, list[TargetPrompt]()
+MOVED_SHARE = 0.1
+"""By so much of its longer side a thing may have moved in another picture to be found again."""
+
+
+def in_new_picture(context: Context, picture: Picture) -> Context:
+    """The context with another picture: what was measured is pointed at, where it was before."""
+    context.services.pictures[picture.sha256] = picture
+    world = World.of(picture)
+    made = context.world.having(
+        picture=world.picture,
+        pointed=tuple(_where_it_was(t, world.picture.size) for t in context.world.targets),
+        targets=(),
+        keep_out=(),
+        samples={},
+        shown=(),
+    )
+    return context.at(made)
+
+
+def _where_it_was(target: Target, size: tuple[int, int]) -> TargetPrompt:
+    """A box around a target and what it may have moved by."""
+    x0, y0, x1, y1 = target.box
+    more = MOVED_SHARE * max(x1 - x0, y1 - y0)
+    last = size[0] - 1, size[1] - 1
+    box = (max(x0 - more, 0), max(y0 - more, 0), min(x1 + more, last[0]), min(y1 + more, last[1]))
+    return TargetPrompt(id=target.id, label=target.label, box=box)
+
+
+def pointed_at(pointed: Sequence[TargetPrompt], world: World) -> list[TargetPrompt]:
+    """What is pointed at in a later turn: other things than the targets there are.
+
+    What was pointed at before and is not measured yet is still meant.
+    """
+    used = {target.id for target in world.targets}
+    numbered = [prompt for prompt in world.pointed if prompt.id not in used]
+    used.update(prompt.id for prompt in numbered)
     for prompt in pointed:
         name = prompt.id
         if name in used:

@@ -73,6 +73,8 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
             settings = Settings.model_validate(event.data["settings"])
             words = event.data["words"]
             turns.append([])
+        elif event.kind == "picture":
+            facts = {**facts, "picture": event.data}
         elif event.kind == "approval" and event.data["plan_id"]:
             settings = settings.model_copy(update={"approved": event.data["plan_id"]})
         elif event.kind == "world":

@@ -12,9 +12,9 @@ from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
-from .agent import Agent, SayOptions
+from .agent import Agent
 from .conversation import Session
-from .session import Run, Show, load_run
+from .session import Run, SayOptions, Show, load_run
 from .store.copies import fork
 from .store.protocol import Event, Store
 
@@ -103,6 +103,10 @@ class Service:
     async def go(self, session: str, plan_id: str | None = None, show: Show | None = None) -> Run:
         """Drive the robots to a plan, the one that stands by default."""
         return await self._turn(session, self.session(session).ago(plan_id, show))
+
+    async def image(self, session: str, picture: Picture) -> Run:
+        """Go on with another picture; see `Session.aimage`."""
+        return await self._turn(session, self.session(session).aimage(picture))
 
     async def approve(self, session: str, plan_id: str, show: Show | None = None) -> Run:
         """Approve exactly one plan, and drive real robots to it."""

@@ -44,6 +44,12 @@ class SayOptions(TypedDict, total=False):
     show: Show | None
 
 
+class TurnOptions(SayOptions, total=False):
+    """What may be given with the words of a later turn; see `Agent.asay`."""
+
+    picture: Picture | None
+
+
 class RunOptions(SayOptions, total=False):
     """What may be given with the first words; see `Agent.arun`."""
 
@@ -309,3 +315,18 @@ def _outcome(state: State) -> Outcome:
     if end["outcome"] == "stopped":
         return Stopped(messages, world, end["kind"], end["reason"])
     raise ValueError
+
+
+def end_facts(outcome: Outcome, report: Report) -> dict[str, Any]:
+    """The event that ends a turn."""
+    facts = {
+        "outcome": type(outcome).__name__.lower(),
+        "status": report.status,
+        "message": report.message,
+        "usage": report.usage.model_dump(),
+    }
+    if isinstance(outcome, Stopped):
+        facts |= {"kind": outcome.kind, "reason": outcome.reason}
+    if isinstance(outcome, Paused):
+        facts |= {"call": outcome.call.id, "plan_id": outcome.plan_id}
+    return facts

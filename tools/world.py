@@ -265,8 +265,8 @@ class World(Value):
             raise ToolError(altered, "void_plan")
         if self.is_void(node.plan):
             raise ToolError(
-                f"Plan {plan_id} is void: what it is about was measured again since, or the scale "
-                "is another. Deploy one proposed since, or propose this again as it was.",
+                f"Plan {plan_id} is void: the picture or its scale is another, or what it is about "
+                "was measured again since. Deploy one proposed since, or propose this again.",
                 "void_plan",
             )
         return node

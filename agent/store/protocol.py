@@ -15,11 +15,13 @@ from pydantic_core import to_json
 from ...tools.context import Artefacts
 from ...tools.errors import InputError, StorageError
 
-EventKind = Literal["session", "turn", "resume", "world", "message", "approval", "moving", "end"]
+EventKind = Literal[
+    "session", "turn", "picture", "resume", "world", "message", "approval", "moving", "end"
+]
 """session: who decides, by which prompts, within which limits, and the picture; turn: what the
-person says, with the settings; resume: the turn goes on, perhaps in another process; world: what
-has changed in it; message: of the conversation; approval: a person's yes or no to a call; moving:
-robots are about to move; end: how the turn ended."""
+person says, with the settings; picture: another one from now on; resume: the turn goes on, perhaps
+in another process; world: what has changed in it; message: of the conversation; approval: a
+person's yes or no to a call; moving: robots are about to move; end: how the turn ended."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from formup.agent.conversation import Session
 from formup.agent.messages import Call, Reply
 from formup.agent.outcomes import Cancelled
 from formup.agent.service import Service
-from formup.agent.session import Run
+from formup.agent.session import Run, load_run
 from formup.agent.store.folder_store import FolderStore
 from formup.agent.wrappers.doubles import FunctionModel
 from formup.tools.context import Settings
@@ -158,6 +158,29 @@ def test_stop_holds_the_robots_until_go_with_the_model_unreachable(
     assert session.say("a bit further out").report.status == "planned"
     assert not drives
     assert session.say("go").report.status == "deployed"
+
+
+def test_another_picture_voids_the_plan_and_things_are_looked_for_where_they_were(
+    picture: Picture, tmp_path: Path
+) -> None:
+    stored = FolderStore(tmp_path).create()
+    session = Agent().start(
+        picture, pointed=[TargetPrompt(box=RED)], settings=Settings(robots=8), stored=stored
+    )
+    first = session.say("Surround it")
+    moved = picture_from_array(np.roll(picture.pixels, 6, axis=1))
+    told = session.image(moved)
+    assert told.report.status == "answered"
+    assert "void" in told.report.message
+    assert session.go().report.status != "deployed"
+    session.run = load_run(stored)
+    assert session.run.context.picture.sha256 == moved.sha256
+    again = session.say("Surround it with 8 robots")
+    assert again.report.status == "planned"
+    assert again.report.plan_id != first.report.plan_id
+    (target,) = again.world.targets
+    assert target.id == "t1"
+    assert target.box[0] == pytest.approx(first.world.targets[0].box[0] + 6, abs=2)
 
 
 class TestService:

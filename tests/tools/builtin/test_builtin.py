@@ -340,7 +340,7 @@ def test_what_the_person_fixed_is_held_to(work: "ToolCalls") -> None:
 def test_a_changed_scene_voids_a_plan(work: "ToolCalls") -> None:
     plan = call(work, "propose_formation", contract=contract("around", 6, "t1"))["plan_id"]
     call(work, "segment", id="t1", outline=[(62, 42), (118, 42), (118, 88), (62, 88)])
-    with pytest.raises(ToolError, match="is void: what it is about was measured again since"):
+    with pytest.raises(ToolError, match="is void: the picture or its scale is another"):
         call(work, "deploy", plan_id=plan)
 
 

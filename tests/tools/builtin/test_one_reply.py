@@ -212,7 +212,7 @@ def test_a_plan_that_is_proposed_again_is_valid_again_and_deployed_by_its_id(beg
     first = work.call("propose_formation", contract={"groups": groups}, targets=[TARGET])
     other = work.call("propose_formation", contract={"groups": groups}, targets=[MENDED])
     assert other.data["plan_id"] != first.data["plan_id"]
-    with pytest.raises(ToolError, match=r"is void: what it is about was measured again since"):
+    with pytest.raises(ToolError, match=r"is void: the picture or its scale is another"):
         work.call("deploy", plan_id=first.data["plan_id"])
     again = work.call("propose_formation", contract={"groups": groups}, targets=[TARGET])
     assert again.data["plan_id"] == first.data["plan_id"]
