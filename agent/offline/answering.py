@@ -12,10 +12,10 @@ from .standing import Standing
 MOST_NAMED = 4
 """Robots of which each way is told."""
 HELP = (
-    "Say what to change: further out, closer, exactly 20 px away, two more robots, only on the left, "
-    "turn it 30 degrees, leave a gap towards the top, the same around the other one, half of them "
-    "there, fill it instead, robot 3 a bit to the left, robot 4 leaves, undo. Ask how far robot 4 is, "
-    "or whether it is closed. Nothing moves until you say go."
+    "Say what to change: further out, closer, exactly 20 px away, two more robots, only on the "
+    "left, turn it 30 degrees, leave a gap towards the top, the same around the other one, half of "
+    "them there, fill it instead, robot 3 a bit to the left, robot 4 leaves, undo. Ask how far "
+    "robot 4 is, or whether it is closed. Nothing moves until you say go."
 )
 ROBOTS_STAY = "The robots do not move back by themselves; say go for that."
 
@@ -40,6 +40,9 @@ def talk(followup: Followup, standing: Standing | None, before: History) -> str:
             if standing.words
             else f"Plan {standing.plan} stands."
         )
+    if about == "steps":
+        n = standing.changes
+        return f"{n} change{'s' * (n != 1)} can be taken back."
     if about == "already":
         return f"That is so already; plan {standing.plan} stands as it is."
     groups = "; ".join(
@@ -79,9 +82,8 @@ def _moves(data: Mapping[str, Any], scale: float | None) -> str:
             ", ".join(f"robot {m['robot']} goes {length_text(m['px'], scale)}" for m in moves)
         )
     elif moving:
-        parts.append(
-            f"{moving} go, robot {moves[0]['robot']} the furthest, {length_text(data['longest_px'], scale)}"
-        )
+        longest = length_text(data["longest_px"], scale)
+        parts.append(f"{moving} go, robot {moves[0]['robot']} the furthest, {longest}")
     for name, verb in (("added", "added"), ("removed", "gone")):
         if data.get(name):
             parts.append(f"robot{'s' * (len(data[name]) > 1)} {listed(data[name])} {verb}")
@@ -114,7 +116,8 @@ def arrived(data: Mapping[str, Any], scale: float | None) -> str:
 def said_of_query(query: Mapping[str, Any], data: Mapping[str, Any], scale: float | None) -> str:
     """The answer to a question about the plan, of what was measured."""
     if "nearest_px" in data:
-        return f"{length_text(data['nearest_px'], scale)} (centre to centre {length_text(data['centres_px'], scale)})."
+        nearest, centres = (length_text(data[n], scale) for n in ("nearest_px", "centres_px"))
+        return f"{nearest} (centre to centre {centres})."
     rows = [r for r in data["each"] if int(r["robot"]) in query.get("robots", [int(r["robot"])])]
     return ANSWERS[query["about"]](query, data, rows, scale)
 
@@ -139,7 +142,8 @@ def _distance(
         )
     ways = [r["target_px"] for r in measured]
     least, most = length_text(min(ways), scale), length_text(max(ways), scale)
-    return f"The robots are {least} to {most} from {listed(list(dict.fromkeys(r['target'] for r in measured)))}."
+    things = listed(list(dict.fromkeys(r["target"] for r in measured)))
+    return f"The robots are {least} to {most} from {things}."
 
 
 def _spacing(
@@ -148,7 +152,8 @@ def _spacing(
     ways = [r["neighbour_px"] for r in rows if "neighbour_px" in r]
     if not ways:
         return "There is one robot only."
-    return f"Each is {length_text(min(ways), scale)} to {length_text(max(ways), scale)} from its nearest neighbour."
+    least, most = length_text(min(ways), scale), length_text(max(ways), scale)
+    return f"Each is {least} to {most} from its nearest neighbour."
 
 
 def _nearest(
@@ -169,8 +174,10 @@ def _closed(
     for group in data["groups"]:
         if "closed" not in group:
             continue
-        widest = f"the widest opening, between robots {listed(group['between'])}, is {length_text(group['widest_opening_px'], scale)}"
-        needed = "" if group["closed"] else f"; {group['robots_to_close']} robots would close it"
+        width = length_text(group["widest_opening_px"], scale)
+        widest = f"the widest opening, between robots {listed(group['between'])}, is {width}"
+        needed = f"; {group['robots_to_close']} evenly spaced robots would close it"
+        needed = "" if group["closed"] else needed
         told.append(f"{'Yes, closed' if group['closed'] else 'No, not closed'}: {widest}{needed}.")
     return " ".join(told) or "They stand in no ring, so nothing is closed."
 
@@ -183,13 +190,16 @@ def _needed(
         return "They stand in no ring, so none would close it."
     if rings[0]["closed"]:
         return f"It is closed with the {data['robots']} robots there are."
-    return f"{rings[0]['robots_to_close']} robots would close it; there are {data['robots']}."
+    enough = f"{rings[0]['robots_to_close']} evenly spaced robots would close it"
+    return f"{enough}; there are {data['robots']}."
 
 
 def _count(
     query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
 ) -> str:
-    return f"{data['robots']} robots."
+    names = [str(r["robot"]) for r in data["each"]]
+    which = f": {listed(names)}" if len(names) == data["robots"] else ""
+    return f"{data['robots']} robots{which}."
 
 
 def _arrival(
@@ -207,10 +217,11 @@ def _arrival(
 def _where(
     query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
 ) -> str:
-    stands = [
-        f"robot {r['robot']} {'stands at' if 'at' in r else 'is to stand at'} ({r.get('at', r['place'])[0]:g}, {r.get('at', r['place'])[1]:g})"
-        for r in rows
-    ]
+    stands: list[str] = []
+    for row in rows:
+        x, y = row.get("at", row["place"])
+        verb = "stands at" if "at" in row else "is to stand at"
+        stands.append(f"robot {row['robot']} {verb} ({x:g}, {y:g})")
     text = "; ".join(stands)
     return text[:1].upper() + text[1:] + "."
 
@@ -218,7 +229,8 @@ def _where(
 def _certified(
     query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
 ) -> str:
-    return f"Plan {data['plan_id']} was certified when it was made, and is certified once more before any robot moves."
+    again = "and is certified once more before any robot moves"
+    return f"Plan {data['plan_id']} was certified when it was made, {again}."
 
 
 ANSWERS: dict[str, Answer] = {

@@ -91,7 +91,7 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
             numbers = re.findall(r"(?<![-.\w])c?([0-9]{1,4})(?!\.?[0-9])\b", answer)
             offered = [f"c{n}" for n in numbers if f"c{n}" in call.arguments["candidates"]]
             if not offered:
-                offered = picked(answer, _sightings(call.arguments["candidates"], history))
+                offered = picked(answer, sightings(call.arguments["candidates"], history))
             named = list(dict.fromkeys([*chosen, *offered]))
             if len(named) <= needed and not _excludes(answer):
                 chosen = named
@@ -149,7 +149,7 @@ def _measure(candidate: dict[str, Any], name: str) -> float:
     return {"x": x0 + x1, "y": y0 + y1}.get(name, candidate["area_px"])
 
 
-def _sightings(ids: Sequence[str], history: History) -> list[dict[str, Any]]:
+def sightings(ids: Sequence[str], history: History) -> list[dict[str, Any]]:
     """What was said of candidates when they were found."""
     found: dict[str, dict[str, Any]] = {}
     for message in history:

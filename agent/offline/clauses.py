@@ -76,6 +76,8 @@ class Line:
         self.led = ""
         self.excepted: tuple[int, ...] = ()
         found = [resolved(c, self.words, standing) for c in chunks_of(self.words, standing)]
+        while len(found) > 1 and ("correction" in found[-1].kinds or is_empty(found[-1])):
+            found.pop()  # "the lower one, i mean"
         self.chunks = self._without_excepted(self._without_lead(found))
 
     @property
@@ -194,7 +196,9 @@ class Line:
         found = self._substituted(clauses, after)
         kinds = {e["kind"] for c in found or () for e in c.effects}
         if found and self.denies and self.standing.edits and kinds & {*followup_turns.RELATIVE}:
-            return [Clause((), "undo", ({"kind": "undo", "steps": 1},)), *found]
+            edits = [e for c in found for e in c.effects]
+            effects = followup_turns.corrected([dict(e) for e in self.standing.edits], edits)
+            return [replace(found[0], effects=tuple(effects), frame="corrected")]
         return found
 
     def _substituted(
@@ -220,22 +224,27 @@ def _is_pure(chunk: Chunk) -> bool:
 
 def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
     """The phrases of a clause with others put in; None where one has no place there."""
-    chunks = list(clause.chunks)
+    chunks, changed = list(clause.chunks), False
     for new in after:
+        at = next((k for k in range(len(chunks) - 1, -1, -1) if _stands_for(new, chunks[k])), None)
         kinds = set(new.kinds)
-        amount = kinds & {*AMOUNTS}
-        alike = [
-            k
-            for k, old in enumerate(chunks)
-            if kinds & set(old.kinds) & {*REPLACED} or (amount and set(old.kinds) & {*AMOUNTS})
-        ]
-        if alike:
-            chunks[alike[-1]] = new
-        elif amount or (clause.frame == "rotate" and kinds & {"dir", "spin"}):
+        if at is not None:
+            unit = next((u for u in ("px", "angle") if u in chunks[at].kinds), "")
+            bare = unit and "num" in kinds
+            chunks[at] = replace(new, kinds={unit: new.kinds["num"]}) if bare else new
+            changed = True
+        elif kinds & {*AMOUNTS} or (clause.frame == "rotate" and kinds & {"dir", "spin"}):
             chunks.append(new)
-        else:
+            changed = True
+        elif not kinds & {*rules()["common"]}:
             return None
-    return chunks
+    return chunks if changed else None
+
+
+def _stands_for(new: Chunk, old: Chunk) -> bool:
+    """Whether a phrase can be put in the place of another: both say the same kind of thing."""
+    amounts = bool(set(new.kinds) & {*AMOUNTS}) and bool(set(old.kinds) & {*AMOUNTS})
+    return amounts or bool(set(new.kinds) & set(old.kinds) & {*REPLACED})
 
 
 def _built(frame: Frame, slots: Slots, said: Said) -> Effects:

@@ -1,4 +1,4 @@
-"""The offline planner in a conversation: what is said to a plan that stands, tool call by tool call.
+"""The offline planner in a conversation: what is said to a plan, tool call by tool call.
 
 What was done already is read from the turn's messages, so nothing is kept here. A whole new
 instruction is left to the planner.
@@ -6,18 +6,21 @@ instruction is left to the planner.
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from ..first_message import Task
 from ..messages import Call, History, Reply, Result
+from .accounting import read_instruction
 from .answering import arrived, said_of_edit, said_of_query, said_of_undo, talk
-from .choosing import Found, Step, agrees, find, located, prompts_of
+from .choosing import Found, Step, agrees, find, located, prompts_of, sightings
 from .followup_edits import OTHER
+from .followup_things import UNNAMED
 from .followups import Followup, read_followup
 from .phrases import table
 from .references import described
+from .spelling import spelled
 from .standing import Standing
 
 DEICTIC = re.compile(
@@ -32,9 +35,9 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
     words, messages = task.instruction, turn[1:]
     followup = read_followup(words, standing)
     if standing is None and not before and followup.kind != "talk":
-        return task, turn
+        return replace(task, instruction=_typed(words)), turn
     while followup.kind == "ask":
-        answer, messages = _answer(messages)
+        answer, messages = _answer_to(messages)
         if answer is None:
             return _calling("ask_user", {"question": _question(followup)})
         if answer.lower().strip(" .!") in DECLINED:
@@ -43,8 +46,17 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
         followup = read_followup(words, standing)
     if followup.kind == "instruction":
         fresh = words != task.instruction
-        return replace(task, instruction=words), (turn[0], *messages) if fresh else turn
+        said = followup.text if standing else words
+        return replace(task, instruction=_typed(said)), (turn[0], *messages) if fresh else turn
     return _Steps(task, standing, followup, messages, before).next()
+
+
+def _typed(words: str) -> str:
+    """An instruction, with slips of the fingers put right where it is understood then."""
+    corrected = spelled(words)
+    if corrected != words and read_instruction(words).unread:
+        return words if read_instruction(corrected).unread else corrected
+    return words
 
 
 def _standing(task: Task) -> Standing | None:
@@ -63,7 +75,7 @@ def _standing(task: Task) -> Standing | None:
     )
 
 
-def _answer(messages: History) -> tuple[str | None, History]:
+def _answer_to(messages: History) -> tuple[str | None, History]:
     """The person's answer to the first question in words, and the messages after it."""
     for k, message in enumerate(messages):
         if isinstance(message, Result) and message.name == "ask_user" and not message.error:
@@ -134,6 +146,9 @@ class _Steps:
             )
             return Reply(text=text)
         robots, thing = query.get("robots", []), query.get("thing", "")
+        unnamed = all(label.startswith(UNNAMED) for _, label in standing.things)
+        if str(thing).startswith("?") and unnamed and len(standing.things) == 1:
+            thing = standing.things[0][0]
         if str(thing).startswith("?"):
             return Reply(text=f'"{thing[1:]}" is not measured yet: point at it, and ask again.')
         if thing or len(robots) == 2:
@@ -143,7 +158,7 @@ class _Steps:
         return _calling("measure", {"a": "plan"})
 
     def _change(self, standing: Standing) -> Reply:
-        """Take back, find things, measure, edit; then move where that is asked, and say what came."""
+        """Take back, find things, measure, edit; then move where asked, and say what came."""
         followup, failed = self.followup, self.done.get("edit_formation")
         ids: dict[str, str] = {}
         prompts: list[dict[str, Any]] = []
@@ -152,10 +167,13 @@ class _Steps:
             if isinstance(found, Step):
                 return _calling(found.name, found.arguments)
             known = [name for name, _ in standing.things]
+            there = measured_at(found.candidate, standing.centre or {}, self.messages)
+            if there is not None:
+                ids[f"?{phrase}"] = there
+                continue
             taken = [*known, *standing.pointed, *(p["id"] for p in prompts)]
-            prompt = prompts_of(
-                [(found.candidate, found.wording.removeprefix("the ")[:100])], self.before, taken
-            )[0]
+            label = found.wording.removeprefix("the ")[:100]
+            prompt = prompts_of([(found.candidate, label)], self.before, taken)[0]
             ids[f"?{phrase}"] = prompt["id"]
             prompts += [prompt] if prompt["id"] not in known else []
         undone = self.done.get("undo")
@@ -212,7 +230,7 @@ class _Steps:
             )
         told = said_of_edit(data, self.task.metres_per_pixel)
         if self.followup.rest:
-            answer, _ = _answer(self.messages)
+            answer, _ = _answer_to(self.messages)
             if answer is None:
                 return _calling(
                     "ask_user",
@@ -236,9 +254,8 @@ class _Steps:
             k for k, m in enumerate(self.messages) if isinstance(m, Result) and m.name == "ask_user"
         )
         if following.kind in ("ask", "instruction"):
-            return Reply(
-                text=f"{told} {following.text if following.kind == 'ask' else 'Say that as a turn of its own.'}"
-            )
+            alone = "Say that as a turn of its own."
+            return Reply(text=f"{told} {following.text if following.kind == 'ask' else alone}")
         return _Steps(self.task, now, following, self.messages[after + 1 :], self.before).next()
 
     def _deploy(self, plan: str, told: str) -> Reply:
@@ -296,21 +313,35 @@ def _other(phrase: str, standing: Standing, messages: History) -> Found | Step:
     )
 
 
+def measured_at(
+    candidate: str, centres: Mapping[str, Sequence[float]], messages: History
+) -> str | None:
+    """The id of what is measured already where a candidate lies; None where nothing is."""
+    boxes = [c["box"] for c in sightings([candidate], messages)]
+    there = (t for t, at in centres.items() for box in boxes if _holds(box, (at[0], at[1])))
+    return next(there, None)
+
+
 def _holds(box: Sequence[float], point: tuple[float, float]) -> bool:
     return box[0] <= point[0] <= box[2] and box[1] <= point[1] <= box[3]
 
 
 def _by_way(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) -> dict[str, Any]:
     """One robot's way out from its target, or in, as a way in x and y."""
-    by = edit.get("by")
+    by: Any = edit.get("by")
     if not isinstance(by, dict):
         return edit
     row = next(r for r in measured["each"] if r["robot"] == str(edit["robot"]))
     centre = (standing.centre or {}).get(row.get("target", ""), (0.0, 0.0))
     x, y = row["place"][0] - centre[0], row["place"][1] - centre[1]
     length = max((x * x + y * y) ** 0.5, 1e-9)
-    way = by.get("out", -by.get("in", 0.0)) / length
+    way = _signed(by) / length
     return edit | {"by": [round(x * way, 2), round(y * way, 2)]}
+
+
+def _signed(by: dict[str, float]) -> float:
+    """How far out, px; in is below 0."""
+    return by["out"] if "out" in by else -by["in"]
 
 
 def _calling(name: str, arguments: dict[str, Any]) -> Reply:

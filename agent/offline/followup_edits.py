@@ -131,6 +131,9 @@ def offset(slots: Slots, said: Said) -> Effects:
 def ratio(slots: Slots, said: Said) -> Effects:
     """Twice, half, three times as far."""
     factor = float(slots["num"][0]) if "num" in slots else float(slots["ratio"][0])
+    radial = {e["kind"] for e in said.last} <= {"out", "in", "distance"}
+    if "that" in said.words.lower().split() and not (said.last and radial):
+        return None
     if factor <= 0 or factor == 1:
         return None
     return [
@@ -141,7 +144,8 @@ def ratio(slots: Slots, said: Said) -> Effects:
 
 
 def distance(slots: Slots, said: Said) -> Effects:
-    """Exactly so far from the thing."""
+    """Exactly so far from the thing; at least, or at most, is so far too."""
+    slots.has("bound")
     return [{"kind": "distance", "px": float(slots["px"][0])}]
 
 
@@ -177,7 +181,8 @@ def rotate(slots: Slots, said: Said) -> Effects:
     last = _of_kind(said.last, "rotate")
     if "otherway" in slots or "back" in slots:
         if not any(name in slots for name in ("angle", "num", "turned", "much")) and last:
-            return _undone(said, [{**last, "degrees": -last["degrees"]}])
+            twice = 2 if "otherway" in slots else 1  # what was turned back, and as far again
+            return [{**last, "degrees": -twice * last["degrees"]}]
         sign = -1 if last is None or last["degrees"] > 0 else 1
     elif "more" in slots and not directions and last:
         sign = 1 if last["degrees"] > 0 else -1
@@ -186,13 +191,6 @@ def rotate(slots: Slots, said: Said) -> Effects:
 
 def _of_kind(edits: list[Effect], *kinds: str) -> Effect | None:
     return next((e for e in reversed(edits) if e["kind"] in kinds), None)
-
-
-def _undone(said: Said, edits: list[Effect]) -> list[Effect]:
-    """The last edit taken back and others made instead; where it cannot be, those on top."""
-    if said.standing.edits and not said.before:
-        return [{"kind": "undo", "steps": 1}, *edits]
-    return edits
 
 
 def mirror(slots: Slots, said: Said) -> Effects:
@@ -204,6 +202,10 @@ def mirror(slots: Slots, said: Said) -> Effects:
 
 def scale(slots: Slots, said: Said) -> Effects:
     """Bigger or smaller."""
+    opens = said.standing.groups[0].get("opening") is not None
+    if opens and _of_kind(said.last, "opening") and slots.has("scale"):
+        factor = factor_of(slots) ** (1 if slots["scale"][0] == "bigger" else -1)
+        return [{"kind": "opening", "factor": rounded(factor)}]
     if "ratio_scale" in slots:
         return [{"kind": "scale", "factor": float(slots["ratio_scale"][0])}]
     if slots["scale"][0] == "smaller" and "share" in slots:
@@ -328,5 +330,5 @@ def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Eff
 
 def listed(numbers: Sequence[object]) -> str:
     """Numbers or names in a sentence."""
-    *most, last = map(str, numbers)
+    *most, last = map(str, numbers or ("none",))
     return f"{', '.join(most)} and {last}" if most else last

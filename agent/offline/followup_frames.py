@@ -1,4 +1,4 @@
-"""Which frame of followups.yaml takes all phrases of a clause, and which phrase is there for what."""
+"""Which frame of followups.yaml takes all phrases of a clause, and what each is there for."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Slots(dict[str, list[Any]]):
 
     def has(self, *names: str) -> bool:
         """Whether a phrase of one of these kinds is there."""
-        return any([name in self for name in names])
+        return len([name for name in names if name in self]) > 0  # looks at all of them
 
     @property
     def unused(self) -> set[str]:

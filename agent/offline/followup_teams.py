@@ -67,11 +67,20 @@ def leave(slots: Slots, said: Said) -> Effects:
     if len(set(robots)) >= said.count:
         return refuse("All robots would leave: nothing would be left to place.")
     slots.has("rest", "closeup")  # closing up is what the others do anyway
-    return [{"kind": "skip" if "empty" in slots else "remove", "robots": robots}]
+    return [{"kind": "skip" if slots.has("empty", "stay") else "remove", "robots": robots}]
+
+
+def leave_others(slots: Slots, said: Said) -> Effects:
+    """All but those named leave."""
+    slots.has("all")
+    named = {r for robots in slots["robots"] for r in robots}
+    others = [int(r) for r in said.standing.robots if int(r) not in named]
+    return [{"kind": "remove", "robots": others}] if others else None
 
 
 def count(slots: Slots, said: Said) -> Effects:
     """So many in all; as many as needed, or as fit."""
+    slots.has("toomany", "back", "remove", "less", "only")
     n = (
         round(said.count * float(slots["ratio_count"][0]))
         if "ratio_count" in slots
@@ -91,6 +100,7 @@ def needed(slots: Slots, said: Said) -> Effects:
 
 def fit(slots: Slots, said: Said) -> Effects:
     """As many as there is room for."""
+    slots.has("apart", "spacing")
     spaced: list[Effect] = (
         [{"kind": "spacing", "px": float(slots["px"][0])}] if "px" in slots else []
     )
@@ -160,37 +170,42 @@ def target(slots: Slots, said: Said) -> Effects:
 def split(slots: Slots, said: Said) -> Effects:
     """Some there, the rest here."""
     named = [r for robots in slots.get("robots", ()) for r in robots]
-    n = whole(slots)
-    if len(set(slots.get("num", ()))) > 1 or ("num" in slots and "portion" in slots):
-        return None
-    if "portion" in slots:
-        n = max(said.count // SHARES[slots["portion"][0]], 1)
-    elif "split" in slots or ("rest" in slots and n is None and not named):
-        n = said.count // 2
-    slots.has("merge", "here", "rest")
     relation = (slots.get("relation") or ["around"])[0]
+    slots.has("merge", "here", "rest", "back", "undo")
     if relation not in ("around", said.standing.relation):
         return None
     if named and not slots.has("rest", "portion", "split"):
         return None if "num" in slots else place(slots, said)
+    some = named or _how_many(slots, said)
     fresh = PLACING.search(said.words) and not slots.has("rest", "here", "stay")
-    if not named and (n is None or n > said.count or fresh):
+    if some is None or (fresh and not named):
         return None
-    if "there" not in slots and "other" not in slots and "thing" not in slots:
-        return (
-            split_ask(slots, said)
-            if "split" in slots or len(slots.get("portion", ())) > 1
-            else None
-        )
-    to = where(slots, said, f"{listed(named) if named else n} of them to {{}}")
+    if not slots.has("there", "other", "thing"):
+        parted = "split" in slots or len(slots.get("portion", ())) > 1
+        return split_ask(slots, said) if parted else None
+    to = where(slots, said, f"{listed(named) if named else some} of them to {{}}")
     if isinstance(to, list):
         return to
     if to in said.standing.targets:
         return None
-    some: Effect = {"kind": "target", "to": to, "robots": named or n}
-    if n == said.count and not named:
-        return [{"kind": "target", "to": to}]
-    return [some | {"stay": True} if "stay" in slots else some]
+    moved: Effect = {"kind": "target", "to": to}
+    if some == said.count:
+        return [moved]
+    stays = {"stay": True} if "stay" in slots else {}
+    return [moved | {"robots": some} | stays]
+
+
+def _how_many(slots: Slots, said: Said) -> int | None:
+    """How many of the robots go elsewhere; None where that is not said, or not so many there."""
+    if "portion" in slots:
+        part = said.count // SHARES[slots["portion"][0]]
+        return None if "num" in slots else max(part, 1)
+    if "addone" in slots:
+        return 1
+    if "num" not in slots:
+        return said.count // 2 if slots.has("split", "rest") else None
+    n = whole(slots)
+    return n if len(set(slots["num"])) == 1 and n is not None and n <= said.count else None
 
 
 def split_ask(slots: Slots, said: Said) -> Effects:
@@ -235,7 +250,7 @@ def sides(slots: Slots, said: Said) -> Effects:
         return None
     if said.standing.relation in RINGS and not {"long", "short"} & {*named}:
         return [{"kind": "sides", "without" if without else "only": named}]
-    if len(named) > 1 or " half" in named[0] or without:
+    if len(named) > 1 or " half" in str(named[0]) or without:
         return None
     return [{"kind": "side", "side": named[0]}]
 

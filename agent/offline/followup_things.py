@@ -10,6 +10,8 @@ from .standing import Standing
 
 POINTING = ("that", "this", "here")
 """Words that mean what is pointed at, where something is."""
+UNNAMED = ("thing pointed at", "the thing pointed at")
+"""What a thing is called that nobody named."""
 SIDES = {"upper": "top", "lower": "bottom", "leftmost": "left", "rightmost": "right"}
 
 
@@ -35,16 +37,20 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
     """The id of a known thing, or the words after "?" for it to be found."""
     if re.fullmatch(r"[tc][0-9]+", phrase):
         return phrase if phrase[0] == "t" else f"?{phrase}"
-    words = set(re.findall(r"[a-z]+", phrase)) - {"one", "the", "thing", "object"}
-    word = next(iter(words), "")
-    side, centre = SIDE_OF.get(SIDES.get(word, word)), standing.centre or {}
-    if len(words) == 1 and side and len(centre) > 1:
+    words = set(re.findall(r"[a-z]+", phrase)) - {"one", "the", "thing", "object", "of", "two"}
+    sides = [SIDE_OF.get(SIDES.get(word, word), "") for word in words]
+    side, rest = max(sides, default=""), {w for w in words if not SIDE_OF.get(SIDES.get(w, w))}
+    named = [t for t, label in standing.things if rest <= {*re.findall(r"[a-z]+", label.lower())}]
+    if not named and all(label.startswith(UNNAMED) for _, label in standing.things):
+        named = [t for t, _ in standing.things] if side else []
+    placed = {t: at for t, at in (standing.centre or {}).items() if t in named}
+    if side and len(placed) > 1:
         x, sign = int(side in ("top", "bottom")), -1 if side in ("left", "top") else 1
-        furthest = max(centre, key=lambda t: sign * centre[t][x])
-        return furthest if furthest not in standing.targets else f"?{phrase}"
-    known = [(t, set(re.findall(r"[a-z]+", label.lower()))) for t, label in standing.things]
-    named = [t for t, label in known if words and words <= label]
-    named = [t for t in named if not (other and t in standing.targets)]
+        named = [max(placed, key=lambda t: sign * placed[t][x])]
+        other = other or len(standing.things) == 1
+    elif side:
+        named = []
+    named = [t for t in named if words and not ((other or side) and t in standing.targets)]
     if len(named) == 1:
         return named[0]
     return f"?other {phrase}" if other else f"?{phrase}"

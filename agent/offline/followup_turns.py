@@ -1,5 +1,6 @@
 """From a frame to what a turn does beside edits, and to edits that follow from the last ones."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from .followup_edits import (
@@ -39,9 +40,8 @@ MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 def undo(slots: Slots, said: Said) -> Effects:
     """So many steps back."""
-    steps = int(slots.get("num", slots.get("twice", [1]))[0])
-    if said.standing.steps < steps:
-        there = said.standing.steps
+    steps, there = int(slots.get("num", slots.get("twice", [1]))[0]), said.standing.changes
+    if there < steps:
         why = (
             "Nothing was changed yet"
             if not there
@@ -61,6 +61,8 @@ def redo(slots: Slots, said: Said) -> Effects:
 
 def first(slots: Slots, said: Said) -> Effects:
     """The first plan."""
+    if not said.standing.steps:
+        return refuse("No plan stands yet, so there is no first one to go back to.")
     return [{"kind": "undo", "to": "first"}]
 
 
@@ -93,9 +95,16 @@ def rest_stays(slots: Slots, said: Said) -> Effects:
 
 
 def again(slots: Slots, said: Said) -> Effects:
-    """The last change once more."""
+    """The last change once more; what was taken back, made again."""
+    if said.standing.redo and not said.before and not said.last:
+        return [{"kind": "undo", "steps": -1}]
     edits = [e for e in said.last if e["kind"] in RELATIVE and "to" not in e]
     return edits or None
+
+
+def steps(slots: Slots, said: Said) -> Effects:
+    """How many steps can be taken back."""
+    return [{"kind": "talk", "about": "steps"}]
 
 
 def more(slots: Slots, said: Said) -> Effects:
@@ -145,8 +154,9 @@ def _further(last: Effect, way: float | None) -> Effect | None:
     """As far again in the direction of a move, or so far."""
     if way is None:
         return last
-    if last["kind"] == "place" and isinstance(last["by"], dict):
-        return last | {"by": dict.fromkeys(last["by"], way)}
+    by: Any = last.get("by")
+    if isinstance(by, dict):
+        return last | {"by": {name: way for name in ("out", "in") if name in by}}
     dx, dy = (last["dx"], last["dy"]) if last["kind"] == "shift" else last["by"]
     length = max(abs(dx), abs(dy))
     if not length:
@@ -188,9 +198,9 @@ def _scaled(edit: Effect, share: float) -> Effect | None:
     if kind == "place" and "by" in edit:
         by: Any = edit["by"]
         if isinstance(by, dict):
-            return edit | {
-                "by": {{"out": "in", "in": "out"}[k]: rounded(v * -share) for k, v in by.items()}
-            }
+            ways: dict[str, float] = edit["by"]
+            back = {"out": "in", "in": "out"}
+            return edit | {"by": {back[k]: rounded(v * -share) for k, v in ways.items()}}
         return edit | {"by": [rounded(v * share) for v in by]}
     if kind in ("add", "remove") and edit.get("n", 0) > 1:
         return {"kind": {"add": "remove", "remove": "add"}[kind], "n": edit["n"] // 2}
@@ -199,10 +209,8 @@ def _scaled(edit: Effect, share: float) -> Effect | None:
 
 def otherway(slots: Slots, said: Said) -> Effects:
     """The last change the other way; with an amount, so much of it back."""
-    last = next(
-        (e for e in reversed(said.last) if e["kind"] in (*RELATIVE, "opening", "sides", "heading")),
-        None,
-    )
+    turning = (*RELATIVE, "opening", "sides", "heading")
+    last = next((e for e in reversed(said.last) if e["kind"] in turning), None)
     if last is None:
         return ask('"The other way" of what?', "turn it left", "turn it right")
     if "much" in slots:
@@ -210,10 +218,43 @@ def otherway(slots: Slots, said: Said) -> Effects:
     other = _turned(last)
     if other is None:
         return None
-    taken_back: list[Effect] = (
-        [{"kind": "undo", "steps": 1}] if said.standing.edits and not said.before else []
-    )
-    return [*taken_back, other] if last["kind"] in RELATIVE else [other]
+    return corrected([last], [other]) if last["kind"] in RELATIVE else [other]
+
+
+def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
+    """Edits in the place of the last ones: those are taken back first, as part of one change."""
+    back = [inverse(e) for e in reversed(last)]
+    found = [e for e in back if e is not None]
+    if len(found) < len(back):
+        return [{"kind": "undo", "steps": 1}, *edits]
+    if len(found) == len(edits) == 1:
+        return _joined(found[0], edits[0])
+    return [*found, *edits]
+
+
+def _joined(first: Effect, then: Effect) -> list[Effect]:
+    """Two edits as one where they are of one kind."""
+    if first["kind"] != then["kind"] or first.get("robot") != then.get("robot"):
+        return [first, then]
+    if "factor" in first and "factor" in then:
+        return [first | {"factor": rounded(first["factor"] * then["factor"])}]
+    names = {"rotate": ("degrees",), "shift": ("dx", "dy")}.get(first["kind"], ("none",))
+    if names[0] in then:
+        return [then | {n: rounded(first[n] + then[n]) for n in names}]
+    a, b = first.get("by"), then.get("by")
+    if isinstance(a, list) and isinstance(b, list):
+        return [then | {"by": [rounded(a[0] + b[0]), rounded(a[1] + b[1])]}]
+    return [first, then]
+
+
+def inverse(edit: Effect) -> Effect | None:
+    """The edit that takes another back; None where there is none."""
+    if edit["kind"] in ("mirror", "swap"):
+        return edit
+    if edit["kind"] in ("add", "remove"):
+        other = {"add": "remove", "remove": "add"}[edit["kind"]]
+        return {"kind": other, "n": edit["n"]} if "n" in edit else None
+    return _scaled(edit, -1.0) if edit["kind"] in RELATIVE else None
 
 
 def _turned(edit: Effect) -> Effect | None:
@@ -272,7 +313,8 @@ def refuse_checks(slots: Slots, said: Said) -> Effects:
 def refuse_through(slots: Slots, said: Said) -> Effects:
     """No robot goes through the thing."""
     return refuse(
-        "Robots do not go through a thing, they drive around it. Say where they should stand, and go."
+        "Robots do not go through a thing, they drive around it. Say where they should stand, "
+        "then go."
     )
 
 

@@ -15,7 +15,7 @@ from .drafting import contract_of
 from .drawn_forms import form_in
 from .followup_edits import Effect, listed
 from .followup_things import impossible
-from .followup_turns import RELATIVE
+from .followup_turns import RELATIVE, corrected
 from .followup_words import Chunk, rules
 from .spelling import spelled
 from .standing import Standing
@@ -30,7 +30,7 @@ INSTRUCTING = (
     *("arrange", "target", "close", "cage", "count", "split", "sides", "gap", "distance"),
 )
 """Frames of what is an instruction when no plan stands."""
-ADDING = ("more", "less", "again", "toofar", "otherway")
+ADDING = ("more", "less", "again", "toofar", "otherway", "corrected")
 """Frames that build on the last change also after "no"."""
 PLAIN = (
     "What should change? For example: a bit further out, turn it 30 degrees, two more robots, or "
@@ -103,10 +103,21 @@ def read_followup(words: str, standing: Standing | None) -> Followup:
     greets = "hello" in line.led or "thanks" in line.led
     if all(is_empty(c) or (greets and set(c.kinds) <= SLIGHT) for c in line.chunks):
         return _said_nothing(line, there=standing is not None)
+    afresh = _afresh(line)
+    if afresh:
+        return Followup("instruction", text=afresh)
     clauses = line.read()
     if standing is None:
         return _without_plan(line, clauses)
     return _not_framed(line) if clauses is None else _gathered(line, clauses)
+
+
+def _afresh(line: Line) -> str:
+    """The instruction after "start over", if there is one."""
+    if not line.chunks or "restart" not in line.chunks[0].kinds:
+        return ""
+    left = [c for c in line.chunks[1:] if not is_empty(c)]
+    return line.words[left[0].start :] if len(left) > 1 else ""
 
 
 def _said_nothing(line: Line, *, there: bool) -> Followup:
@@ -143,6 +154,7 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
     """All that the clauses come to."""
     same = [c for c in clauses if c.frame == "again" and "same" in line.words_of(c.chunks).lower()]
     kept = [c for c in clauses if c not in same] or clauses  # "same again, closer"
+    kept = _without_moot(line, kept)
     effects = [e for c in kept for e in c.effects]
     unsettled = next((e for e in effects if e["kind"] in ("ask", "refuse")), None)
     if unsettled is not None and unsettled["kind"] == "ask":
@@ -150,15 +162,28 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
     if unsettled is not None:
         return Followup("refuse", text=unsettled["text"])
     edits = [e for e in effects if e["kind"] not in NO_EDITS]
-    question = _contradiction(line, edits)
+    fresh = all(c.frame != "corrected" for c in kept)
+    question = _contradiction(line, edits) if fresh else None
     if question is not None:
         return question
     undo = sum(e.get("steps", 0) for e in effects if e["kind"] == "undo")
     if "no " in line.led and edits and not undo and clauses[0].frame not in ADDING:
-        last = line.standing.edits[0]["kind"] if line.standing.edits else ""
-        alike = {edits[0]["kind"], last} <= {"out", "in"} or edits[0]["kind"] == last
-        undo = int(alike and last in RELATIVE)
+        last = [dict(e) for e in line.standing.edits]
+        kind = last[0]["kind"] if len(last) == 1 else ""
+        alike = edits[0]["kind"] == kind or {edits[0]["kind"], kind} <= {"out", "in"}
+        if alike and kind in RELATIVE:
+            made = corrected(last, edits)
+            undo = sum(e.get("steps", 0) for e in made if e["kind"] == "undo")
+            edits = [e for e in made if e["kind"] != "undo"]
     return _settled(line, effects, edits, undo)
+
+
+def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
+    """The clauses without what others make moot: "too much, go back", "never mind, closer"."""
+    undone = any(c.frame in ("undo", "first") for c in clauses)
+    kept = [c for c in clauses if not (undone and c.frame in ADDING)]
+    waved = [c for c in kept if "mind" in line.words_of(c.chunks).lower().split()]
+    return [c for c in kept if c not in waved] or kept
 
 
 def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
@@ -188,9 +213,10 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
         edits = [e | {"stay": True} if e["kind"] == "target" else e for e in edits]
     query = next((e for e in effects if e["kind"] == "query"), None)
     to = next((e["to"] for e in effects if e["kind"] == "undo" and "to" in e), "")
-    other = next((k for k in ("go", "hold", "query") if k in kinds), "talk")
+    others: tuple[Kind, ...] = ("go", "hold", "query")
+    rest: tuple[Kind, ...] = tuple(k for k in others if k in kinds) or ("talk",)
     return Followup(
-        "edits" if edits else "undo" if undo or to else other,
+        "edits" if edits else "undo" if undo or to else rest[0],
         undo=undo,
         to=to,
         edits=tuple(edits),

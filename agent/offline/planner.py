@@ -16,6 +16,7 @@ from .choosing import Step, agrees, calls_in, find, located_reasons, prompts_of
 from .conversing import conversed
 from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, would_do
+from .pointed import narrowed
 from .reading import Reading
 from .references import described
 
@@ -63,6 +64,10 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     agreed = _agreed(task, history)
     if agreed is not None:
         return agreed
+    narrow = narrowed(task, history)
+    if isinstance(narrow, Step):
+        return _call(narrow.name, narrow.arguments)
+    shown, task = task.pointed, narrow
     reading = read_instruction(_said(task, history), task.metres_per_pixel)
     wording = reading.robots or (reading.form.robots if reading.form else None)
     robots = task.robots or wording or _number_answered(history) or _standing_count(task)
@@ -75,7 +80,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         return _call("ask_user", asked)
     needed = things_needed(reading)
     ids, others = _target_ids(task)[:needed], _target_ids(task)[needed:]
-    prompts = [p for p in task.pointed if p["id"] not in task.targets]
+    prompts = [p for p in shown if p["id"] not in task.targets]
     if not ids:
         named = [*reading.others, *([reading.faced] if reading.faced else [])]
         found = find(_things(task, reading), needed, history)

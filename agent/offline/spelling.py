@@ -10,6 +10,8 @@ from .phrases import phrase, table
 KEYS = ("qwertyuiop", "asdfghjkl", "zxcvbnm")
 LEAST_CORRECTED = 4
 """Letters of the shortest word in which a slip is looked for."""
+LEAST_ANY = 6
+"""Letters of a word in which one may be any other, not only a key off."""
 UNITS = ("degrees", "pixels", "metres", "meters")
 
 
@@ -49,7 +51,8 @@ def _is_slip(typed: str, meant: str) -> bool:
     if len(off) == 2:
         a, b = off
         return b == a + 1 and (typed[a], typed[b]) == (meant[b], meant[a])
-    return len(off) == 1 and _are_near(typed[off[0]], meant[off[0]])
+    any_letter = len(typed) >= LEAST_ANY
+    return len(off) == 1 and (any_letter or _are_near(typed[off[0]], meant[off[0]]))
 
 
 def _are_near(a: str, b: str) -> bool:

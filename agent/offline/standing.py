@@ -41,7 +41,7 @@ class Standing:
     @classmethod
     def of(cls, facts: Mapping[str, Any], **told: Any) -> "Standing":
         """From the line `Standing` of a turn's first message, and what else the turn is told."""
-        last = facts.get("last") or {}
+        last: dict[str, Any] = facts.get("last") or {}
         return cls(
             plan=facts["plan"],
             contract=facts["contract"],
@@ -74,6 +74,11 @@ class Standing:
     def targets(self) -> list[str]:
         """Ids of what the groups are about, in order, once each."""
         return list(dict.fromkeys(t for group in self.groups for t in group.get("targets", ())))
+
+    @property
+    def changes(self) -> int:
+        """How many changes can be taken back, so that a plan still stands."""
+        return max(self.steps - 1, 0)
 
     def others(self) -> list[str]:
         """Things known that no group is about; those pointed at in this turn come first."""

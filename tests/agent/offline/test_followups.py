@@ -1,5 +1,6 @@
 """Follow-ups as operators type them to the edits, answers and questions that they mean."""
 
+import json
 from functools import cache
 from pathlib import Path
 from typing import Any, get_args
@@ -46,9 +47,7 @@ def read(scene: str, words: str) -> dict[str, Any] | str:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _plain(v) for name, v in value.items()}
-    return [_plain(v) for v in value] if isinstance(value, list | tuple) else value
+    return json.loads(json.dumps(value))
 
 
 @pytest.mark.parametrize(("scene", "words", "meant"), ROWS)
@@ -103,6 +102,13 @@ def test_options_answer_the_question(scene: str, words: str, meant: str) -> None
 )
 def test_what_fits_when_no_plan_stands(words: str, kind: str) -> None:
     assert read_followup(words, None).kind == kind
+
+
+@pytest.mark.parametrize(("scene", "words", "meant"), ROWS)
+def test_nothing_is_changed_where_no_plan_stands(scene: str, words: str, meant: object) -> None:
+    followup = read_followup(words, None)
+    assert not followup.edits
+    assert followup.kind not in ("edits", "undo", "query")
 
 
 def test_what_is_not_understood_is_quoted() -> None:

@@ -1,0 +1,60 @@
+"""Which of several things that were pointed at an instruction is about: "the upper coin", "t1"."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..first_message import Task
+from ..messages import History
+from .choosing import Step, find
+from .conversing import measured_at
+from .followup_things import UNNAMED, resolved
+from .followup_words import chunks_of
+from .references import described
+from .standing import Standing
+
+THE_THING = "the thing"
+"""Stands in the instruction for the one that is chosen."""
+
+
+def narrowed(task: Task, history: History) -> Task | Step:
+    """The task about the one of the things pointed at that its words name, or what to do first.
+
+    As it was, where they name none or all of them.
+    """
+    centres = {str(p["id"]): _centre(p) for p in task.pointed}
+    things = tuple((str(p["id"]), str(p.get("label") or UNNAMED[0])) for p in task.pointed)
+    contract = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}
+    standing = Standing("", contract, (), things=things, centre=centres)
+    found = [resolved(c, task.instruction, standing) for c in chunks_of(task.instruction, standing)]
+    named = [(c, str(c.kinds["thing"])) for c in found if "thing" in c.kinds]
+    if not named or (len(task.pointed) < 2 and named[0][1] not in centres):
+        return task
+    if len({name for _, name in named}) > 1:
+        return task
+    chunk, name = named[0]
+    if name not in centres:
+        looked = find(described([name.removeprefix("?")]), 1, history)
+        if isinstance(looked, Step):
+            return looked if looked.name == "locate_object" else task
+        name = measured_at(looked[0].candidate, centres, history) or name
+    if name not in centres:
+        return task
+    text = task.instruction
+    article = re.search(r"\b(?:the|this|that)\s+$", text[: chunk.start], re.IGNORECASE)
+    start = article.start() if article else chunk.start
+    words = f"{text[:start]}{THE_THING}{text[chunk.end :]}"
+    chosen = tuple(p for p in task.pointed if p["id"] == name)
+    return replace(task, instruction=words, pointed=chosen)
+
+
+def _centre(prompt: dict[str, Any]) -> tuple[float, float]:
+    """Where a thing that is pointed at lies, px."""
+    box: Sequence[float] | None = prompt.get("box")
+    corners = None if box is None else [box[:2], box[2:]]
+    points = np.asarray(prompt.get("outline") or corners or prompt.get("points") or [(0, 0)])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return float(middle[0]), float(middle[1])
