@@ -116,7 +116,8 @@ def _begun(events: Sequence[Event]) -> Sequence[Event]:
     turn: int | None = None
     for event in events:
         if event.kind == "turn":
-            kept = kept[:turn]
+            if turn is not None:
+                del kept[turn:]
             turn = len(kept)
         elif event.kind == "message":
             turn = None
