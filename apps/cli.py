@@ -15,7 +15,7 @@ from ..prompts import PromptLibrary
 from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
-from . import arguments, deploy, evaluate, prompts, tools, trace
+from . import arguments, chat, deploy, evaluate, prompts, sessions, tools, trace
 from . import options as o
 from .agents import agent_of, tracer_of_environment
 from .run_files import Folder, write_files
@@ -33,6 +33,7 @@ app = typer.Typer(
 )
 app.add_typer(tools.app, name="tools", help="The tools the model sees.")
 app.add_typer(evaluate.app, name="eval", help="How good it is.")
+app.add_typer(sessions.app, name="sessions", help="Conversations that were stored.")
 app.add_typer(prompts.app, name="prompts", help="What models are told, in versions.")
 
 
@@ -148,6 +149,7 @@ def resume(
         raise typer.Exit(session.serve(left))
 
 
+app.command(name="chat", cls=chat.InOrder)(chat.chat)
 app.command(name="deploy")(deploy.deploy)
 app.command(name="trace")(trace.show_trace)
 

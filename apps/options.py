@@ -128,6 +128,34 @@ Approve = Annotated[
 ResumeModel = Annotated[
     str | None, typer.Option("--model", help="Another than before, as in formup run.")
 ]
+ChatImage = Annotated[
+    Path | None, typer.Argument(help="Picture of the place; not needed with --session.")
+]
+Script = Annotated[
+    Path | None,
+    typer.Option("--script", help="What to say, a line a turn, instead of a person's typing."),
+]
+ScriptJson = Annotated[
+    bool, typer.Option("--json", help="Print one JSON object a line for each turn, nothing else.")
+]
+SessionId = Annotated[
+    str | None, typer.Option("--session", help="Go on with a stored session.", metavar="ID")
+]
+StoreUrl = Annotated[
+    str | None,
+    typer.Option(
+        "--store",
+        envvar="FORMUP_STORE",
+        help="Where sessions are: a folder, sqlite:///FILE or postgresql://...; default: the "
+        "user's data folder.",
+    ),
+]
+Auto = Annotated[
+    bool, typer.Option("--auto", help="Simulated robots move at once, not only at go.")
+]
+Plain = Annotated[
+    bool, typer.Option("--plain", help="Nothing but lines of text, for screen readers.")
+]
 TraceFile = Annotated[Path, typer.Argument(help="A run's trace, or its folder.")]
 DetectorName = Annotated[str, typer.Option("--detector", help="How things are found.")]
 SegmenterName = Annotated[str, typer.Option("--segmenter", help="How outlines are measured.")]

@@ -114,9 +114,9 @@ def say_failed(message: str) -> None:
     if len(message) > LONGEST:
         message = f"{message[: LONGEST // 2]} ... {message[-LONGEST // 2 :]}"
     say(f"formup: {message}", error=True)
-    if "--json" in sys.argv and sys.argv[1] in ("run", "resume", "deploy"):
+    if "--json" in sys.argv and sys.argv[1] in ("run", "resume", "deploy", "chat"):
         report = Report(status="failed", message=message, instruction="", model="offline")
-        say(report.model_dump_json(indent=2))
+        say(report.model_dump_json(indent=None if sys.argv[1] == "chat" else 2))
 
 
 def _line(console: Console, name: str, text: str) -> None:

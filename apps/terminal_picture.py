@@ -38,7 +38,7 @@ def way_of_terminal(console: Console) -> Way:
     """How the terminal shows pictures, by its own answer."""
     if not console.is_terminal or console.is_dumb_terminal or console.color_system is None:
         return "none"
-    said = _asked()
+    said = _identity()
     return "kitty" if KITTY.search(said) else "sixel" if SIXEL.search(said) else "blocks"
 
 
@@ -56,7 +56,7 @@ def show_picture(
         small: draws it anew for few pixels, given the greatest width and height.
         names: what is written into that.
     """
-    columns, rows = min(console.width, WIDEST), max(console.height // 2, 8)
+    columns, rows = min(console.width, WIDEST), max(console.height * 2 // 3, 8)
     if way == "blocks":
         console.print(_HalfBlocks(small((columns, 2 * rows)), names))
     elif way != "none":
@@ -76,7 +76,8 @@ class _HalfBlocks:
             row, column = int(y * rows), int(x * columns) - (len(name) - 1) // 2
             fits = 0 <= row < rows and 0 <= column <= columns - len(name)
             cells = [(row, column + i) for i in range(len(name))]
-            if fits and not any(cell in self._letters for cell in cells):
+            around = [(row, column + i) for i in range(-1, len(name) + 1)]
+            if fits and not any(cell in self._letters for cell in around):
                 self._letters |= dict(zip(cells, name, strict=True))
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
@@ -125,7 +126,7 @@ def _runs(columns: np.ndarray) -> str:
     return "".join(f"!{n}{chr(63 + c)}" if n > 3 else chr(63 + c) * n for c, n in runs)
 
 
-def _asked() -> bytes:
+def _identity() -> bytes:
     """What the terminal answers."""
     try:
         import termios

@@ -1,0 +1,173 @@
+"""`formup chat`: talk to a team of robots about a picture, or have a script do the talking."""
+
+import asyncio
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+from typer.core import TyperCommand
+
+from ..agent.service import Service
+from ..agent.store.places import data_folder, store_at
+from ..tools.context import Context, Settings
+from ..tools.errors import InputError
+from ..tools.perception.image import load_picture
+from ..tools.perception.target_prompt import TargetPrompt
+from ..tools.store import read_text
+from . import arguments
+from . import options as o
+from .agents import agent_of
+from .chat_display import Display
+from .chat_keyboard import ask_plainly
+from .chat_lines import Talk
+from .chat_terminal import converse, run_script
+from .run_display import at_terminal
+from .run_files import Folder
+from .starts import starts as read_starts
+from .terminal import say
+from .terminal_picture import way_of_terminal
+
+POINTING = ("--point", "--box", "--outline", "--target")
+"""Options that point, in the order in which `arguments.pointed` has them."""
+
+
+class InOrder(TyperCommand):
+    """Keeps the words of the command line, so that things are t1, t2, ... in the order given."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the command line."""
+        ctx.meta["words"] = list(args)
+        return super().parse_args(ctx, args)
+
+
+def chat(
+    ctx: typer.Context,
+    image: o.ChatImage = None,
+    robots: o.Robots = None,
+    point: o.Points = None,
+    box: o.Boxes = None,
+    outline: o.Outlines = None,
+    target: o.Candidates = None,
+    keep_out: o.KeepOuts = None,
+    script: o.Script = None,
+    session: o.SessionId = None,
+    store: o.StoreUrl = None,
+    auto: o.Auto = False,
+    plan_only: o.PlanOnly = False,
+    plain: o.Plain = False,
+    as_json: o.ScriptJson = False,
+    out: o.Out = None,
+    model: o.ModelName = "offline",
+    base_url: o.BaseUrl = None,
+    planner: o.PlannerName = None,
+    prompt: o.PromptName = None,
+    prompts: o.PromptsFolder = None,
+    numbered: o.Numbered = False,
+    limit: o.LimitList = None,
+    policy: o.PolicyList = None,
+    detector: o.DetectorName = "standout",
+    segmenter: o.SegmenterName = "grabcut",
+    threshold: o.Threshold = None,
+    descriptor: o.DescriptorName = "edges",
+    fleet: o.FleetName = "simulated",
+    starts: o.Starts = None,
+    metres_per_pixel: o.MetresPerPixel = None,
+    robot_radius: o.Radius = None,
+    clearance: o.Clearance = None,
+    seed: o.Seed = "0",
+) -> None:
+    """Talk to the team: what it shall do, changes, questions; /help says what else."""
+    fixed = arguments.numbers(robots, metres_per_pixel, robot_radius, clearance, threshold, seed)
+    fixed |= {"descriptor": arguments.descriptor(descriptor), "starts": read_starts(starts)}
+    fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
+    things = _in_order(arguments.pointed(point, box, outline, target), ctx.meta["words"])
+    begin = Beginning(image, session, things, arguments.kept_out(keep_out), Settings(**fixed))
+    rules = ["deploy=refuse"] * plan_only + (policy or [])
+    rest = (planner, base_url, prompt, prompts, limit, rules)
+    if auto and plan_only:
+        raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
+    with agent_of(model, *rest) as agent, Folder(out) as home:
+        service, lines = Service(agent, store_at(store), auto=auto), _lines(script, as_json)
+        talk = Talk(service, home, lambda name: agent_of(name, *rest))
+        raise typer.Exit(asyncio.run(_serve(talk, begin, lines, plain=plain, as_json=as_json)))
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """What a chat begins with: a picture and what was said of it, or a stored session."""
+
+    image: Path | None
+    session: str | None
+    pointed: tuple[TargetPrompt, ...]
+    keep_out: tuple[TargetPrompt, ...]
+    settings: Settings
+
+    def open(self, service: Service) -> str:
+        """The session.
+
+        Raises:
+            InputError: nothing to begin with, or it cannot be used.
+        """
+        picture = None if self.image is None else load_picture(self.image)
+        if self.session is not None:
+            service.reopen(self.session, picture)
+            return self.session
+        if picture is None:
+            raise InputError("Name a picture to talk about, or a session to go on with.")
+        Context.of(picture, self.settings)  # what cannot be is said before anything is kept
+        return service.open(
+            picture, settings=self.settings, pointed=self.pointed, keep_out=self.keep_out
+        )
+
+
+async def _serve(
+    talk: Talk, begin: Beginning, lines: Iterator[str] | None, *, plain: bool, as_json: bool
+) -> int:
+    """Open the session and talk; what to exit with."""
+    console, service = Console(highlight=False), talk.service
+    talk.session = begin.open(service)
+    try:
+        if lines is not None:
+            return await run_script(talk, lines, None if as_json else Display(talk.folder.path))
+        if plain:
+            display, ask = Display(talk.folder.path), ask_plainly
+        else:
+            from .chat_prompt import Prompt  # its library takes a while to load
+
+            display = Display(talk.folder.path, console, way_of_terminal(console))
+            ask = Prompt(data_folder() / "history", talk.words).ask
+        display.line("session", f"{talk.session}; /help says what there is, /quit leaves")
+        return await converse(talk, display, ask)
+    finally:
+        if service.session(talk.session).run is None:
+            service.store.delete(talk.session)  # nothing was said in it
+        else:
+            say(f"formup: formup chat --session {talk.session} goes on from here.", error=True)
+        await service.close()
+
+
+def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
+    """What is said by a file or a program; None where a person types.
+
+    Raises:
+        InputError: the file cannot be read, or a person types and JSON is wanted.
+    """
+    if script is not None:
+        return iter(read_text(script).splitlines())
+    if not at_terminal():
+        return map(bytes.decode, iter(sys.stdin.buffer.readline, b""))
+    if as_json:
+        raise InputError("--json is for programs: say things with --script, or on stdin.")
+    return None
+
+
+def _in_order(things: tuple[TargetPrompt, ...], words: Sequence[str]) -> tuple[TargetPrompt, ...]:
+    """Things, listed by the kind of their option, as t1, t2, ... in the order of the words."""
+    kinds = [POINTING.index(k) for word in words if (k := word.partition("=")[0]) in POINTING]
+    places = sorted(range(len(kinds)), key=lambda i: kinds[i])
+    given = [thing for _, thing in sorted(zip(places, things, strict=True), key=lambda p: p[0])]
+    return tuple(t.model_copy(update={"id": f"t{i}"}) for i, t in enumerate(given, start=1))

@@ -1,0 +1,116 @@
+"""`formup sessions`: conversations that were stored, listed, searched, read, forked, exported."""
+
+import json
+from collections.abc import Generator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import asdict
+from datetime import datetime
+from pathlib import Path
+from textwrap import shorten
+from typing import Annotated
+
+import typer
+
+from ..agent.export import export_folder, export_json, export_page
+from ..agent.store.copies import fork as fork_of
+from ..agent.store.places import store_at
+from ..agent.store.protocol import SessionFacts, Store, StoredSession
+from . import options as o
+from .terminal import say
+from .trace import show_events
+
+LONGEST = 100
+"""Characters of a session's name and last words in a list."""
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+
+SessionId = Annotated[str, typer.Argument(metavar="ID", help="Of a session, as in the list.")]
+SearchText = Annotated[str, typer.Argument(help="Part of a name or of what was said.")]
+NewName = Annotated[str, typer.Argument(help="What it is called from now on.")]
+LastTurn = Annotated[int | None, typer.Option("--turn", help="The last turn it keeps; else all.")]
+ExportFolder = Annotated[Path, typer.Argument(help="A folder that has none yet.")]
+
+
+@app.command("list")
+def list_sessions(store: o.StoreUrl = None, as_json: o.Json = False) -> None:
+    """The sessions there are, the newest first."""
+    _list(store, "", as_json)
+
+
+@app.command()
+def search(text: SearchText, store: o.StoreUrl = None, as_json: o.Json = False) -> None:
+    """The sessions whose names, or what was said in them, have a text in them."""
+    _list(store, text, as_json)
+
+
+@app.command()
+def show(session: SessionId, store: o.StoreUrl = None) -> None:
+    """A session step by step: what was said and called, times, tokens, cost."""
+    with _at(store) as there:
+        events, how_on = there.open(session).events(), f"formup chat --session {session} goes on"
+    show_events(events, lambda sha256: sha256[:16], session, how_on)
+
+
+@app.command()
+def rename(session: SessionId, name: NewName, store: o.StoreUrl = None) -> None:
+    """Give a session a name."""
+    with _at(store) as there:
+        there.rename(session, name)
+
+
+@app.command()
+def fork(session: SessionId, turn: LastTurn = None, store: o.StoreUrl = None) -> None:
+    """A new session that goes on from a turn of another one, which stays as it is."""
+    with _at(store) as there:
+        say(fork_of(there, there.open(session), turn).id)
+
+
+@app.command(name="export")
+def export_session(session: SessionId, folder: ExportFolder, store: o.StoreUrl = None) -> None:
+    """A session as a folder: a page with pictures, all events as JSON, and what trace reads."""
+    with _at(store) as there:
+        say(export(there.open(session), folder))
+
+
+@app.command()
+def delete(session: SessionId, store: o.StoreUrl = None) -> None:
+    """Delete a session and its files; there is no way back."""
+    with _at(store) as there:
+        there.delete(session)
+
+
+def export(session: StoredSession, folder: Path) -> str:
+    """Write a session out in every form; where it is.
+
+    Raises:
+        StorageError: the folder has one already, or it cannot be read or written.
+    """
+    export_folder(session, folder)
+    written = (export_page(session, folder), export_json(session, folder))
+    page, events = (path.name for path in written)
+    return f"It is in {folder}: {page} to read, {events}, and all that formup trace shows."
+
+
+def list_words(found: Sequence[SessionFacts]) -> str:
+    """Sessions as lines."""
+    lines: list[str] = []
+    for facts in found:
+        when = datetime.fromisoformat(facts.created).astimezone().strftime("%Y-%m-%d %H:%M")
+        noun = "turn" if facts.turns == 1 else "turns"
+        said = ": ".join(text for text in (facts.name, " ".join(facts.words.split())) if text)
+        lines.append(f"{facts.id}  {when}  {facts.turns} {noun}  {shorten(said, LONGEST)}")
+    return "\n".join(lines) or "There are no sessions."
+
+
+def _list(store: str | None, text: str, as_json: bool) -> None:
+    with _at(store) as there:
+        found = there.sessions(text)
+    if as_json:
+        say(json.dumps([asdict(facts) for facts in found], indent=2))
+    else:
+        say(list_words(found))
+
+
+@contextmanager
+def _at(url: str | None) -> Generator[Store, None, None]:
+    with closing(store_at(url)) as store:
+        yield store
