@@ -42,6 +42,8 @@ SHOWN = {
     "formup eval suites": "zerocap15",
     "formup eval run": "chance GCR",
     "formup prompts": "former",
+    "formup chat": "deployed:",
+    "formup sessions": "6 turns",
 }
 """What commands print, by how they begin."""
 
@@ -105,7 +107,10 @@ def test_commands_run_as_written(commands: list[str], tmp_path: Path) -> None:
         (tmp_path / folder).symlink_to(ROOT / folder)
     for command in commands:
         arguments = [sys.executable, "-m", *shlex.split(command)]
-        done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, check=False)
+        home = os.environ | {"XDG_DATA_HOME": str(tmp_path)}
+        done = subprocess.run(
+            arguments, cwd=tmp_path, env=home, capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0, done.stdout + done.stderr
         shown = (text for start, text in SHOWN.items() if command.startswith(start))
         assert next(shown, '"settled": true') in done.stdout
@@ -114,6 +119,11 @@ def test_commands_run_as_written(commands: list[str], tmp_path: Path) -> None:
 def test_there_is_something_to_run() -> None:
     assert sum(map(len, COMMANDS)) >= 3
     assert blocks("python")
+
+
+def test_the_script_that_is_run_is_the_one_shown() -> None:
+    script = (ROOT / "docs/talk.txt").read_text("utf-8")
+    assert f"\n```\n{script}```\n" in (ROOT / "docs/chat.md").read_text("utf-8")
 
 
 def test_links_lead_somewhere() -> None:
