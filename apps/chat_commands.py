@@ -183,8 +183,8 @@ async def _who(talk: "Talk", rest: str, show: Show | None) -> Done:
 
 
 async def _cost(talk: "Talk", rest: str, show: Show | None) -> Done:
-    spent = Totals()
-    for event in talk.service.events(talk.session):
+    spent, begun = Totals(), talk.service.session(talk.session).run is not None
+    for event in talk.service.events(talk.session) if begun else ():
         if event.kind == "end":
             used = Totals.model_validate(event.data["usage"])
             sums = {name: getattr(spent, name) + value for name, value in used}
@@ -196,6 +196,8 @@ async def _cost(talk: "Talk", rest: str, show: Show | None) -> Done:
 
 
 async def _export(talk: "Talk", rest: str, show: Show | None) -> Done:
+    if talk.service.session(talk.session).run is None:
+        return "Nothing was said in this session yet."
     folder = Path(rest) if rest else talk.folder.path / "session"
     return export(talk.service.store.open(talk.session), folder)
 
