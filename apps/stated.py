@@ -5,8 +5,8 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from ..agent.agent import SayOptions
 from ..agent.offline.stated import StatedContract
+from ..agent.session import SayOptions
 from ..tools.context import Settings
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import Contract
