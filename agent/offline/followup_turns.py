@@ -334,7 +334,7 @@ def asked(slots: Slots, said: Said, about: str) -> Effects:
     if about == "distance" and ("spacing" in slots or "apart" in slots):
         query["about"] = "spacing"
     if about == "nearest":
-        query["most"] = slots["nearest"][0] if slots["nearest"] else "nearest"
+        query["most"] = next(iter(slots.get("nearest", ())), "nearest")
     return [
         query
         | ({"robots": robots} if robots else {})
