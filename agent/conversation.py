@@ -29,7 +29,7 @@ HELD = "The robots are held where they are. Say what to change, or go to drive o
 STOP = frozenset({"stop", "halt", "freeze", "stop now", "stop it", "emergency stop"})
 """Words that hold the robots at once, whoever else would have read them."""
 YES, NO = frozenset({"y", "yes", "approve", "approved"}), frozenset({"n", "no", "nope"})
-DROPS = frozenset({"query", "talk", "undo", "hold"})
+DROPS = frozenset({"query", "talk", "undo", "hold", "go"})
 """Kinds of what is said that are no answer to a question, which is dropped for them."""
 
 
