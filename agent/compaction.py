@@ -28,7 +28,7 @@ def compacted(history: History) -> History:
     Args:
         history: all of it; its last turn is kept to the letter.
     """
-    turns = _turns(history)
+    turns = _turns_of(history)
     passed = max(0, (len(turns) - WHOLE) // STEP * STEP)
     if not passed:
         return history
@@ -46,7 +46,7 @@ def compacted(history: History) -> History:
     return (*made, *(message for turn in turns[thinned:] for message in turn))
 
 
-def _turns(history: History) -> list[list[Message]]:
+def _turns_of(history: History) -> list[list[Message]]:
     """The messages by turns, each of which the person's message began."""
     turns: list[list[Message]] = [[]]
     for message in history:
@@ -85,7 +85,7 @@ def _outlined(turn: Sequence[Message], pictures: tuple[bytes, ...]) -> list[Mess
             plan = (message.facts or {}).get("plan_id", plan)
             if message.name == "ask_user" and not message.error and message.call_id in calls:
                 question = calls[message.call_id].arguments.get("question", "")
-                asked.append(f"Asked {_quoted(question)}, answered {_quoted(message.text)}.")
+                asked.append(f"Asked {_in_quotes(question)}, answered {_in_quotes(message.text)}.")
         elif isinstance(message, Reply):
             told = message.text or told
     told = _cut(told, LONGEST_TEXT) or "This came to no end."
@@ -106,7 +106,7 @@ def _words(text: str) -> str:
     return _cut(next((s for s in lines if s.startswith("Instruction: ")), text), LONGEST_WORDS)
 
 
-def _quoted(text: Any) -> str:
+def _in_quotes(text: Any) -> str:
     return json.dumps(_cut(str(text), LONGEST_WORDS), ensure_ascii=False)
 
 

@@ -33,7 +33,7 @@ def export_folder(session: StoredSession, folder: Path) -> Path:
         StorageError: there is a session already, or it cannot be read or written.
     """
     events = read_session(session)
-    _new(log_path(_made(folder)))
+    _not_there(log_path(_existing(folder)))
     write_session(folder, events, files_named(events, session.artefacts))
     return log_path(folder)
 
@@ -49,7 +49,7 @@ def export_json(session: StoredSession, folder: Path) -> Path:
         for e in read_session(session)
     ]
     content = {"format": FORMAT, "session": session.id, "events": lines}
-    path = _new(_made(folder) / EVENTS)
+    path = _not_there(_existing(folder) / EVENTS)
     write_whole(path, json.dumps(content, indent=1, ensure_ascii=False).encode())
     return path
 
@@ -63,24 +63,26 @@ def export_page(session: StoredSession, folder: Path) -> Path:
     """
     start, *events = read_session(session)
     picture = load_run(session).context.picture
-    path = _new(_made(folder) / PAGE)
+    path = _not_there(_existing(folder) / PAGE)
     (folder / PICTURES).mkdir(exist_ok=True)
     facts = picture.width, picture.height, model_name(start.data)
     lines = [f"# Session {session.id}", "", "{} x {} px, {}".format(*facts), ""]
     data = session.artefacts.get(start.data["picture"]["file"])
-    lines += _shown(folder, "start", data)
+    lines += _picture_lines(folder, "start", data)
     world = World.of(picture)
-    for number, turn in enumerate(_turns(events), start=1):
+    for number, turn in enumerate(_by_turns(events), start=1):
         began, world = world, _after(world, turn)
-        lines += [f"## {number}. {_plain(turn[0].data['words'])}", "", *_answers(turn)]
+        lines += [f"## {number}. {_escaped(turn[0].data['words'])}", "", *_asked_and_answered(turn)]
         if world.current is not None and world.current != began.current:
-            lines += _shown(folder, world.current, _drawn(picture, world, turn[0].data["words"]))
-        lines += [_plain(_told(turn)), ""]
+            lines += _picture_lines(
+                folder, world.current, _plan_png(picture, world, turn[0].data["words"])
+            )
+        lines += [_escaped(_came_to(turn)), ""]
     write_whole(path, "\n".join(lines).encode())
     return path
 
 
-def _turns(events: Sequence[Event]) -> Iterator[Sequence[Event]]:
+def _by_turns(events: Sequence[Event]) -> Iterator[Sequence[Event]]:
     starts = [place for place, event in enumerate(events) if event.kind == "turn"]
     for first, after in zip(starts, [*starts[1:], len(events)], strict=True):
         yield events[first:after]
@@ -92,41 +94,41 @@ def _after(world: World, turn: Sequence[Event]) -> World:
     return world
 
 
-def _answers(turn: Sequence[Event]) -> Iterator[str]:
+def _asked_and_answered(turn: Sequence[Event]) -> Iterator[str]:
     """Questions of the turn that were answered, with the answers."""
     messages = [event.data for event in turn if event.kind == "message"]
     calls = {c["id"]: c for m in messages for c in m.get("calls", ())}
     for message in messages:
         if message.get("name") == "ask_user" and not message.get("error"):
             question: Any = calls[message["call_id"]]["arguments"].get("question", "")
-            yield f"> {_plain(question)}\n>\n> **{_plain(message['text'])}**"
+            yield f"> {_escaped(question)}\n>\n> **{_escaped(message['text'])}**"
             yield ""
 
 
-def _told(turn: Sequence[Event]) -> str:
+def _came_to(turn: Sequence[Event]) -> str:
     ends = [event.data for event in turn if event.kind == "end"]
     return f"{ends[-1]['status']}: {ends[-1]['message']}" if ends else "This was broken off."
 
 
-def _drawn(picture: Picture, world: World, title: str) -> bytes:
+def _plan_png(picture: Picture, world: World, title: str) -> bytes:
     file = io.BytesIO()
     draw_plan(picture, world, world.plan().plan, title).save(file, "PNG")
     return file.getvalue()
 
 
-def _shown(folder: Path, name: str, data: bytes) -> list[str]:
+def _picture_lines(folder: Path, name: str, data: bytes) -> list[str]:
     """A picture beside the page, and the lines that show it."""
     path = f"{PICTURES}/{name}.{suffix_of(data)}"
     write_whole(folder / path, data)
     return [f"![{name}]({path})", ""]
 
 
-def _plain(text: str) -> str:
+def _escaped(text: str) -> str:
     """A text as one line in which nothing means anything to Markdown."""
     return re.sub(r"([\\`*_{}\[\]<>#|&])", r"\\\1", " ".join(text.split()))
 
 
-def _made(folder: Path) -> Path:
+def _existing(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -134,7 +136,7 @@ def _made(folder: Path) -> Path:
     return folder
 
 
-def _new(path: Path) -> Path:
+def _not_there(path: Path) -> Path:
     if path.exists():
         raise StorageError(f"{path} is there already and is not overwritten; name another folder.")
     return path

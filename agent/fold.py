@@ -62,7 +62,8 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     facts = events[0].data
     start = World.model_validate({"picture": facts["picture"]["facts"]})
     turns: list[list[Mapping[str, Any]]] = []
-    settings, words, end = Settings(), "", None
+    said: Mapping[str, Any] = {}
+    approved = end = None
     lines: list[Mapping[str, Any]] = []
     seconds = last = 0.0
     for event in _begun(events[1:]):
@@ -70,28 +71,29 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
             seconds = 0.0 if event.kind == "turn" else seconds + last
         last = event.seconds
         if event.kind == "turn":
-            settings = Settings.model_validate(event.data["settings"])
-            words = event.data["words"]
+            said, approved = event.data, None
             turns.append([])
         elif event.kind == "picture":
             facts = {**facts, "picture": event.data}
         elif event.kind == "approval" and event.data["plan_id"]:
-            settings = settings.model_copy(update={"approved": event.data["plan_id"]})
+            approved = event.data["plan_id"]
         elif event.kind == "world":
             turns[-1].append(event.data["changes"])
         elif event.kind == "message":
             lines.append(event.data)
         end = event.data if event.kind == "end" else end
         end = None if event.kind in GOES_ON else end
-    if not words:
+    if not said.get("words"):
         raise InputError("It was broken off before anything began; run again.")
+    settings = Settings.model_validate(said["settings"])
+    settings = settings.model_copy(update={"approved": approved}) if approved else settings
     began, steps = _steps_before(start, turns)
     world = with_changes(began, *turns[-1])
     latest = [name for name in (world.current, *list(world.plans)[-1:]) if name]
     if any(world.plans[name].plan.id != name for name in latest):  # others as they are used
         raise InputError("Its plans were altered after formup wrote them; make them again.")
     messages = paired(read_messages(lines, artefacts))
-    return State(facts, settings, words, world, began, steps, messages, seconds + last, end)
+    return State(facts, settings, said["words"], world, began, steps, messages, seconds + last, end)
 
 
 def _steps_before(

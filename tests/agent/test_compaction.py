@@ -30,6 +30,7 @@ def asked(number: int, words: str, standing: Any, *, shown: bool = False) -> Use
     lines: dict[str, Any] = {
         "Instruction": words,
         "Robots": None,
+        "Picture": "200 x 140 px",
         "Pointed at": [],
         "Targets": [],
         "Deploy": True,
