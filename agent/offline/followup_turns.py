@@ -334,7 +334,7 @@ def asked(slots: Slots, said: Said, about: str) -> Effects:
     if about == "distance" and ("spacing" in slots or "apart" in slots):
         query["about"] = "spacing"
     if about == "nearest":
-        query["most"] = next(iter(slots.get("nearest", ())), "nearest")
+        query["most"] = (slots.get("nearest") or ["nearest"])[0]
     return [
         query
         | ({"robots": robots} if robots else {})

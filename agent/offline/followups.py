@@ -237,7 +237,8 @@ def _not_framed(line: Line) -> Followup:
     settled = not any(left) and reading.sure and reading.relation not in ("ask", "several")
     if not settled or "relation" not in kinds or "neg" in kinds:
         return _not_understood(line)
-    if "thing" in kinds or (reading.robots and reading.things):
+    shown = "there" in kinds and bool(line.standing.pointed)
+    if "thing" in kinds or (reading.robots and (reading.things or shown)):
         return Followup("instruction", text=text)
     drawn = text[slice(*form_in(text)[1])].lower()
     known = {*rules()["common"], *rules()["void"], "relation"}
