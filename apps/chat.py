@@ -1,7 +1,6 @@
 """`formup chat`: talk to a team of robots about a picture, or have a script do the talking."""
 
 import asyncio
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +21,7 @@ from . import arguments
 from . import options as o
 from .agents import agent_of
 from .chat_display import Display
-from .chat_keyboard import ask_plainly
+from .chat_keyboard import ask_plainly, lines_piped
 from .chat_lines import Talk
 from .chat_terminal import converse, run_script
 from .run_display import at_terminal
@@ -140,13 +139,14 @@ async def _serve(
 
             display = Display(talk.folder.path, console, way_of_terminal(console))
             ask = Prompt(data_folder() / "history", talk.words).ask
-        display.line("session", f"{talk.session}; /help says what there is, /quit leaves")
+        who = service.session(talk.session).agent.model.name
+        display.line("session", f"{talk.session}, {who} decides; /help says what there is")
         return await converse(talk, display, ask)
     finally:
         if service.session(talk.session).run is None:
             service.store.delete(talk.session)  # nothing was said in it
         else:
-            say(f"formup: formup chat --session {talk.session} goes on from here.", error=True)
+            say(f"formup: formup chat --session {talk.session} goes on with this.", error=True)
         await service.close()
 
 
@@ -159,7 +159,7 @@ def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
     if script is not None:
         return iter(read_text(script).splitlines())
     if not at_terminal():
-        return map(bytes.decode, iter(sys.stdin.buffer.readline, b""))
+        return lines_piped()
     if as_json:
         raise InputError("--json is for programs: say things with --script, or on stdin.")
     return None

@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -100,6 +100,19 @@ async def ask_plainly(typed: Typed) -> str:
                 say("")
                 raise KeyboardInterrupt
     return text
+
+
+def lines_piped() -> Iterator[str]:
+    """Lines as a program writes them; Ctrl-C ends the wait for one."""
+    while True:
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        try:
+            line = sys.stdin.buffer.readline()
+        finally:
+            signal.signal(signal.SIGINT, before)
+        if not line:
+            return
+        yield line.decode(errors="replace")
 
 
 @contextmanager

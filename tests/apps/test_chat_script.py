@@ -207,3 +207,25 @@ def test_ctrl_c_exits_with_130(picture: Path) -> None:
             asked.close()
     assert talking.returncode == 130
     assert [json.loads(line)["status"] for line in out.splitlines()] == ["stopped"]
+
+
+def test_ctrl_c_ends_the_wait_for_a_line(picture: Path) -> None:
+    command = [sys.executable, "-m", "formup", "chat", "scene.png", "--store", "talks"]
+    with subprocess.Popen(
+        command,
+        cwd=picture.parent,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as talking:
+        assert talking.stdin is not None and talking.stdout is not None
+        talking.stdin.write(b"what can you do?\n\xff\n")
+        talking.stdin.flush()
+        while "you: \N{REPLACEMENT CHARACTER}" not in talking.stdout.readline().decode():
+            pass
+        assert talking.stdout.readline().startswith(b"formup: ")
+        talking.send_signal(signal.SIGINT)
+        out, said = talking.communicate()
+    assert (talking.returncode, out) == (130, b"")
+    assert b"interrupted" in said
+    assert len(store_at(picture.parent / "talks").sessions()) == 1
