@@ -23,7 +23,7 @@ ROUNDS = (1, 10, 50)
 """Turns whose cost is shown: the median of four from each of these rounds on."""
 
 
-def _picture() -> Picture:
+def _scene() -> Picture:
     rng = np.random.default_rng(7)
     pixels = rng.integers(85, 105, (*SIZE, 3), dtype=np.uint8)
     x0, y0, x1, y1 = BOX
@@ -34,7 +34,7 @@ def _picture() -> Picture:
 def main() -> None:
     """Print what turns take."""
     settings = Settings(robots=ROBOTS)
-    session = Agent().start(_picture(), pointed=[TargetPrompt(box=BOX)], settings=settings)
+    session = Agent().start(_scene(), pointed=[TargetPrompt(box=BOX)], settings=settings)
     session.say("Surround it")
     spent: list[float] = []
     for turn in range(4 * max(ROUNDS)):

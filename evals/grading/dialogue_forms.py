@@ -120,7 +120,7 @@ def _wrong(form: str, thing: Thing, points: FloatArray) -> str:
     return "" if len(held) >= min(4, len(points)) else f"robots are at {len(held)} corners"
 
 
-def _line(case: Case) -> Iterator[str]:
+def _line_held(case: Case) -> Iterator[str]:
     """A straight one."""
     about = case.after.positions - case.after.positions.mean(0)
     along, across = (about @ np.linalg.svd(about, full_matrices=False)[2].T).T[:2]
@@ -146,5 +146,5 @@ def _between(case: Case) -> Iterator[str]:
         yield f"robots are not all between the {first.name} and the {second.name}"
 
 
-BY_THEMSELVES = {"between": _between, "line": _line, "circle": _circle}
+BY_THEMSELVES = {"between": _between, "line": _line_held, "circle": _circle}
 """Forms that are not about each thing by itself."""
