@@ -67,9 +67,7 @@ async def _help(talk: "Talk", rest: str, show: Show | None) -> Done:
 async def _image(talk: "Talk", rest: str, show: Show | None) -> Done:
     if not rest:
         raise InputError("/image: name the file of a picture, such as /image photo.jpg.")
-    before, settings = talk.session, talk.service.session(talk.session).settings
-    talk.session = talk.service.open(load_picture(Path(rest)), settings=settings)
-    return f"This is session {talk.session} from here on; plans made before stay in {before}."
+    return await talk.service.image(talk.session, load_picture(Path(rest)))
 
 
 async def _robots(talk: "Talk", rest: str, show: Show | None) -> Done:
@@ -106,7 +104,9 @@ async def _plan(talk: "Talk", rest: str, show: Show | None) -> Done:
     lines = [group_words(group, scale) for group in plan.formation.contract.groups]
     shown = report.model_copy(update={"plan_id": plan.id, "verdict": plan.verdict})
     lines += [f"{name}: {text}" for name, text in certificate_lines(shown)]
-    return "\n".join([*lines, *([f"made from {node.parent}"] if node.parent else [])])
+    lines += [f"made from {node.parent}"] if node.parent else []
+    lines += ["It is void: the picture, or what it is about, is another now."] * world.is_void(plan)
+    return "\n".join(lines)
 
 
 async def _show_again(talk: "Talk", rest: str, show: Show | None) -> Done:
@@ -217,7 +217,9 @@ async def _quit(talk: "Talk", rest: str, show: Show | None) -> Done:
 
 COMMANDS = {
     "help": Command("", "what can be said and commanded", _help),
-    "image": Command("FILE", "another picture from here on, in a new session", _image),
+    "image": Command(
+        "FILE", "another picture from here on; plans made before stay readable", _image
+    ),
     "robots": Command("", "where each robot shall stand, stands, and how far from what", _robots),
     "plan": Command("", "the plan that stands: what it demands, its certificate", _plan),
     "show": Command("", "its picture again", _show_again, draws=True),

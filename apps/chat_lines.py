@@ -123,7 +123,8 @@ class Talk:
         """What a turn did, with its files."""
         was, now = before.world.plans.get(before.world.current or ""), run.report
         changed = now.plan_id not in (None, before.report.plan_id)
-        plan = was.plan if was is not None and was.plan.id != now.plan_id else None
+        other = run.world.picture != before.world.picture
+        plan = None if was is None or was.plan.id == now.plan_id or other else was.plan
         drawn = changed or bool(now.arrival or now.candidates)
         return self._finished(run, plan, drawn=drawn, changed=changed)
 

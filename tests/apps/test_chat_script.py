@@ -120,6 +120,18 @@ def test_undo_and_redo_are_turns_with_plans(chat: Chat) -> None:
     assert made[4]["message"].count("moves") == 5
 
 
+def test_another_picture_voids_plans(chat: Chat, picture: Path) -> None:
+    Image.open(picture).point(lambda value: value + 9).save(picture.parent / "b.png")
+    lines = [SURROUND, "/image b.png", "/go", "/plan", "/show", SURROUND, "/sessions"]
+    made = objects(chat(lines, "scene.png", "--json"))
+    first, last = made[0]["plan_id"], made[5]["plan_id"]
+    assert [o["plan_id"] for o in made] == [first, None, None, None, None, last, last]
+    assert made[2]["arrival"] is None
+    assert first in made[3]["message"] and "void" in made[3]["message"]
+    assert first != last is not None
+    assert made[5]["image"]["sha256"] != made[0]["image"]["sha256"]
+
+
 def test_a_session_goes_on_in_another_process(chat: Chat) -> None:
     begun = chat([SURROUND, "/sessions"], "scene.png", "--json")
     session = re.search(r"--session (\w+)", begun.stderr)
