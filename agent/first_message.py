@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import Any
+from typing import Any, cast
 
 from ..tools.context import Context
 from ..tools.draw import draw_view, view_scale
@@ -100,7 +100,7 @@ def standing(context: Context) -> dict[str, Any] | None:
     back = len(context.steps) - 1 - world.undone
     return {
         "plan": node.plan.id,
-        "contract": to_json_values(formation.contract),
+        "contract": _rounded(to_json_values(formation.contract)),
         "robots": formation.robots,
         "deployed": node.plan.id in world.arrivals,
         "last": {"words": node.words, "edits": json.loads(node.edit or "null")},
@@ -111,6 +111,17 @@ def standing(context: Context) -> dict[str, Any] | None:
         "undo": max(back, 0),
         "redo": world.undone,
     }
+
+
+def _rounded(value: Any) -> Any:
+    """JSON with its numbers as exact as a model needs them."""
+    if isinstance(value, float):
+        return round(value, 1) if abs(value) >= 1 else round(value, 4)
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in cast("dict[str, Any]", value).items()}
+    return (
+        [_rounded(item) for item in cast("list[Any]", value)] if isinstance(value, list) else value
+    )
 
 
 def read_task(text: str) -> Task:

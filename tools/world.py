@@ -56,6 +56,7 @@ class Target(Value):
         source: what it was found from, if that was an outline somebody drew.
         missed: where the rough outline it was found from reaches out of `outline`, (x, y, by px).
         added: where `outline` reaches out of that, likewise.
+        seen: whether a model was shown the outline to look at.
     """
 
     id: str
@@ -68,6 +69,7 @@ class Target(Value):
     missed: tuple[Deviation, ...] = ()
     added: tuple[Deviation, ...] = ()
     source: TargetPrompt | None = None
+    seen: bool = False
 
 
 class KeepOut(Value):

@@ -32,6 +32,7 @@ from .targets import (
     measured_all,
     summary,
     well_missed,
+    with_pointed,
 )
 
 MAX_FINDINGS = 12
@@ -67,6 +68,7 @@ async def propose_formation(
     stated = contract_in_pixels(contract, context.world.metres_per_pixel)
     _check_against_words(context, stated)
     held = held_off(_held_to(stated, context.settings), context.world)
+    targets = with_pointed(context.world, targets, held.target_ids)
 
     def work() -> tuple[World, PlanNode | PlacementError, Plan | None]:
         world = with_others(context.at(measured_all(context, targets)))
@@ -113,12 +115,15 @@ def tell_of(
 ) -> ToolResult:
     """What a tool that made a plan gives back: what to look at first, or the turn's last word."""
     now, message, certified = context.at(world), None, node.plan.verdict.certified
+    looked = tuple(
+        t.model_copy(update={"seen": t.seen or t.id in node.unseen}) for t in world.targets
+    )
     if certified and (advice := _to_see(now, node)):
         data |= {"look_first": advice}
     elif certified and not context.settings.may_deploy:
         message = tell or None
     shown = closer_views(now, context.world, targets, node.plan, node.unseen)
-    return ToolResult(data, shown, world=world, message=message)
+    return ToolResult(data, shown, world=world.having(targets=looked), message=message)
 
 
 def _check_against_words(context: Context, contract: Contract) -> None:
@@ -182,7 +187,7 @@ def _refusal(error: PlacementError, partial: dict[str, str]) -> ToolError:
 def _unseen(world: World, held: Contract) -> tuple[str, ...]:
     """Targets whose outlines have to be seen before robots move."""
     measured_from = {n for g in held.groups if g.clearance is not None for n in g.targets}
-    named = (t for t in world.targets if t.id in held.target_ids)
+    named = (t for t in world.targets if t.id in held.target_ids and not t.seen)
     return tuple(t.id for t in named if doubtful(t) or t.id in measured_from)
 
 
@@ -193,13 +198,11 @@ async def deploy(
     """Move the robots to a certified plan; says where they arrived.
 
     Args:
-        plan_id: left out: the one proposed in this reply.
+        plan_id: left out: the one of this reply, else the one that stands.
         tell: to the person once all have arrived; ends the turn.
     """
-    if plan_id is None and context.proposed is None:
-        known = ", ".join(context.world.plans) or "none yet: propose a formation first"
-        raise ToolError(f"No plan was made in this reply; name plan_id. Plans: {known}.")
-    node = context.world.plan(plan_id or context.proposed)
+    plan_id, made = plan_id or _standing_id(context), context.proposed
+    node = context.world.plan(plan_id or made)
     _check_may_move(context, node.plan)
     if plan_id is None and (advice := _to_see(context, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
@@ -218,6 +221,22 @@ async def deploy(
     message = _with_observed(tell, arrival, world) if arrival.arrived else None
     data = with_metres(data, world.metres_per_pixel)
     return ToolResult(data, world=world, message=message)
+
+
+def _standing_id(context: Context) -> str | None:
+    """The plan of an earlier turn that stands, where nothing was proposed since.
+
+    Raises:
+        ToolError: there is none, and none was made in this reply.
+    """
+    world = context.world
+    if context.proposed is not None:
+        return None
+    began = context.steps[-1 - world.undone].current if context.steps else None
+    if world.current is not None and (world.undone or world.current == began):
+        return world.current
+    known = ", ".join(world.plans) or "none yet: propose a formation first"
+    raise ToolError(f"No plan was made in this reply; name plan_id. Plans: {known}.")
 
 
 def _check_may_move(context: Context, plan: Plan) -> None:

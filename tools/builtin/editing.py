@@ -22,13 +22,13 @@ from ..world import PlanNode, Step, World, to_json_values
 from .committing import MAX_FINDINGS, proposal_data, tell_of
 from .others import with_others
 from .robots import with_robots
-from .targets import doubtful, measured_all
+from .targets import doubtful, measured_all, with_pointed
 
 MOST_MOVES = 12
 """Robots of a reply whose ways are listed; of the others the number and the longest."""
 STAYS = 0.05
 """A robot whose place is nearer than this to the one it had, px, stays."""
-SHORT = {
+SHORT: dict[str, Any] = {
     "type": "array",
     "items": {"type": "object", "properties": {"id": {}, "label": {}, "outline": {}, "box": {}}},
 }
@@ -45,33 +45,33 @@ async def edit_formation(
     stay: tuple[int, ...] = (),
     tell: str | None = None,
 ) -> ToolResult:
-    """Change the plan that stands; what is not named stays: who stands where, things, lengths.
+    """Change the plan that stands; what is not named stays as it is.
 
     Args:
         edits: in order.
-        plan_id: to change an earlier plan instead.
-        targets: things the edits name that are not measured yet, as of propose_formation.
-        stay: numbers of robots that are not to move.
+        plan_id: an earlier plan instead.
+        targets: unmeasured things edits name, as of propose_formation.
+        stay: robots that do not move.
         tell: as of propose_formation.
     """
     if not edits:
         raise ToolError("edit_formation: name at least one edit.")
     parent = context.world.plan(plan_id)
+    targets = with_pointed(context.world, targets, _named(edits))
 
     def work() -> tuple[World, Edited]:
         world = with_others(context.at(measured_all(context, targets)))
         return world, _edited(world, parent.plan, edits, stay)
 
     world, made = await in_thread(work)
-    contract = made.plan.formation.contract
     known = set(parent.plan.formation.contract.target_ids)
-    unseen = [t.id for t in world.targets if t.id not in known and doubtful(t)]
+    unseen = [t.id for t in world.targets if t.id not in known and doubtful(t) and not t.seen]
     node = PlanNode(
         plan=made.plan,
         parent=parent.plan.id,
         words=context.words,
         edit=json.dumps([_edit_facts(edit) for edit in edits], separators=(",", ":")),
-        unseen=tuple(n for n in (*parent.unseen, *unseen) if n in contract.target_ids),
+        unseen=tuple(unseen),
     )
     world = await with_robots(context.at(world), node, made.robots)
     node = world.latest
@@ -105,6 +105,17 @@ def _edit_facts(edit: Edit) -> dict[str, Any]:
     return {"kind": edit.kind, **to_json_values(edit)}
 
 
+def _named(edits: Sequence[Edit]) -> set[str]:
+    """What edits name that may be ids of things."""
+    named: set[Any] = set()
+    for edit in edits:
+        facts = edit.model_dump()
+        demanded: dict[str, Any] = facts.get("demands") or {}
+        named.update(facts.get(name) for name in ("to", "target", "towards"))
+        named.update((*(facts.get("ids") or ()), *(demanded.get("targets") or ())))
+    return {name for name in named if isinstance(name, str)}
+
+
 def moves(before: Plan, after: Plan) -> dict[str, Any]:
     """Who has another place than before and how far it is from the old one, by robots' ids."""
     old = dict(zip(before.formation.robots, before.formation.positions, strict=False))
@@ -123,12 +134,15 @@ def moves(before: Plan, after: Plan) -> dict[str, Any]:
 
 
 @tool("commit")
-def undo(context: Context, steps: int = 1, to: str | None = None) -> ToolResult:
+def undo(
+    context: Context, steps: int = 1, to: str | None = None, tell: str | None = None
+) -> ToolResult:
     """Go back to the plan before; robots do not move by that.
 
     Args:
         steps: how many; negative goes forward again.
         to: first, or the id of a plan of the conversation, instead.
+        tell: to the person; ends the turn.
     """
     world, line = context.world, _line_of_plans(context)
     at = len(line) - 1 - world.undone
@@ -141,11 +155,11 @@ def undo(context: Context, steps: int = 1, to: str | None = None) -> ToolResult:
         raise ToolError(f"{which}: {left} of {abs(steps)} steps are there.", "nothing_to_undo")
     world = world.back_at(line[wanted], len(line) - 1 - wanted)
     if world.current is None:
-        return ToolResult({"plan_id": None, "robots": NOT_MOVED}, world=world)
+        return ToolResult({"plan_id": None, "robots": NOT_MOVED}, world=world, message=tell or None)
     plan = world.plan().plan
     before = context.world.plans.get(context.world.current or "")
     data = proposal_data(world, plan) | (moves(before.plan, plan) if before else {})
-    return ToolResult(data | {"next": NOT_MOVED}, world=world)
+    return ToolResult(data | {"next": NOT_MOVED}, world=world, message=tell or None)
 
 
 def _line_of_plans(context: Context) -> list[Step]:

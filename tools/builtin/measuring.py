@@ -16,7 +16,8 @@ from ..geometry.outline import FloatArray, Outline, distances
 from ..perception.target_prompt import Point
 from ..tool import ToolResult, tool
 from .seeing import framed
-from .standing import PLAN, robot_named, standing_data
+from .standing import PLAN, robot_data, robot_named, standing_data
+from .targets import measured_all, with_pointed
 
 MATRIX_SIDE = 32
 """Longest side of the binary matrix descriptor, cells."""
@@ -91,13 +92,19 @@ def measure(context: Context, a: str | Point, b: str | Point | None = None) -> T
     """Measure distances and direction from a to b; or the plan: places, distances, openings.
 
     Args:
-        a: id, (x, y) or r3 for robot 3; plan, alone.
+        a: id, (x, y) or r3 for robot 3; plan or r3, alone.
         b: likewise.
     """
     if a == PLAN:
         return ToolResult(standing_data(context))
+    if b is None and isinstance(a, str) and a[:1] == "r":
+        robot_named(context.world, a)
+        return ToolResult(robot_data(context, a))
     if b is None:
-        raise ToolError("measure: b is missing; only the plan is measured alone.")
+        raise ToolError("measure: b is missing; only the plan and robots are measured alone.")
+    named = {n for n in (a, b) if isinstance(n, str)}
+    world = measured_all(context, with_pointed(context.world, (), named))
+    context = context.at(world)
     (shape_a, centre_a), (shape_b, centre_b) = _place(context, a), _place(context, b)
     way = centre_b - centre_a
     data = {
@@ -106,7 +113,7 @@ def measure(context: Context, a: str | Point, b: str | Point | None = None) -> T
         "direction_degrees": round(math.degrees(math.atan2(way[1], way[0])), 1),
         **framed(context.world, "; directions clockwise from right"),
     }
-    return ToolResult(with_metres(data, context.world.metres_per_pixel))
+    return ToolResult(with_metres(data, world.metres_per_pixel), world=world)
 
 
 def _place(context: Context, thing: str | Point) -> tuple[BaseGeometry, FloatArray]:

@@ -51,6 +51,19 @@ def standing_data(context: Context) -> dict[str, Any]:
     return with_metres(data, world.metres_per_pixel)
 
 
+def robot_data(context: Context, name: str) -> dict[str, Any]:
+    """What `measure` says of one robot, by r and its id; its place where it has one."""
+    world, robot = context.world, name.removeprefix("r")
+    plan = world.plan().plan
+    groups = range(len(plan.formation.contract.groups))
+    rows = (row for k in groups for row in _robot_rows(world, plan, k))
+    found = next((row for row in rows if row["robot"] == robot), None)
+    if found is None:
+        at = robot_named(world, name)
+        found = {"robot": robot, "place": None, "at": [round(v, 1) for v in at]}
+    return with_metres({"plan_id": plan.id, **found}, world.metres_per_pixel)
+
+
 def _members(plan: Plan, k: int) -> tuple[list[str], FloatArray]:
     """Ids and places, (n, 2) px, of the robots of a group, counted from 0."""
     groups = plan.formation.contract.groups
@@ -93,7 +106,8 @@ def _group_facts(world: World, plan: Plan, k: int) -> dict[str, Any]:
     ring = ring_of(points, world.outline(group.targets[0]), contract.robot_radius)
     if ring is None:
         return data
-    return data | ring.model_dump() | {"between": [names[i] for i in ring.between]}
+    facts = ring.model_dump() | {"between": [names[i] for i in ring.between]}
+    return data | facts | {"closed": ring.closed and not group.opens}
 
 
 def _arrived(world: World, plan: Plan) -> bool:

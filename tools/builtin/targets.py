@@ -50,6 +50,18 @@ def _rounded_parts(parts: Iterable[Deviation]) -> list[dict[str, int]]:
     return [dict(zip(("x", "y", "px"), map(round, part), strict=True)) for part in parts]
 
 
+def with_pointed(
+    world: World, prompts: Sequence[TargetPrompt], named: Collection[str]
+) -> tuple[TargetPrompt, ...]:
+    """Prompts and, of what the person pointed at, what is named and not measured yet.
+
+    Args:
+        named: ids that a contract, edits or a question name.
+    """
+    known = {t.id for t in world.targets} | {p.id for p in prompts}
+    return (*prompts, *(p for p in world.pointed if p.id in named and p.id not in known))
+
+
 def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
     """The world with the things that prompts point at as targets.
 

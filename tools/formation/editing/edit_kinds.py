@@ -231,10 +231,10 @@ EDIT_SCHEMA: dict[str, Any] = {
         "rotate: degrees clockwise. mirror: axis left-right or top-bottom. shift: dx, dy. scale: "
         "factor. add: n. remove: n or robots (numbers); others close up. count: robots, a number, "
         "needed (to close the ring) or fit. swap: a, b. skip: robots; places stay empty. side: all "
-        "to it. sides: only or without, as of a ring. opening: towards, px wide or factor. close, "
+        "to it. sides: only or without, lists. opening: towards, px wide or factor. close, "
         "open, escape-proof. arrange: demands, fields of a group. target: to an id; only robots (a "
         "count or numbers), the rest stay. merge. place: robot to [x, y], by [dx, dy] or target. "
-        "heading: to. keep-out: ids. group: which, if several."
+        "heading: to. keep-out: ids. group: else all."
     ),
     "properties": {"kind": {"type": "string"}, **{name: {} for name in _NAMES}},
     "required": ["kind"],
