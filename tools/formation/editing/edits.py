@@ -6,31 +6,25 @@ places themselves are new, the least sum of squared ways decides who takes which
 """
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
 from itertools import count
 
 import numpy as np
 
 from ...errors import ToolError
 from ...geometry.cages.budget import search_budget
-from ...geometry.outline import FloatArray
 from ..checking.verdict import Verdict
 from ..contract import Contract
-from ..encounters import encounters_of, others_than
-from ..placement.avoidance import off_others
 from ..placement.place import Site
 from ..plan import Plan, make_plan
 from ..value import Value
 from .draft import Draft, draft_of
 from .edit_kinds import Edit
 from .edit_rules import RULES
-from .part import IntArray, taken
+from .off_things import off_things
+from .part import IntArray
 from .ring_rules import RING_RULES
 from .staying import held, holding, moved_in, settled
 from .team_rules import TEAM_RULES
-
-EXACT = frozenset({"rotate", "mirror", "shift", "scale", "swap", "skip", "place", "heading"})
-"""What says where everybody is to be: nobody is moved off another thing for it."""
 
 
 class Diff(Value):
@@ -97,7 +91,7 @@ def edited_all(
             raise ToolError(f"Robot {names} cannot stay where it is and take part in that.")
         contract = draft.agreed()
         after = make_plan(contract, site, version(contract), draft.points)
-        after = _off_others(after, draft, plan.formation.points, edits)
+        after = off_things(after, draft, plan.formation.points, {edit.kind for edit in edits})
     after = after.model_copy(update={"verdict": _called_by_id(after.verdict, draft)})
     was = draft.was
     names = plan.formation.robot_of_place
@@ -113,34 +107,6 @@ def _edited_by(draft: Draft, edits: Sequence[Edit]) -> Draft:
         rule = RULES.get(edit.kind) or RING_RULES[edit.kind]
         draft = draft.with_each(draft.chosen(edit), lambda part: rule(part, edit))  # noqa: B023
     return draft
-
-
-def _off_others(plan: Plan, draft: Draft, before: FloatArray, edits: Sequence[Edit]) -> Plan:
-    """The plan, or one whose robots that moved stand on fewer other things, as few moved as can.
-
-    Nobody who is to stay is moved.
-    """
-    if all(edit.kind in EXACT for edit in edits):
-        return plan
-    contract, points, was = plan.formation.contract, plan.formation.points, draft.was
-    outlines = {name: draft.site.outlines[name] for name in contract.target_ids}
-    others = others_than(contract, outlines, draft.site.others)
-    site = replace(draft.site, others=others)
-    on = [e for e in encounters_of(plan, site, {}, 0.0) if e.how == "on"]
-    here = np.array([int(name) - 1 for e in on for name in e.robots], dtype=np.intp)
-    moved = (was < 0) | (np.linalg.norm(points - before[was], axis=1) > 0)
-    if not moved[here].any() and plan.verdict.certified:
-        return plan
-    off = off_others(plan, site)
-    if off is plan:
-        return plan
-    slots, parts = off.formation.points, np.split(np.arange(len(was)), _ends(draft))
-    order = np.concatenate([mine[taken(points[mine], slots[mine])] for mine in parts])
-    stays = np.isin(was, list(draft.held))
-    if (slots[order][stays] != points[stays]).any():
-        return plan
-    again = make_plan(contract, site, plan.formation.scene_version, slots[order])
-    return again if again.verdict.certified else plan
 
 
 def _called_by_id(verdict: Verdict, draft: Draft) -> Verdict:
@@ -159,10 +125,6 @@ def _called_by_id(verdict: Verdict, draft: Draft) -> Verdict:
     )
     notes = tuple(dict.fromkeys((*verdict.notes, *draft.notes)))
     return verdict.model_copy(update={"findings": findings, "notes": notes})
-
-
-def _ends(draft: Draft) -> IntArray:
-    return np.cumsum([len(part.points) for part in draft.parts])[:-1]
 
 
 def _diff(before: Plan, after: Plan, was: IntArray) -> Diff:

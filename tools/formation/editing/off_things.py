@@ -1,0 +1,167 @@
+"""Robots that an edit puts onto other things in the picture are slid off them, along their curve.
+
+So the distance that an edit gave stays. Frame: image pixels, x right, y down.
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from ...geometry.outline import FloatArray, distances
+from ..encounters import TOUCHING, others_than
+from ..placement.avoidance import MOST_ROBOTS, MOST_TRIED, TRIED_TOGETHER, off_others
+from ..placement.caging import escape_proof
+from ..placement.place import Site
+from ..plan import Plan, make_plan
+from .draft import Draft
+from .part import ON_CURVE, Part, taken
+from .respacing import Track
+
+EXACT = frozenset({"rotate", "mirror", "shift", "scale", "swap", "skip", "place", "heading"})
+"""What says where everybody is to be: nobody is moved off another thing for it."""
+ANEW = frozenset({"target", "arrange", "merge"})
+"""What places robots anew: at any distance that is allowed."""
+GIVEN = frozenset({"out", "in", "distance", "spacing"})
+"""What says how far from its target or from each other robots are to be."""
+SLIDES, REACH = 24, 0.9
+"""Places on either side that a robot is slid to, up to this share of the way to its neighbours."""
+
+
+def off_things(plan: Plan, draft: Draft, before: FloatArray, kinds: Collection[str]) -> Plan:
+    """The plan, or one of whose robots that were moved fewer stand on other things that are sure.
+
+    Nobody who is to stay is moved.
+
+    Args:
+        before: places of the formation before, (n, 2), px.
+        kinds: of the edits that made it.
+    """
+    contract, was = plan.formation.contract, draft.was
+    outlines = {name: draft.site.outlines[name] for name in contract.target_ids}
+    others = others_than(contract, outlines, draft.site.others)
+    site, failed = replace(draft.site, others=others), {f.kind for f in plan.verdict.findings}
+    sound = contract.robots <= MOST_ROBOTS and not failed - {"keep_out"}
+    if EXACT.issuperset(kinds) or not sound or any(map(escape_proof, contract.groups)):
+        return plan
+    moved = (was < 0) | (np.linalg.norm(plan.formation.points - before[was], axis=1) > 0)
+    given = not GIVEN.isdisjoint(kinds)
+    if ANEW.isdisjoint(kinds) or given:
+        plan = _Slides(plan, draft, site, moved).found()
+        on_curves = any(_line_of(part) is not None for part in draft.parts)
+        if given or (on_curves and plan.verdict.certified):
+            return plan
+    return _rearranged(plan, draft, site)
+
+
+def _rearranged(plan: Plan, draft: Draft, site: Site) -> Plan:
+    """The plan, or one at other places its contract allows; who takes which by least motion."""
+    off = off_others(plan, site)
+    if off is plan:
+        return plan
+    contract, points, slots = plan.formation.contract, plan.formation.points, off.formation.points
+    order = np.concatenate([mine[taken(points[mine], slots[mine])] for mine in _members(draft)])
+    stays = np.isin(draft.was, list(draft.held))
+    if (slots[order][stays] != points[stays]).any():
+        return plan
+    again = make_plan(contract, site, plan.formation.scene_version, slots[order])
+    return again if again.verdict.certified else plan
+
+
+def _members(draft: Draft) -> list[NDArray[np.intp]]:
+    """For each group which of all robots are its own."""
+    ends = np.cumsum([len(part.points) for part in draft.parts])
+    return np.split(np.arange(ends[-1]), ends[:-1])
+
+
+class _Slides:
+    """The best plan so far, and how many others may still be certified."""
+
+    def __init__(self, plan: Plan, draft: Draft, site: Site, moved: NDArray[np.bool_]) -> None:
+        self._best, self._draft, self._site = plan, draft, site
+        self._free = moved & ~np.isin(draft.was, list(draft.held))
+        self._left = min(MOST_TRIED, TRIED_TOGETHER // plan.formation.contract.robots)
+        contract = plan.formation.contract
+        regions = [thing.region for thing in site.others if thing.sure]
+        regions += [site.outlines[name].filled for name in contract.keep_out]
+        self._solid: BaseGeometry = shapely.union_all(regions)
+        self._floor, self._near = contract.spacing_floor, contract.robot_radius + TOUCHING
+
+    def _on(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Which of (n, 2) places are on a thing, (n,)."""
+        if self._solid.is_empty:
+            return np.zeros(len(points), dtype=bool)
+        return distances(self._solid, points) < self._near
+
+    def found(self) -> Plan:
+        """Robots on things slid one by one; where that is not enough, their curve's together."""
+        for part, mine in zip(self._draft.parts, _members(self._draft), strict=True):
+            line = _line_of(part)
+            points = self._best.formation.points
+            bad = mine[self._on(points[mine]) & self._free[mine]]
+            if line is None or not len(bad):
+                continue
+            for i in map(int, bad):
+                self._take(self._alone(line, mine, i))
+            if self._on(self._best.formation.points[bad]).any() and self._free[mine].all():
+                self._take(self._together(line, mine, points[mine]))
+        return self._best
+
+    def _take(self, ways: Iterator[FloatArray]) -> None:
+        """The first of some arrangements with fewer robots on things that does not fail."""
+        count = int(self._on(self._best.formation.points).sum())
+        formation = self._best.formation
+        better = (way for way in ways if int(self._on(way).sum()) < count)
+        for way in islice(better, max(self._left, 0)):
+            self._left -= 1
+            plan = make_plan(formation.contract, self._site, formation.scene_version, way)
+            if not {f.kind for f in plan.verdict.findings} - {"keep_out"}:
+                self._best = plan
+                return
+
+    def _alone(self, line: Track, mine: Sequence[int], i: int) -> Iterator[FloatArray]:
+        """One robot at other places of its curve, the nearest first."""
+        points = self._best.formation.points
+        reach = REACH * line.curve.length / len(mine)
+        for shift in _shifts(reach):
+            way = points.copy()
+            way[[i]] = _slid(line, points[[i]], shift)
+            others = np.delete(points, i, axis=0)
+            apart = np.linalg.norm(others - way[i], axis=1)
+            if not len(apart) or apart.min() >= self._floor:
+                yield way
+
+    def _together(
+        self, line: Track, mine: Sequence[int], points: FloatArray
+    ) -> Iterator[FloatArray]:
+        """All robots of a curve slid along it by as much, the fewest on things and least first."""
+        ways = [_slid(line, points, s) for s in _shifts(REACH * line.curve.length / len(mine))]
+        for own in sorted(ways, key=lambda way: int(self._on(way).sum())):
+            whole = self._best.formation.points.copy()
+            whole[mine] = own
+            yield whole
+
+
+def _shifts(reach: float) -> Iterator[float]:
+    for k in range(1, SLIDES + 1):
+        yield reach * k / SLIDES
+        yield -reach * k / SLIDES
+
+
+def _line_of(part: Part) -> Track | None:
+    """The curve in one piece that robots can be slid along."""
+    if part.group.relation not in (*ON_CURVE, "between") and part.group.line is None:
+        return None
+    line = part.track(len(part.points))
+    return line if len(line.curve.lines) == 1 and line.curve.length > 0 else None
+
+
+def _slid(line: Track, points: FloatArray, by: float) -> FloatArray:
+    """Robots (n, 2) further along a curve, as far from the target as they were, px."""
+    ends = (-np.inf, np.inf) if line.curve.closed else (0.0, line.curve.length)
+    there = line.at(np.clip(line.stations(points) + by, *ends))
+    return there if line.base.is_empty else line.settled(there, distances(line.base, points))
