@@ -5,6 +5,7 @@ that is repeated to the person, or is left unread: then the planner asks and quo
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from .demand_fields import LENGTHS, Fields
 from .demands import Item, demands_in, items_of, says_more, sentences, stops_in
@@ -14,11 +15,13 @@ from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_com
 from .reading import Reading
 from .tagging import Tagging, Token, in_use, tag, tokens, word_classes
 
-SURE_BACKGROUND = 0.5
+SURE_BACKGROUND, SURE_NUMBER = 0.5, 0.8
 SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 """Share of a sentence's words that are no command from which on all of it is background."""
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
 """What a reason or purpose begins with."""
+SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
+"""What these can do for a demand that is carried out demands nothing more."""
 STATING = frozenset(
     ("is", "are", "was", "were", "has", "have", "had", "could", "might", "will", "it's", "there's")
 )
@@ -87,6 +90,9 @@ class _Reader:
         self.taken = [item.symbol == "<f>" for item in items]
         self.classes = [frozenset(c) for c in word_classes([item.symbol for item in items])]
         self.demands = demands_in(items)
+        ends = [k for k, item in enumerate(items) if item.symbol in ENDS]
+        bounds = pairwise([-1, *ends, len(items)])
+        self.clauses = [range(first + 1, last) for first, last in bounds]
         self.scenery = self._scenery()
 
     def read(self) -> Reading:
@@ -130,7 +136,8 @@ class _Reader:
             if goes_on:
                 share = 1.0
             goes_on = sentence[-1].symbol == ";"
-            if demanded & {*place} or any(i.quantity for i in sentence):
+            counts = [k for k in place if self.items[k].quantity and not self._tells(k)]
+            if demanded & {*place} or counts:
                 share = 1.0
             ordered = any(d.sets == "robots" and d.first in place for d in self.demands)
             if sentence[-1].symbol == "?" and not ordered:
@@ -179,7 +186,7 @@ class _Reader:
         for sentence in sentences(self.items):
             place = [k for k in range(at, at + len(sentence)) if k not in demanded]
             at += len(sentence)
-            negated = any(self.items[k].symbol in NEGATIONS for k in place)
+            negated = any(self.items[k].symbol in NEGATIONS - {"without"} for k in place)
             if negated and any("prevent" in self.classes[k] for k in place):
                 return True
         return False
@@ -239,6 +246,9 @@ class _Reader:
         weighty = [i for i in words if i.symbol in WEIGHTY]
         if caged and any(i.symbol in NEGATIONS for i in words):
             return all(i.symbol in NEGATIONS for i in weighty)
+        opening = [i.symbol for i in words[:3] if i.symbol != "that"]
+        if opening[0] == "so" and opening[1:2] and opening[1] in SPEAKERS:
+            return True
         if words[0].symbol not in REASONS or weighty:
             return False
         return not any(self.classes[k] & ASKED_CLASSES for k in range(first, last))
@@ -265,7 +275,7 @@ class _Reader:
         if self.scenery[k]:
             return "background"
         if item.quantity is not None:
-            return "" if self._counts_corners(item) else "unread"
+            return "" if self._counts_corners(item) else "background" if self._tells(k) else "unread"
         if item.label == "background" and item.certainty >= SURE_BACKGROUND:
             return "background"
         if weighs(item.symbol, self.classes[k], self.reading.relation):
@@ -276,6 +286,13 @@ class _Reader:
             return "background"
         known = goes_with(item.symbol, self.classes[k], self.reading.relation)
         return "" if known else "unread"
+
+    def _tells(self, k: int) -> bool:
+        """Whether a number stands in a clause that is sure to be background: "come at three"."""
+        clause = next(c for c in self.clauses if k in c)
+        words = [self.items[j] for j in clause]
+        told = all(i.label in ("background", "thing") for i in words if i.symbol not in ENDS)
+        return self.items[k].symbol == "<n>" and told and self.items[k].certainty >= SURE_NUMBER
 
     def _counts_corners(self, item: Item) -> bool:
         """Four corners, one robot at each."""

@@ -91,12 +91,12 @@ def items_of(text: str, words: Sequence[Token], tagging: Tagging) -> tuple[Item,
 def _is_plain(quantity: Quantity, words: Sequence[Token], labels: dict[int, str]) -> bool:
     """Whether it is no part of a phrase for a thing, and no "one" that stands for a noun."""
     inside = [labels[w.start] for w in words if quantity.start <= w.start < quantity.end]
-    following = [w.text for w in words if w.start >= quantity.end][:3]
+    after = next((w.text for w in words if w.start >= quantity.end), "")
+    following = [w.text for w in words if w.start >= quantity.end][: 3 if after.isalpha() else 0]
     if "thing" in inside and not any(_robots().fullmatch(word) for word in following):
         return False
     if quantity.wording.lower() != "one":
         return True
-    after = next((w.text for w in words if w.start >= quantity.end), "")
     before = next((w.text for w in reversed(words) if w.end <= quantity.start), "")
     return before not in ("no", "the", "each", "every", "any", "this", "that", "single") and (
         after not in ("after", "by", "another", "behind", "beside", "next", "to", *_table()["rows"])

@@ -40,7 +40,8 @@ def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
 def would_do(task: Task, reading: Reading) -> bool:
     """Whether all but words that were left unread is settled, so that a contract can be shown."""
     settled = not (reading.stops or reading.unscaled or _unsettled(reading))
-    return settled and bool(reading.unread) and not _which_things(task, reading)
+    settled = settled and not (reading.others or reading.faced or _which_things(task, reading))
+    return settled and bool(reading.unread)
 
 
 def things_needed(reading: Reading) -> int:
@@ -199,12 +200,6 @@ def _which_things(task: Task, reading: Reading) -> str | None:
     needed = things_needed(reading)
     if reading.faced and len(pointed) == needed + 1:
         return None
-    others = [*reading.others, *([reading.faced] if reading.faced else [])]
-    if pointed and others:
-        return (
-            f'Which thing is "{others[0]}"? Mark it with --keep-out, or point at nothing so that '
-            "both are looked for."
-        )
     if len(pointed) == 1 and needed == 2:
         return "Which two things? Point at both: --point X,Y --point X,Y."
     if len(pointed) > needed:

@@ -81,18 +81,22 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     needed = things_needed(reading)
     ids, others = _target_ids(task)[:needed], _target_ids(task)[needed:]
     prompts = [p for p in shown if p["id"] not in task.targets]
-    if not ids:
-        named = [*reading.others, *([reading.faced] if reading.faced else [])]
-        found = find(_things(task, reading), needed, history)
-        if isinstance(found, Step):
-            return _call(found.name, found.arguments)
-        for phrase in named:
-            other = find(described([phrase]), 1, history)
-            if isinstance(other, Step):
-                return _call(other.name, other.arguments)
-            found += other
-        prompts = prompts_of([(f.candidate, _label(f.wording)) for f in found], before)
-        ids, others = _parted([p["id"] for p in prompts], len(named))
+    named = [] if others else [*reading.others, *([reading.faced] if reading.faced else [])]
+    found = [] if ids else find(_things(task, reading), needed, history)
+    if isinstance(found, Step):
+        return _call(found.name, found.arguments)
+    for phrase in named:
+        other = find(described([phrase]), 1, history)
+        if isinstance(other, Step) and ids and not other.arguments:
+            question = f'Which thing is "{phrase}"? Mark it with --keep-out.'
+            return _call("ask_user", {"question": question})
+        if isinstance(other, Step):
+            return _call(other.name, other.arguments)
+        found += other
+    if found:
+        looked_for = prompts_of([(f.candidate, _label(f.wording)) for f in found], before, ids)
+        prompts = [*prompts, *looked_for]
+        ids, others = _parted([*ids, *(p["id"] for p in looked_for)], len(named))
     contract = _in_unit(task, contract_of(reading, robots, ids, others, _refusals(history)))
     if _was_doubted(history):
         contract["reading"] = READING

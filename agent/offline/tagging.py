@@ -19,6 +19,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from ...tools.formation.number_words import numbers_in
+
 LABELS = ("command", "thing", "demand", "background")
 DEMAND, SURE_DEMAND = LABELS.index("demand"), 0.5
 """Words are a demand only where that is at least so probable."""
@@ -34,6 +36,12 @@ TAG_BUCKETS, MEANING_BUCKETS = 1 << 16, 1 << 15
 TOKEN = re.compile(r"\d+(?:[.,]\d+)*|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[^\w\s]|_")
 SENTENCE_ENDS = frozenset(".!?;\n")
 ENDINGS = ("ing", "ed", "es", "s", "e")
+PURPOSES = ("so that", "because", "in order", "so we", "so it", "so they", "so nobody", "so no")
+"""Begin what is no part of a phrase for a thing."""
+DETERMINERS = frozenset(("the", "that", "this", "those", "these", "my", "our", "your"))
+AVOIDED_BY = frozenset(("from", "of", "off", "on", "onto", "into", "near", "touching", "avoid"))
+AVOIDING = frozenset(("keep", "keeping", "stay", "staying", "clear", "away", "avoid", "touching"))
+"""What stands after a word of the second and close behind one of the third is a thing."""
 LONGEST = 4
 """Words of the longest phrase of classes.yaml that is looked for."""
 Floats = NDArray[np.float64]
@@ -76,9 +84,32 @@ def tag(words: Sequence[Token], may_command: Sequence[bool] = ()) -> Tagging:
         words: of the instruction.
         may_command: for each word whether it can be one of the command; left out, all can.
     """
-    model = in_use()
-    labels, certainty = model.labels([w.text for w in words], may_command)
-    return Tagging(labels, certainty, model.meaning([w.text for w in words], labels))
+    model, texts = in_use(), [w.text for w in words]
+    labels, certainty = model.labels(texts, may_command)
+    labels = _trimmed(texts, labels)
+    return Tagging(labels, certainty, model.meaning(texts, labels))
+
+
+def _trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
+    """The labels, where phrases for things end before a purpose or a further number."""
+    found = list(labels)
+    for i in range(1, len(words)):
+        opens = " ".join(words[i : i + 2])
+        if found[i] == found[i - 1] == "thing" and opens.startswith(PURPOSES):
+            end = next((k for k in range(i, len(words)) if labels[k] != "thing"), len(words))
+            found[i:end] = ["background"] * (end - i)
+    for i in range(4, len(words)):
+        lead = words[i - 4 : i]
+        if found[i] == "demand" and words[i] in DETERMINERS and lead[-1] in AVOIDED_BY:
+            end = next((k for k in range(i, len(words)) if found[k] != "demand"), len(words))
+            end = next((k for k in range(i, end) if words[k] in ",.;:!?()"), end)
+            if AVOIDING & {*lead} and not numbers_in(" ".join(lead)):
+                found[i:end] = ["thing"] * (end - i)
+    for i in range(len(words) - 1):
+        ends = found[i] == "thing" and found[i + 1 : i + 2] != ["thing"]
+        if ends and words[i - 1] == "and" and numbers_in(words[i]):
+            found[i - 1 : i + 1] = ["command"] * 2
+    return tuple(found)
 
 
 @dataclass(frozen=True)

@@ -51,8 +51,11 @@ DIGITS = (
     r"[0-9]{1,3}(?: [0-9]{3})+(?![0-9]|[.,][0-9])|"
     r"[0-9]+,[0-9]{1,2}(?![0-9])|[0-9]*\.?[0-9]+(?:e[0-9]+)?"
 )
+WEIGHED = r"[0-9]{1,3}(?: [0-9]{3})+(?=[ -]?(?:k?g|k?grams?|kilos?|pounds?|lbs?|oz|ounces?|v|volts?)\b)"
+"""No number in thousands: "8 200 gram robots" are eight."""
 ATOM = re.compile(
-    rf"(?P<digits>(?<![\w.,])(?:{DIGITS})(?![\d]))|(?P<sign>[\u00bd\u00bc\u00be\u2153\u2154])|"
+    rf"(?P<weighed>(?<![\w.,]){WEIGHED})|"
+    rf"(?P<digits>(?<![\w.,])(?:{DIGITS})(?!\d|(?:st|nd|rd|th|d)\b))|(?P<sign>[\u00bd\u00bc\u00be\u2153\u2154])|"
     r"(?P<word>[^\W\d_]+(?:'s)?)|(?P<mark>[-\u2013\u2014\u2212+*\u00d7/\u00b1%,.;:!?()'\"])",
     re.IGNORECASE,
 )
@@ -222,6 +225,9 @@ def _number(atoms: Sequence[_Atom], at: int, *, bridging: bool = True) -> tuple[
     atom = atoms[at]
     if atom.kind == "sign":
         return SIGNS[atom.text], at + 1
+    if atom.text == "point" and _text(atoms, at - 1) not in ("the", "a", "each", "that", "this"):
+        value, end = _after_point(atoms, 0.0, at)
+        return (value, end) if end > at else None
     if atom.kind == "digits":
         decimal = re.fullmatch(r"[0-9]+,[0-9]{1,2}", atom.text)  # as much of Europe writes it
         plain = atom.text.replace(",", ".") if decimal else atom.text

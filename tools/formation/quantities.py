@@ -1,6 +1,7 @@
 """Numbers and lengths in an instruction with their units: "25 dm", "half a metre", "10'"."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -84,7 +85,24 @@ def quantities_in(text: str) -> tuple[Quantity, ...]:
     numbers += [n for n in ones if not any(k.start < n.end and n.start < k.end for k in numbers)]
     found += [_with_unit(text, n) for n in numbers if not _overlaps(n, taken)]
     counted = [q for q in found if q.kind != "number" or not q.wording.lower().endswith(SHARES_OF)]
-    return tuple(sorted(counted, key=lambda q: q.start))
+    return _ranges(text, sorted(counted, key=lambda q: q.start))
+
+
+def _ranges(text: str, found: Sequence[Quantity]) -> tuple[Quantity, ...]:
+    """The quantities; two that name the unit of each end of a range are one: "1 m to 2 m"."""
+    ranges: list[Quantity] = []
+    for quantity in found:
+        last = ranges[-1] if ranges else quantity
+        link = text[last.end : quantity.start].strip()
+        between = link == "and" and text[: last.start].endswith("between ")
+        if last.is_length and last.kind == quantity.kind and (between or link in ("to", "-")):
+            start, end = last.start - between * len("between "), quantity.end
+            ranges[-1] = Quantity(
+                last.kind, last.least, quantity.most, text[start:end], start, end
+            )
+        else:
+            ranges.append(quantity)
+    return tuple(ranges)
 
 
 def _overlaps(number: Number, taken: list[tuple[int, int]]) -> bool:
