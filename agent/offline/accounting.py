@@ -15,11 +15,17 @@ from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_com
 from .reading import Reading
 from .tagging import Tagging, Token, in_use, tag, tokens, word_classes
 
-SURE_BACKGROUND, SURE_NUMBER = 0.5, 0.8
+SURE_BACKGROUND, SURE_ALONE, SURE_NUMBER = 0.5, 0.8, 0.8
+"""Least probabilities of background, of a single word that is, and of a clause with a number."""
 SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 """Share of a sentence's words that are no command from which on all of it is background."""
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
 """What a reason or purpose begins with."""
+OPENS_THING = frozenset(
+    ("the", "a", "an", "that", "this", "these", "those", "my", "our", "your", "its", "his", "her")
+    + ("what", "whatever", "where", "wherever", "which", "who", "whose", "not", "one", "two", "it")
+)
+"""A further phrase for a thing begins with one of these."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
 """What these can do for a demand that is carried out demands nothing more."""
 STATING = frozenset(
@@ -186,8 +192,11 @@ class _Reader:
         for sentence in sentences(self.items):
             place = [k for k in range(at, at + len(sentence)) if k not in demanded]
             at += len(sentence)
-            negated = any(self.items[k].symbol in NEGATIONS - {"without"} for k in place)
+            symbols = {self.items[k].symbol for k in place}
+            negated = symbols & (NEGATIONS - {"without"})
             if negated and any("prevent" in self.classes[k] for k in place):
+                return True
+            if "kept" in symbols and symbols & {"out", "away", "in"}:
                 return True
         return False
 
@@ -197,7 +206,8 @@ class _Reader:
             if item.symbol == "<t>" and (not self.taken[k] or k in self.fields.mentioned):
                 phrase = self._quote(k, self.fields.reaches.get(k, k + 1))
                 self.taken[k] = True
-                if says_more(phrase):
+                first = phrase.lower().split()[0]
+                if says_more(phrase) or (self.reading.things and first not in OPENS_THING):
                     self.reading.unread.append(phrase)
                 else:
                     self.reading.things.append(phrase)
@@ -276,7 +286,9 @@ class _Reader:
             return "background"
         if item.quantity is not None:
             return "" if self._counts_corners(item) else "background" if self._tells(k) else "unread"
-        if item.label == "background" and item.certainty >= SURE_BACKGROUND:
+        beside = {self.items[n].label for n in (k - 1, k + 1) if n in range(len(self.items))}
+        sure = SURE_BACKGROUND if "background" in beside else SURE_ALONE
+        if item.label == "background" and item.certainty >= sure:
             return "background"
         if weighs(item.symbol, self.classes[k], self.reading.relation):
             return "unread"

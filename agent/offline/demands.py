@@ -17,8 +17,10 @@ from ...tools.formation.quantities import Quantity, quantities_in
 from .tagging import Tagging, Token
 
 SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
-ALWAYS = ("a negation", "a cancellation", "something past", "another task")
+ALWAYS = ("a negation", "a cancellation", "something past", "another task", "a span of time")
 """Kinds of stops that also count in words that look like background beside an order."""
+SURE_SCENIC = 0.8
+"""Least probability of each word of a sentence that only tells something."""
 OPENING_CONDITIONS = ("unless", "until", "if", "once", "as", "provided")
 """First words of a sentence that makes all of them conditional."""
 WRAPPED = re.compile(r"\s*\|\s*")
@@ -129,13 +131,16 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
     for sentence in parts:
         line = _Line(sentence)
         asked_only = all(s[-1].symbol == "?" for s in parts)
-        scenic = all(i.label in ("background", "thing") or not i.symbol.isalpha() for i in sentence)
+        words = [i for i in sentence if i.symbol.isalpha()]
+        aside = ("background", "thing")
+        scenic = all(i.label in aside and i.certainty >= SURE_SCENIC for i in words)
         for kind, pattern in _stops():
             for match in pattern.finditer(line.text):
                 first, last = line.items_of(match)
                 meant = any(i.label != "background" for i in sentence[first:last])
                 opens = first == 0 and sentence[0].symbol in OPENING_CONDITIONS
-                stops = meant or opens or (kind in ALWAYS and not scenic)
+                told = scenic and last - first < len(words)
+                stops = meant or opens or (kind in ALWAYS and not told)
                 stops = stops and (kind != "a question" or asked_only)
                 orders = len(parts) == 1 or any(i.quantity for i in sentence)
                 if stops and (kind != "something past" or orders):

@@ -37,7 +37,12 @@ TOKEN = re.compile(r"\d+(?:[.,]\d+)*|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[^\w\s]|_"
 SENTENCE_ENDS = frozenset(".!?;\n")
 ENDINGS = ("ing", "ed", "es", "s", "e")
 PURPOSES = ("so that", "because", "in order", "so we", "so it", "so they", "so nobody", "so no")
-"""Begin what is no part of a phrase for a thing."""
+NO_THING = ("with ", "without ", "nearer ", "closer ", "in ", "at ", "on ", "by ", "and ")
+"""Begin what is no part of a phrase for a thing, and what is none."""
+ONLY_SIDE = re.compile(
+    "(?:(?:the|its) )?(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?(?: side| end| edge)?"
+)
+"""Where at a thing, not which thing."""
 DETERMINERS = frozenset(("the", "that", "this", "those", "these", "my", "our", "your"))
 AVOIDED_BY = frozenset(("from", "of", "off", "on", "onto", "into", "near", "touching", "avoid"))
 AVOIDING = frozenset(("keep", "keeping", "stay", "staying", "clear", "away", "avoid", "touching"))
@@ -91,25 +96,32 @@ def tag(words: Sequence[Token], may_command: Sequence[bool] = ()) -> Tagging:
 
 
 def _trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
-    """The labels, where phrases for things end before a purpose or a further number."""
+    """The labels, with phrases for things from a determiner on to a purpose or further number."""
     found = list(labels)
-    for i in range(1, len(words)):
-        opens = " ".join(words[i : i + 2])
-        if found[i] == found[i - 1] == "thing" and opens.startswith(PURPOSES):
-            end = next((k for k in range(i, len(words)) if labels[k] != "thing"), len(words))
-            found[i:end] = ["background"] * (end - i)
-    for i in range(4, len(words)):
-        lead = words[i - 4 : i]
-        if found[i] == "demand" and words[i] in DETERMINERS and lead[-1] in AVOIDED_BY:
-            end = next((k for k in range(i, len(words)) if found[k] != "demand"), len(words))
-            end = next((k for k in range(i, end) if words[k] in ",.;:!?()"), end)
-            if AVOIDING & {*lead} and not numbers_in(" ".join(lead)):
-                found[i:end] = ["thing"] * (end - i)
-    for i in range(len(words) - 1):
-        ends = found[i] == "thing" and found[i + 1 : i + 2] != ["thing"]
-        if ends and words[i - 1] == "and" and numbers_in(words[i]):
-            found[i - 1 : i + 1] = ["command"] * 2
+    for start, end in _runs(found, "thing"):
+        phrase = " ".join(words[start:end])
+        for k in range(start + 1, end):
+            if " ".join(words[k : k + 2]).startswith(PURPOSES):
+                found[k:end] = ["background"] * (end - k)
+                break
+        if phrase.startswith(NO_THING) or ONLY_SIDE.fullmatch(phrase):
+            found[start:end] = ["demand"] * (end - start)
+        elif end - start > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
+            found[end - 2 : end] = ["command"] * 2
+    for start, end in _runs(found, "demand"):
+        for k in range(max(start, 4), end):
+            lead = words[k - 4 : k]
+            avoids = AVOIDING & {*lead} and not numbers_in(" ".join(lead))
+            if words[k] in DETERMINERS and lead[-1] in AVOIDED_BY and avoids:
+                stop = next((n for n in range(k, end) if not words[n][0].isalnum()), end)
+                found[k:stop] = ["thing"] * (stop - k)
     return tuple(found)
+
+
+def _runs(labels: Sequence[str], label: str) -> list[tuple[int, int]]:
+    """Where words of a label stand together: first, past-the-last."""
+    bounds = [i for i in range(len(labels) + 1) if labels[i - 1 : i] != labels[i : i + 1] or i == 0]
+    return [(a, b) for a, b in pairwise(bounds) if labels[a] == label]
 
 
 @dataclass(frozen=True)

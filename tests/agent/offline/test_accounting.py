@@ -10,7 +10,6 @@ from formup.agent.offline.reading import Reading
 from formup.evals.tasks.suites import load_suite
 from formup.tools.formation.contract import Contract
 
-FAULT = pytest.mark.xfail(strict=True, reason="a known fault of the reading")
 SCALE = 0.05
 """Metres per pixel of the pictures that the instructions are read for."""
 
@@ -47,9 +46,7 @@ def read(words: str, robots: int | None = None) -> tuple[Reading, str | None]:
         ("surround it so nothing gets out", "cage"),
         ("so that it cannot get out, surround it", "cage"),
         ("Wall the crate in, no one may reach it", "cage"),
-        pytest.param(
-            "Ring the pond with 9 guards so that visitors are kept out", "cage", marks=FAULT
-        ),
+        ("Ring the pond with 9 guards so that visitors are kept out", "cage"),
         ("occupy the sand trap", "inside"),
         ("Fill the pool with 6 robots", "inside"),
         ("Spread 9 robots over the courtyard next to the house", "inside"),
@@ -57,7 +54,7 @@ def read(words: str, robots: int | None = None) -> tuple[Reading, str | None]:
         ("Sprinkle seven bots across the lawn", "inside"),
         pytest.param("stand 3 robots on top of the sweet", "inside"),
         ("Line up 7 robots along the lower side of the roof", "along"),
-        pytest.param("five drones to the left of the truck", "along", marks=FAULT),
+        ("five drones to the left of the truck", "along"),
         ("Put 5 robots on the left side of the car", "along"),
         ("stand in a row along the north side", "along"),
         ("Place 3 robots between the car and the wall", "between"),
@@ -80,14 +77,14 @@ def test_words_name_one_arrangement(words: str, relation: str) -> None:
         ("Stand a hundred and six robots around the lid", 106),
         ("Circle it with three dozen bots", 36),
         ("Circle it with 4 dozen bots", 48),
-        pytest.param("Circle it with one and a half dozen bots", 18, marks=FAULT),
+        ("Circle it with one and a half dozen bots", 18),
         ("Circle it with half a dozen bots", 6),
         ("Circle it with a baker's dozen of bots", 13),
-        pytest.param("Circle it with three pairs of bots", 6, marks=FAULT),
+        ("Circle it with three pairs of bots", 6),
         ("Circle it with 2,400 bots", 2400),
         ("Circle it with 2 400 bots", 2400),
         ("Circle it with 16 six-wheeled bots", 16),
-        pytest.param("Circle it with 16 little green bots", 16, marks=FAULT),
+        ("Circle it with 16 little green bots", 16),
         ("Circle it with 7 + 5 bots", 12),
         ("Circle it with 9", 9),
         ("9 around the tree", 9),
@@ -118,7 +115,7 @@ def test_robots_are_counted_in_digits_and_words(words: str, robots: int) -> None
         "Surround it with a third of the robots",
         "Surround it with 12,000 robots",
         "Surround it with eleven thousand robots",
-        pytest.param("Surround it with 8 200 gram robots", marks=FAULT),
+        "Surround it with 8 200 gram robots",
     ],
 )
 def test_what_is_no_count_of_robots_is_asked_about(words: str) -> None:
@@ -138,7 +135,7 @@ LENGTHS = [
     (", between 30 and 45 px away", {"clearance": [30, 45]}),
     (", three quarters of a metre away", {"clearance": [15, 16]}),
     (", two point five metres from the edge", {"clearance": [50, 51]}),
-    pytest.param(", point five metres away", {"clearance": [10, 11]}, marks=FAULT),
+    (", point five metres away", {"clearance": [10, 11]}),
     (", 1m75 away", {"clearance": [35, 36]}),
     (", 22 dm away", {"clearance": [44, 45]}),
     (", 140cm away", {"clearance": [28, 29]}),
@@ -204,12 +201,9 @@ def test_how_large_the_robots_are(words: str, radius: float) -> None:
         ("Put 8 robots around it, evenly", "around", {"spacing": "even"}),
         ("Put 8 robots around it, noses outward", "around", {"heading": "away"}),
         ("Put 8 robots around it, all of them facing it", "around", {"heading": "towards"}),
-        pytest.param(
-            "Put 8 robots around it with their cameras on it",
+        ("Put 8 robots around it with their cameras on it",
             "around",
-            {"heading": "towards"},
-            marks=FAULT,
-        ),
+            {"heading": "towards"}),
         ("Put 8 robots around it, backs to it", "around", {"heading": "away"}),
         ("Put 8 robots around it, facing east", "around", {"heading": 0}),
         ("Put 8 robots around it, facing 120 degrees", "around", {"heading": 120}),
@@ -247,12 +241,9 @@ def test_how_large_the_robots_are(words: str, radius: float) -> None:
         ("Build an escape-proof cage of 9 robots around it", "cage", {"closure": "escape-proof"}),
         ("Cage it with 9 robots", "cage", {}),
         ("Cage it with 9 robots, leaving one exit", "around", {"opening": 0}),
-        pytest.param(
-            "Put 4 robots between the vans as a divider",
+        ("Put 4 robots between the vans as a divider",
             "between",
-            {"layout": "divider"},
-            marks=FAULT,
-        ),
+            {"layout": "divider"}),
     ],
 )
 def test_what_else_is_demanded(words: str, relation: str, fields: dict[str, Any]) -> None:
