@@ -162,7 +162,7 @@ class _Reader:
             forced = "between"
         elif "rings" in sets and reading.relation in ("several", "shape"):
             forced = next(m for m, _ in reading.meanings if m in ("around", "cage", "along"))
-        elif "groups" in sets and reading.relation in ("several", "around"):
+        elif "groups" in sets and reading.relation in ("several", "around", "along"):
             forced = "along"
         if forced and reading.relation != "ask":
             reading.meanings = [(forced, 1.0), *reading.meanings]
@@ -179,7 +179,7 @@ class _Reader:
         if self.reading.relation == "around" and self._prevents():
             return True
         closing = any(
-            classes & CLOSING and not classes & {"surround", "ring"}
+            classes & CLOSING and not classes & {"surround", "ring", "near"}
             for classes, item in zip(self.classes, self.items, strict=True)
             if item.label == "command"
         )
@@ -285,7 +285,9 @@ class _Reader:
         if self.scenery[k]:
             return "background"
         if item.quantity is not None:
-            return "" if self._counts_corners(item) else "background" if self._tells(k) else "unread"
+            return (
+                "" if self._counts_corners(item) else "background" if self._tells(k) else "unread"
+            )
         beside = {self.items[n].label for n in (k - 1, k + 1) if n in range(len(self.items))}
         sure = SURE_BACKGROUND if "background" in beside else SURE_ALONE
         if item.label == "background" and item.certainty >= sure:

@@ -151,10 +151,11 @@ class Fields:
         return True
 
     def _faced(self, demand: Demand) -> bool:
-        other = self._other(demand)
-        if other is None or self.reading.relation != "along" or self.reading.faced:
+        named = [k for k in range(demand.first, demand.last) if self.items[k].symbol == "<t>"]
+        if not named or self.reading.relation != "along" or self.reading.faced:
             return False
-        self.reading.faced = other
+        self.reading.faced = self._quote(named[-1], named[-1] + 1)
+        self.mentioned += named[:-1]
         return True
 
     def _other(self, demand: Demand) -> str | None:
@@ -235,7 +236,9 @@ class Fields:
         return self.reading.relation == "between"
 
     def _abreast(self, demand: Demand) -> bool:
-        return self.reading.relation in ("along", "between")
+        beside = self.items[demand.first].symbol in ("beside", "alongside", "next")
+        drawn = beside and self.reading.relation == "shape"
+        return drawn or self.reading.relation in ("along", "between", "cage")
 
     def _atop(self, demand: Demand) -> bool:
         return self.reading.relation in ("inside", "centre", "shape")

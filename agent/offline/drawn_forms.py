@@ -15,8 +15,8 @@ MAKE = (
     r"(?:in(?:to)?\s+)?"
 )
 STAND = (
-    r"(?P<kept>^\s*|\b(?:robots?|bots?|drones?|rovers?|agents?|units?|stand|arranged?|them|line up"
-    r"|placed?|up|be)\s+)?(?:in|into|as|be|like)\s+(?:the (?:shape|form) of\s+)?"
+    r"(?P<kept>^\s*|[,.;:]\s*|\b(?:robots?|bots?|drones?|rovers?|agents?|units?|stand|arranged?|them"
+    r"|line up|placed?|up|be|it|this|that|around)\s+)(?:in|into|as|be|like)\s+(?:the (?:shape|form) of\s+)?"
 )
 SIZES = r"(?:(?:big|large|giant|huge|small|little|neat|proper|capital|block) )?"
 CARDINALS = "|".join((*SMALL, *TENS))

@@ -37,12 +37,29 @@ TOKEN = re.compile(r"\d+(?:[.,]\d+)*|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[^\w\s]|_"
 SENTENCE_ENDS = frozenset(".!?;\n")
 ENDINGS = ("ing", "ed", "es", "s", "e")
 PURPOSES = ("so that", "because", "in order", "so we", "so it", "so they", "so nobody", "so no")
-NO_THING = ("with ", "without ", "nearer ", "closer ", "in ", "at ", "on ", "by ", "and ")
+NO_THING = (
+    "with ",
+    "without ",
+    "nearer ",
+    "closer ",
+    "in ",
+    "at ",
+    "on ",
+    "by ",
+    "and ",
+    "it ",
+    "them ",
+)
 """Begin what is no part of a phrase for a thing, and what is none."""
 ONLY_SIDE = re.compile(
     "(?:(?:the|its) )?(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?(?: side| end| edge)?"
 )
 """Where at a thing, not which thing."""
+OWNED_SIDE = re.compile(
+    "'s ((?:left|right|top|bottom|upper|lower)(?: - hand| hand)? (?:side|edge))$"
+)
+TURNED = frozenset(("facing", "faces", "nearest"))
+"""Say which side of a thing is meant: "the side of the shed facing the road"."""
 DETERMINERS = frozenset(("the", "that", "this", "those", "these", "my", "our", "your"))
 AVOIDED_BY = frozenset(("from", "of", "off", "on", "onto", "into", "near", "touching", "avoid"))
 AVOIDING = frozenset(("keep", "keeping", "stay", "staying", "clear", "away", "avoid", "touching"))
@@ -104,6 +121,15 @@ def _trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
             if " ".join(words[k : k + 2]).startswith(PURPOSES):
                 found[k:end] = ["background"] * (end - k)
                 break
+        owned = OWNED_SIDE.search(phrase)
+        if owned is not None:
+            tail = len(owned[1].split())
+            found[end - tail : end] = ["demand"] * tail
+        if words[start - 1 : start] == ["of"] and words[start - 2] in ("side", "edge", "end"):
+            turned = next((k for k in range(start + 1, end) if words[k] in TURNED), end)
+            last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
+            first = turned - (words[turned - 1] in ("that", "which"))
+            found[first : min(last, end)] = ["demand"] * (min(last, end) - first)
         if phrase.startswith(NO_THING) or ONLY_SIDE.fullmatch(phrase):
             found[start:end] = ["demand"] * (end - start)
         elif end - start > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):

@@ -51,7 +51,9 @@ DIGITS = (
     r"[0-9]{1,3}(?: [0-9]{3})+(?![0-9]|[.,][0-9])|"
     r"[0-9]+,[0-9]{1,2}(?![0-9])|[0-9]*\.?[0-9]+(?:e[0-9]+)?"
 )
-WEIGHED = r"[0-9]{1,3}(?: [0-9]{3})+(?=[ -]?(?:k?g|k?grams?|kilos?|pounds?|lbs?|oz|ounces?|v|volts?)\b)"
+WEIGHED = (
+    r"[0-9]{1,3}(?: [0-9]{3})+(?=[ -]?(?:k?g|k?grams?|kilos?|pounds?|lbs?|oz|ounces?|v|volts?)\b)"
+)
 """No number in thousands: "8 200 gram robots" are eight."""
 ATOM = re.compile(
     rf"(?P<weighed>(?<![\w.,]){WEIGHED})|"

@@ -97,9 +97,7 @@ def _ranges(text: str, found: Sequence[Quantity]) -> tuple[Quantity, ...]:
         between = link == "and" and text[: last.start].endswith("between ")
         if last.is_length and last.kind == quantity.kind and (between or link in ("to", "-")):
             start, end = last.start - between * len("between "), quantity.end
-            ranges[-1] = Quantity(
-                last.kind, last.least, quantity.most, text[start:end], start, end
-            )
+            ranges[-1] = Quantity(last.kind, last.least, quantity.most, text[start:end], start, end)
         else:
             ranges.append(quantity)
     return tuple(ranges)

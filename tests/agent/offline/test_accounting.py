@@ -201,9 +201,7 @@ def test_how_large_the_robots_are(words: str, radius: float) -> None:
         ("Put 8 robots around it, evenly", "around", {"spacing": "even"}),
         ("Put 8 robots around it, noses outward", "around", {"heading": "away"}),
         ("Put 8 robots around it, all of them facing it", "around", {"heading": "towards"}),
-        ("Put 8 robots around it with their cameras on it",
-            "around",
-            {"heading": "towards"}),
+        ("Put 8 robots around it with their cameras on it", "around", {"heading": "towards"}),
         ("Put 8 robots around it, backs to it", "around", {"heading": "away"}),
         ("Put 8 robots around it, facing east", "around", {"heading": 0}),
         ("Put 8 robots around it, facing 120 degrees", "around", {"heading": 120}),
@@ -241,9 +239,7 @@ def test_how_large_the_robots_are(words: str, radius: float) -> None:
         ("Build an escape-proof cage of 9 robots around it", "cage", {"closure": "escape-proof"}),
         ("Cage it with 9 robots", "cage", {}),
         ("Cage it with 9 robots, leaving one exit", "around", {"opening": 0}),
-        ("Put 4 robots between the vans as a divider",
-            "between",
-            {"layout": "divider"}),
+        ("Put 4 robots between the vans as a divider", "between", {"layout": "divider"}),
     ],
 )
 def test_what_else_is_demanded(words: str, relation: str, fields: dict[str, Any]) -> None:

@@ -16,7 +16,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 PHOTOS = Path(__file__).parents[3] / "evals/photos/images"
-FAULT = pytest.mark.xfail(strict=True, reason="a known fault of the reading")
 SIX = Settings(robots=6, may_deploy=False)
 
 
@@ -76,7 +75,7 @@ def is_settled(history: History) -> bool:
         pytest.param("Which of these is the largest coin? Surround it.", "around"),
         ("The largest coin needs a ring of robots around it", "around"),
         ("Fill the largest coin", "inside"),
-        pytest.param("Line up on the largest coin's left side", "along", marks=FAULT),
+        ("Line up on the largest coin's left side", "along"),
     ],
 )
 def test_the_thing_that_measures_single_out_is_taken(words: str, relation: str) -> None:

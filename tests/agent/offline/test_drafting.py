@@ -6,7 +6,6 @@ from formup.agent.offline.accounting import read_instruction
 from formup.agent.offline.drafting import question_of, things_needed
 
 
-
 def asked(words: str, scale: float | None = 0.05) -> str | None:
     """What is asked about an instruction for a thing that is pointed at; None where nothing is."""
     reading = read_instruction(words, scale)
