@@ -95,10 +95,15 @@ class _Reader:
         self.fields = Fields(text, items, reading, metres_per_pixel)
         self.taken = [item.symbol == "<f>" for item in items]
         self.classes = [frozenset(c) for c in word_classes([item.symbol for item in items])]
-        self.demands = demands_in(items)
         ends = [k for k, item in enumerate(items) if item.symbol in ENDS]
         bounds = pairwise([-1, *ends, len(items)])
         self.clauses = [range(first + 1, last) for first, last in bounds]
+        self.prevented = self._prevented()
+        self.demands = tuple(
+            d
+            for d in demands_in(items)
+            if d.numbers or not self.prevented.issuperset(range(d.first, d.last))
+        )
         self.scenery = self._scenery()
 
     def read(self) -> Reading:
@@ -116,6 +121,18 @@ class _Reader:
         self._count_alone()
         self._account()
         return self.reading
+
+    def _prevented(self) -> frozenset[int]:
+        """Items that say what must not happen: "so that nobody gets near it"."""
+        found: set[int] = set()
+        for clause in self.clauses:
+            start = next((k for k in clause if self.items[k].symbol == "so"), clause.stop)
+            rest = range(start, clause.stop)
+            symbols = {self.items[k].symbol for k in rest}
+            prevents = any("prevent" in self.classes[k] for k in rest)
+            if symbols & NEGATIONS and prevents and not symbols & {"robot", "robots"}:
+                found |= {*rest}
+        return frozenset(found)
 
     def _count_corners(self) -> None:
         """As many robots as the words name corners, where they name no robots."""
@@ -207,7 +224,9 @@ class _Reader:
                 phrase = self._quote(k, self.fields.reaches.get(k, k + 1))
                 self.taken[k] = True
                 first = phrase.lower().split()[0]
-                if says_more(phrase) or (self.reading.things and first not in OPENS_THING):
+                if k in self.prevented and self.reading.relation == "cage":
+                    self.taken[k] = False
+                elif says_more(phrase) or (self.reading.things and first not in OPENS_THING):
                     self.reading.unread.append(phrase)
                 else:
                     self.reading.things.append(phrase)
@@ -279,10 +298,11 @@ class _Reader:
         """Of an item: "" where it is accounted for, else filler, background or unread."""
         item = self.items[k]
         if self.taken[k] or not (
-            item.symbol[0].isalnum() or item.symbol in ("<n>", "<l>", "<a>", "<s>", "<c>")
+            item.symbol[0].isalnum() or item.symbol in ("<t>", "<n>", "<l>", "<a>", "<s>", "<c>")
         ):
             return ""
-        if self.scenery[k]:
+        caged = self.reading.relation == "cage" and item.quantity is None
+        if self.scenery[k] or (caged and k in self.prevented):
             return "background"
         if item.quantity is not None:
             return (

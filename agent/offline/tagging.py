@@ -37,29 +37,22 @@ TOKEN = re.compile(r"\d+(?:[.,]\d+)*|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[^\w\s]|_"
 SENTENCE_ENDS = frozenset(".!?;\n")
 ENDINGS = ("ing", "ed", "es", "s", "e")
 PURPOSES = ("so that", "because", "in order", "so we", "so it", "so they", "so nobody", "so no")
-NO_THING = (
-    "with ",
-    "without ",
-    "nearer ",
-    "closer ",
-    "in ",
-    "at ",
-    "on ",
-    "by ",
-    "and ",
-    "it ",
-    "them ",
-)
+NO_THING = ("with ", "without ", "nearer ", "closer ", "it ", "them ")
 """Begin what is no part of a phrase for a thing, and what is none."""
 ONLY_SIDE = re.compile(
     "(?:(?:the|its) )?(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?(?: side| end| edge)?"
 )
 """Where at a thing, not which thing."""
 OWNED_SIDE = re.compile(
-    "'s ((?:left|right|top|bottom|upper|lower)(?: - hand| hand)? (?:side|edge))$"
+    "'s ((?:left|right|top|bottom|upper|lower)(?: - hand)? (?:side|edge)|corners)$"
 )
 TURNED = frozenset(("facing", "faces", "nearest"))
 """Say which side of a thing is meant: "the side of the shed facing the road"."""
+LEADING = frozenset(
+    ("in", "at", "on", "by", "and", "between", "around", "round", "inside", "over", "across")
+    + ("beside", "along", "near", "under", "above", "below", "of", "to")
+)
+"""Stand before a phrase for a thing."""
 DETERMINERS = frozenset(("the", "that", "this", "those", "these", "my", "our", "your"))
 AVOIDED_BY = frozenset(("from", "of", "off", "on", "onto", "into", "near", "touching", "avoid"))
 AVOIDING = frozenset(("keep", "keeping", "stay", "staying", "clear", "away", "avoid", "touching"))
@@ -113,27 +106,12 @@ def tag(words: Sequence[Token], may_command: Sequence[bool] = ()) -> Tagging:
 
 
 def _trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
-    """The labels, with phrases for things from a determiner on to a purpose or further number."""
+    """The labels, without what is no phrase for a thing, or no part of one."""
     found = list(labels)
     for start, end in _runs(found, "thing"):
-        phrase = " ".join(words[start:end])
-        for k in range(start + 1, end):
-            if " ".join(words[k : k + 2]).startswith(PURPOSES):
-                found[k:end] = ["background"] * (end - k)
-                break
-        owned = OWNED_SIDE.search(phrase)
-        if owned is not None:
-            tail = len(owned[1].split())
-            found[end - tail : end] = ["demand"] * tail
-        if words[start - 1 : start] == ["of"] and words[start - 2] in ("side", "edge", "end"):
-            turned = next((k for k in range(start + 1, end) if words[k] in TURNED), end)
-            last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
-            first = turned - (words[turned - 1] in ("that", "which"))
-            found[first : min(last, end)] = ["demand"] * (min(last, end) - first)
-        if phrase.startswith(NO_THING) or ONLY_SIDE.fullmatch(phrase):
-            found[start:end] = ["demand"] * (end - start)
-        elif end - start > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
-            found[end - 2 : end] = ["command"] * 2
+        while start < end - 1 and words[start] in LEADING:
+            found[start], start = "command", start + 1
+        found[start:end] = _thing_labels(words, start, end)
     for start, end in _runs(found, "demand"):
         for k in range(max(start, 4), end):
             lead = words[k - 4 : k]
@@ -142,6 +120,29 @@ def _trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
                 stop = next((n for n in range(k, end) if not words[n][0].isalnum()), end)
                 found[k:stop] = ["thing"] * (stop - k)
     return tuple(found)
+
+
+def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
+    """What the words of a phrase for a thing are, up to a purpose or a further number."""
+    phrase, count = " ".join(words[start:end]), end - start
+    if phrase.startswith(NO_THING) or ONLY_SIDE.fullmatch(phrase):
+        return ["demand"] * count
+    found = ["thing"] * count
+    if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
+        found[-2:] = ["command"] * 2
+    owned = OWNED_SIDE.search(phrase)
+    if owned is not None:
+        tail = len(owned[1].split())
+        found[-tail:] = ["command" if owned[1] == "corners" else "demand"] * tail
+    if words[start - 1 : start] == ["of"] and words[start - 2] in ("side", "edge", "end"):
+        turned = next((k for k in range(start + 1, end) if words[k] in TURNED), end)
+        last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
+        for k in range(turned - (words[turned - 1] in ("that", "which")), min(last, end)):
+            found[k - start] = "demand"
+    purpose = next(
+        (k for k in range(1, count) if " ".join(words[start + k : end]).startswith(PURPOSES)), count
+    )
+    return found[:purpose] + ["background"] * (count - purpose)
 
 
 def _runs(labels: Sequence[str], label: str) -> list[tuple[int, int]]:
