@@ -22,8 +22,7 @@ SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
 """What a reason or purpose begins with."""
 OPENS_THING = frozenset(
-    ("the", "a", "an", "that", "this", "these", "those", "my", "our", "your", "its", "his", "her")
-    + ("what", "whatever", "where", "wherever", "which", "who", "whose", "not", "one", "two", "it")
+    ["the", "a", "an", "that", "this", "these", "those", "my", "our", "your", "its", "his", "her", "what", "whatever", "where", "wherever", "which", "who", "whose", "not", "one", "two", "it"]
 )
 """A further phrase for a thing begins with one of these."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))

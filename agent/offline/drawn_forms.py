@@ -16,7 +16,8 @@ MAKE = (
 )
 STAND = (
     r"(?P<kept>^\s*|[,.;:]\s*|\b(?:robots?|bots?|drones?|rovers?|agents?|units?|stand|arranged?|them"
-    r"|line up|placed?|up|be|it|this|that|around)\s+)(?:in|into|as|be|like)\s+(?:the (?:shape|form) of\s+)?"
+    r"|line up|placed?|up|be|it|this|that|around)\s+)(?:in|into|as|be|like)\s+"
+    r"(?:the (?:shape|form) of\s+)?"
 )
 SIZES = r"(?:(?:big|large|giant|huge|small|little|neat|proper|capital|block) )?"
 CARDINALS = "|".join((*SMALL, *TENS))

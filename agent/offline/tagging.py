@@ -19,7 +19,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from ...tools.formation.number_words import numbers_in
+from .spans import trimmed
 
 LABELS = ("command", "thing", "demand", "background")
 DEMAND, SURE_DEMAND = LABELS.index("demand"), 0.5
@@ -36,27 +36,6 @@ TAG_BUCKETS, MEANING_BUCKETS = 1 << 16, 1 << 15
 TOKEN = re.compile(r"\d+(?:[.,]\d+)*|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[^\w\s]|_")
 SENTENCE_ENDS = frozenset(".!?;\n")
 ENDINGS = ("ing", "ed", "es", "s", "e")
-PURPOSES = ("so that", "because", "in order", "so we", "so it", "so they", "so nobody", "so no")
-NO_THING = ("with ", "without ", "nearer ", "closer ", "it ", "them ")
-"""Begin what is no part of a phrase for a thing, and what is none."""
-ONLY_SIDE = re.compile(
-    "(?:(?:the|its) )?(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?(?: side| end| edge)?"
-)
-"""Where at a thing, not which thing."""
-OWNED_SIDE = re.compile(
-    "'s ((?:left|right|top|bottom|upper|lower)(?: - hand)? (?:side|edge)|corners)$"
-)
-TURNED = frozenset(("facing", "faces", "nearest"))
-"""Say which side of a thing is meant: "the side of the shed facing the road"."""
-LEADING = frozenset(
-    ("in", "at", "on", "by", "and", "between", "around", "round", "inside", "over", "across")
-    + ("beside", "along", "near", "under", "above", "below", "of", "to")
-)
-"""Stand before a phrase for a thing."""
-DETERMINERS = frozenset(("the", "that", "this", "those", "these", "my", "our", "your"))
-AVOIDED_BY = frozenset(("from", "of", "off", "on", "onto", "into", "near", "touching", "avoid"))
-AVOIDING = frozenset(("keep", "keeping", "stay", "staying", "clear", "away", "avoid", "touching"))
-"""What stands after a word of the second and close behind one of the third is a thing."""
 LONGEST = 4
 """Words of the longest phrase of classes.yaml that is looked for."""
 Floats = NDArray[np.float64]
@@ -101,54 +80,8 @@ def tag(words: Sequence[Token], may_command: Sequence[bool] = ()) -> Tagging:
     """
     model, texts = in_use(), [w.text for w in words]
     labels, certainty = model.labels(texts, may_command)
-    labels = _trimmed(texts, labels)
+    labels = trimmed(texts, labels)
     return Tagging(labels, certainty, model.meaning(texts, labels))
-
-
-def _trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
-    """The labels, without what is no phrase for a thing, or no part of one."""
-    found = list(labels)
-    for start, end in _runs(found, "thing"):
-        while start < end - 1 and words[start] in LEADING:
-            found[start], start = "command", start + 1
-        found[start:end] = _thing_labels(words, start, end)
-    for start, end in _runs(found, "demand"):
-        for k in range(max(start, 4), end):
-            lead = words[k - 4 : k]
-            avoids = AVOIDING & {*lead} and not numbers_in(" ".join(lead))
-            if words[k] in DETERMINERS and lead[-1] in AVOIDED_BY and avoids:
-                stop = next((n for n in range(k, end) if not words[n][0].isalnum()), end)
-                found[k:stop] = ["thing"] * (stop - k)
-    return tuple(found)
-
-
-def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
-    """What the words of a phrase for a thing are, up to a purpose or a further number."""
-    phrase, count = " ".join(words[start:end]), end - start
-    if phrase.startswith(NO_THING) or ONLY_SIDE.fullmatch(phrase):
-        return ["demand"] * count
-    found = ["thing"] * count
-    if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
-        found[-2:] = ["command"] * 2
-    owned = OWNED_SIDE.search(phrase)
-    if owned is not None:
-        tail = len(owned[1].split())
-        found[-tail:] = ["command" if owned[1] == "corners" else "demand"] * tail
-    if words[start - 1 : start] == ["of"] and words[start - 2] in ("side", "edge", "end"):
-        turned = next((k for k in range(start + 1, end) if words[k] in TURNED), end)
-        last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
-        for k in range(turned - (words[turned - 1] in ("that", "which")), min(last, end)):
-            found[k - start] = "demand"
-    purpose = next(
-        (k for k in range(1, count) if " ".join(words[start + k : end]).startswith(PURPOSES)), count
-    )
-    return found[:purpose] + ["background"] * (count - purpose)
-
-
-def _runs(labels: Sequence[str], label: str) -> list[tuple[int, int]]:
-    """Where words of a label stand together: first, past-the-last."""
-    bounds = [i for i in range(len(labels) + 1) if labels[i - 1 : i] != labels[i : i + 1] or i == 0]
-    return [(a, b) for a, b in pairwise(bounds) if labels[a] == label]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 
-
 @pytest.mark.parametrize(
     ("text", "kind", "value"),
     [

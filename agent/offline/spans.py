@@ -1,0 +1,88 @@
+"""Where phrases for things begin and end, by rules over the trained labels.
+
+The model labels word after word; a purpose, a side or a preposition that it takes into a phrase
+for a thing would be lost there, because such a phrase only says which thing is meant.
+"""
+
+import re
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+from itertools import pairwise
+
+import yaml
+
+from ...tools.formation.number_words import numbers_in
+
+SIDE = "(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?"
+ONLY_SIDE = re.compile(f"(?:(?:the|its) )?{SIDE}(?: side| end| edge)?")
+"""Where at a thing, not which thing."""
+OWNED_SIDE = re.compile(f"'s ({SIDE} (?:side|edge)|corners)$")
+
+
+def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
+    """The labels, without what is no phrase for a thing, or no part of one."""
+    found = list(labels)
+    for start, end in _runs(found, "thing"):
+        while start < end - 1 and words[start] in _table()["leading"]:
+            found[start], start = "command", start + 1
+        found[start:end] = _thing_labels(words, start, end)
+    for start, end in _runs(found, "demand"):
+        for k in range(max(start, 4), end):
+            lead = words[k - 4 : k]
+            avoids = {*_table()["avoiding"]} & {*lead} and not numbers_in(" ".join(lead))
+            sided = lead[-1] == "of" and lead[-2] in _table()["sides"]
+            if (
+                words[k] in _table()["determiners"]
+                and lead[-1] in _table()["avoided_by"]
+                and (avoids or sided)
+            ):
+                stop = next((n for n in range(k, end) if _ends_thing(words[n])), end)
+                if not {*_table()["picture"]} & {*words[k:stop]}:
+                    found[k:stop] = ["thing"] * (stop - k)
+    return tuple(found)
+
+
+def _ends_thing(word: str) -> bool:
+    """Whether a word or sign ends the words for a thing that stands in a demand."""
+    return not word[0].isalnum() or word in (*_table()["turned"], "that", "which", "and", "but")
+
+
+def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
+    """What the words of a phrase for a thing are, up to a purpose or a further number."""
+    phrase, count = " ".join(words[start:end]), end - start
+    if phrase.startswith(tuple(_table()["no_thing"])) or ONLY_SIDE.fullmatch(phrase):
+        return ["demand"] * count
+    found = ["thing"] * count
+    if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
+        found[-2:] = ["command"] * 2
+    owned = OWNED_SIDE.search(phrase)
+    if owned is not None:
+        tail = len(owned[1].split())
+        found[-tail:] = ["command" if owned[1] == "corners" else "demand"] * tail
+    if words[start - 1 : start] == ["of"] and words[start - 2] in _table()["sides"]:
+        turned = next((k for k in range(start + 1, end) if words[k] in _table()["turned"]), end)
+        last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
+        for k in range(turned - (words[turned - 1] in ("that", "which")), min(last, end)):
+            found[k - start] = "demand"
+    purpose = next(
+        (
+            k
+            for k in range(1, count)
+            if " ".join(words[start + k : end]).startswith(tuple(_table()["purposes"]))
+        ),
+        count,
+    )
+    return found[:purpose] + ["background"] * (count - purpose)
+
+
+def _runs(labels: Sequence[str], label: str) -> list[tuple[int, int]]:
+    """Where words of a label stand together: first, past-the-last."""
+    bounds = [i for i in range(len(labels) + 1) if labels[i - 1 : i] != labels[i : i + 1] or i == 0]
+    return [(a, b) for a, b in pairwise(bounds) if labels[a] == label]
+
+
+@cache
+def _table() -> dict[str, list[str]]:
+    text = resources.files(__package__ or "").joinpath("spans.yaml").read_text("utf-8")
+    return yaml.safe_load(text)
