@@ -13,6 +13,7 @@ from .drawn_forms import form_in
 from .languages import foreign_language
 from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
 from .reading import Reading
+from .spans import may_open
 from .tagging import Tagging, Token, in_use, tag, tokens, word_classes
 
 SURE_BACKGROUND, SURE_ALONE, SURE_NUMBER = 0.5, 0.8, 0.8
@@ -21,10 +22,6 @@ SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 """Share of a sentence's words that are no command from which on all of it is background."""
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
 """What a reason or purpose begins with."""
-OPENS_THING = frozenset(
-    ["the", "a", "an", "that", "this", "these", "those", "my", "our", "your", "its", "his", "her", "what", "whatever", "where", "wherever", "which", "who", "whose", "not", "one", "two", "it"]
-)
-"""A further phrase for a thing begins with one of these."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
 """What these can do for a demand that is carried out demands nothing more."""
 STATING = frozenset(
@@ -225,7 +222,7 @@ class _Reader:
                 first = phrase.lower().split()[0]
                 if k in self.prevented and self.reading.relation == "cage":
                     self.taken[k] = False
-                elif says_more(phrase) or (self.reading.things and first not in OPENS_THING):
+                elif says_more(phrase) or (self.reading.things and not may_open(first)):
                     self.reading.unread.append(phrase)
                 else:
                     self.reading.things.append(phrase)

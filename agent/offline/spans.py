@@ -43,6 +43,11 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
+def may_open(word: str) -> bool:
+    """Whether a further phrase for a thing may begin with a word."""
+    return word in _table()["opening"]
+
+
 def _ends_thing(word: str) -> bool:
     """Whether a word or sign ends the words for a thing that stands in a demand."""
     return not word[0].isalnum() or word in (*_table()["turned"], "that", "which", "and", "but")
