@@ -24,7 +24,7 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     """The labels, without what is no phrase for a thing, or no part of one."""
     found = list(labels)
     for start, end in _runs(found, "thing"):
-        while start < end - 1 and words[start] in _table()["leading"]:
+        while start < end - 1 and (words[start] in _table()["leading"] or _is_verb(words, start)):
             found[start], start = "command", start + 1
         found[start:end] = _thing_labels(words, start, end)
     for start, end in _runs(found, "demand"):
@@ -41,6 +41,11 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
                 if not {*_table()["picture"]} & {*words[k:stop]}:
                     found[k:stop] = ["thing"] * (stop - k)
     return tuple(found)
+
+
+def _is_verb(words: Sequence[str], at: int) -> bool:
+    """Whether a word before a determiner is no noun: "circle the" at the very beginning."""
+    return at == 0 and not may_open(words[0]) and may_open(words[1])
 
 
 def may_open(word: str) -> bool:
