@@ -22,6 +22,8 @@ SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 """Share of a sentence's words that are no command from which on all of it is background."""
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
 """What a reason or purpose begins with."""
+LONGEST_CALL = 3
+"""Words of an exclamation that only calls somebody: "Ball boys!"."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
 """What these can do for a demand that is carried out demands nothing more."""
 STATING = frozenset(
@@ -149,7 +151,8 @@ class _Reader:
             says = {*CLASSES_OF.get(self.reading.relation, ()), "place", "robot"} - VAGUE
             weighty = any(i.symbol in WEIGHTY for i in sentence)
             share = WEIGHTY_SCENIC if weighty else SCENIC
-            states = any(i.symbol in STATING for i in sentence)
+            calls = sentence[-1].symbol == "!" and len(words) <= LONGEST_CALL
+            states = calls or any(i.symbol in STATING for i in sentence)
             if states and not weighty and not any(self.classes[k] & says for k in place):
                 share = 0.0
             if goes_on:

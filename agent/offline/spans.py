@@ -17,6 +17,10 @@ from ...tools.formation.number_words import numbers_in
 SIDE = "(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?"
 ONLY_SIDE = re.compile(f"(?:(?:the|its) )?{SIDE}(?: side| end| edge)?")
 """Where at a thing, not which thing."""
+SIDE_OF = re.compile(
+    f"(?:the |its )?{SIDE}(?: side| edge| end| flank)? of "
+    r"(?=it|this|that|the (?!two|three|four|\w+s\b))"
+)
 OWNED_SIDE = re.compile(f"'s ({SIDE} (?:side|edge)|corners)$")
 
 
@@ -66,6 +70,9 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
     found = ["thing"] * count
     if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
         found[-2:] = ["command"] * 2
+    side = SIDE_OF.match(phrase)
+    if side is not None:
+        found[: len(side[0].split())] = ["demand"] * len(side[0].split())
     owned = OWNED_SIDE.search(phrase)
     if owned is not None:
         tail = len(owned[1].split())
@@ -75,15 +82,12 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
         last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
         for k in range(turned - (words[turned - 1] in ("that", "which")), min(last, end)):
             found[k - start] = "demand"
-    purpose = next(
-        (
-            k
-            for k in range(1, count)
-            if " ".join(words[start + k : end]).startswith(tuple(_table()["purposes"]))
-        ),
-        count,
-    )
-    return found[:purpose] + ["background"] * (count - purpose)
+    for k in range(1, count):
+        rest = " ".join(words[start + k : end])
+        for label in ("background", "demand"):
+            if rest.startswith(tuple(_table()[f"begin_{label}"])):
+                return found[:k] + [label] * (count - k)
+    return found
 
 
 def _runs(labels: Sequence[str], label: str) -> list[tuple[int, int]]:
