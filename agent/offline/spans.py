@@ -28,21 +28,21 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     """The labels, without what is no phrase for a thing, or no part of one."""
     found = list(labels)
     for start, end in _runs(found, "thing"):
-        while start < end - 1 and (words[start] in _table()["leading"] or _is_verb(words, start)):
+        while start < end - 1 and (words[start] in _lists()["leading"] or _is_verb(words, start)):
             found[start], start = "command", start + 1
         found[start:end] = _thing_labels(words, start, end)
     for start, end in _runs(found, "demand"):
         for k in range(max(start, 4), end):
             lead = words[k - 4 : k]
-            avoids = {*_table()["avoiding"]} & {*lead} and not numbers_in(" ".join(lead))
-            sided = lead[-1] == "of" and lead[-2] in _table()["sides"]
+            avoids = {*_lists()["avoiding"]} & {*lead} and not numbers_in(" ".join(lead))
+            sided = lead[-1] == "of" and lead[-2] in _lists()["sides"]
             if (
-                words[k] in _table()["determiners"]
-                and lead[-1] in _table()["avoided_by"]
+                words[k] in _lists()["determiners"]
+                and lead[-1] in _lists()["avoided_by"]
                 and (avoids or sided)
             ):
                 stop = next((n for n in range(k, end) if _ends_thing(words[n])), end)
-                if not {*_table()["picture"]} & {*words[k:stop]}:
+                if not {*_lists()["picture"]} & {*words[k:stop]}:
                     found[k:stop] = ["thing"] * (stop - k)
     return tuple(found)
 
@@ -54,18 +54,18 @@ def _is_verb(words: Sequence[str], at: int) -> bool:
 
 def may_open(word: str) -> bool:
     """Whether a further phrase for a thing may begin with a word."""
-    return word in _table()["opening"]
+    return word in _lists()["opening"]
 
 
 def _ends_thing(word: str) -> bool:
     """Whether a word or sign ends the words for a thing that stands in a demand."""
-    return not word[0].isalnum() or word in (*_table()["turned"], "that", "which", "and", "but")
+    return not word[0].isalnum() or word in (*_lists()["turned"], "that", "which", "and", "but")
 
 
 def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
     """What the words of a phrase for a thing are, up to a purpose or a further number."""
     phrase, count = " ".join(words[start:end]), end - start
-    if phrase.startswith(tuple(_table()["no_thing"])) or ONLY_SIDE.fullmatch(phrase):
+    if phrase.startswith(tuple(_lists()["no_thing"])) or ONLY_SIDE.fullmatch(phrase):
         return ["demand"] * count
     found = ["thing"] * count
     if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
@@ -77,15 +77,15 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
     if owned is not None:
         tail = len(owned[1].split())
         found[-tail:] = ["command" if owned[1] == "corners" else "demand"] * tail
-    if words[start - 1 : start] == ["of"] and words[start - 2] in _table()["sides"]:
-        turned = next((k for k in range(start + 1, end) if words[k] in _table()["turned"]), end)
+    if words[start - 1 : start] == ["of"] and words[start - 2] in _lists()["sides"]:
+        turned = next((k for k in range(start + 1, end) if words[k] in _lists()["turned"]), end)
         last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
         for k in range(turned - (words[turned - 1] in ("that", "which")), min(last, end)):
             found[k - start] = "demand"
     for k in range(1, count):
         rest = " ".join(words[start + k : end])
         for label in ("background", "demand"):
-            if rest.startswith(tuple(_table()[f"begin_{label}"])):
+            if rest.startswith(tuple(_lists()[f"begin_{label}"])):
                 return found[:k] + [label] * (count - k)
     return found
 
@@ -97,6 +97,6 @@ def _runs(labels: Sequence[str], label: str) -> list[tuple[int, int]]:
 
 
 @cache
-def _table() -> dict[str, list[str]]:
+def _lists() -> dict[str, list[str]]:
     text = resources.files(__package__ or "").joinpath("spans.yaml").read_text("utf-8")
     return yaml.safe_load(text)
