@@ -86,6 +86,7 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
         rest = " ".join(words[start + k : end])
         for label in ("background", "demand"):
             if rest.startswith(tuple(_lists()[f"begin_{label}"])):
+                k -= not words[start + k - 1][0].isalnum()
                 return found[:k] + [label] * (count - k)
     return found
 

@@ -162,3 +162,15 @@ def test_a_bare_number_is_a_length_only_in_a_picture_without_a_scale() -> None:
     question = asked(words)
     assert question is not None
     assert "45" in question
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Surround the coin with 8 robots, the first further out than the others",
+        "Form a heart around it with 20 robots",
+        "Surround the lid with 8 robots, nearer at the left than at the right",
+    ],
+)
+def test_no_phrase_for_a_thing_takes_up_another_demand(words: str) -> None:
+    assert asked(words) is not None
