@@ -12,7 +12,7 @@ from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
-from .choosing import Step, agrees, calls_in, find, located_reasons, prompts_of
+from .choosing import Found, Step, agrees, calls_in, find, located_reasons, prompts_of
 from .conversing import conversed
 from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, would_do
@@ -82,17 +82,9 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     ids, others = _target_ids(task)[:needed], _target_ids(task)[needed:]
     prompts = [p for p in shown if p["id"] not in task.targets]
     named = [] if others else [*reading.others, *([reading.faced] if reading.faced else [])]
-    found = [] if ids else find(_things(task, reading), needed, history)
+    found = _found(task, reading, named, history, pointed=bool(ids))
     if isinstance(found, Step):
         return _call(found.name, found.arguments)
-    for phrase in named:
-        other = find(described([phrase]), 1, history)
-        if isinstance(other, Step) and ids and not other.arguments:
-            question = f'Which thing is "{phrase}"? Mark it with --keep-out.'
-            return _call("ask_user", {"question": question})
-        if isinstance(other, Step):
-            return _call(other.name, other.arguments)
-        found += other
     if found:
         looked_for = prompts_of([(f.candidate, _label(f.wording)) for f in found], before, ids)
         prompts = [*prompts, *looked_for]
@@ -101,6 +93,24 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if _was_doubted(history):
         contract["reading"] = READING
     return _call("propose_formation", {"contract": contract, "targets": prompts})
+
+
+def _found(
+    task: Task, reading: Reading, named: list[str], history: History, *, pointed: bool
+) -> list[Found] | Step:
+    """The things that words are for, those that are only named last, or what to do first."""
+    found = [] if pointed else find(_things(task, reading), things_needed(reading), history)
+    if isinstance(found, Step):
+        return found
+    for phrase in named:
+        other = find(described([phrase]), 1, history)
+        if isinstance(other, Step) and pointed and not other.arguments:
+            question = f'Which thing is "{phrase}"? Mark it with --keep-out.'
+            return Step("ask_user", {"question": question})
+        if isinstance(other, Step):
+            return other
+        found += other
+    return found
 
 
 def _in_unit(task: Task, contract: dict[str, Any]) -> dict[str, Any]:
