@@ -171,13 +171,14 @@ def _closed(
     query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
 ) -> str:
     told: list[str] = []
-    for group in data["groups"]:
+    for group, opened in zip(data["groups"], query["opened"], strict=True):
         if "closed" not in group:
             continue
+        group = group | {"closed": group["closed"] and not opened}
         width = length_text(group["widest_opening_px"], scale)
         widest = f"the widest opening, between robots {listed(group['between'])}, is {width}"
         needed = f"; {group['robots_to_close']} evenly spaced robots would close it"
-        needed = "" if group["closed"] else needed
+        needed = "" if group["closed"] or opened else needed
         told.append(f"{'Yes, closed' if group['closed'] else 'No, not closed'}: {widest}{needed}.")
     return " ".join(told) or "They stand in no ring, so nothing is closed."
 

@@ -78,7 +78,15 @@ class Line:
         found = [resolved(c, self.words, standing) for c in chunks_of(self.words, standing)]
         while len(found) > 1 and ("correction" in found[-1].kinds or is_empty(found[-1])):
             found.pop()  # "the lower one, i mean"
+        if any({"stay", "except"} & set(c.kinds) for c in found) and not self._leaving(found):
+            found = [_as_team(c) if "rest" in c.kinds else c for c in found]
         self.chunks = self._without_excepted(self._without_lead(found))
+
+    def _leaving(self, chunks: Sequence[Chunk]) -> bool:
+        """Whether robots leave, or the others are said to stay."""
+        at = [k for k, c in enumerate(chunks) if "rest" in c.kinds]
+        stays = any("stay" in c.kinds for k in at for c in chunks[k + 1 : k + 3])
+        return stays or any({"leave", "remove"} & set(c.kinds) for c in chunks)
 
     @property
     def denies(self) -> bool:
@@ -191,7 +199,11 @@ class Line:
         clauses = last.clauses(last.chunks)
         after = [c for c in self.chunks if "too" not in c.kinds and not is_empty(c)]
         robots_alone = all({"robots", "stay"} & set(c.kinds) for c in after)
-        if not clauses or not after or (not self.denies and not robots_alone):
+        if not after or (not self.denies and not robots_alone):
+            return None
+        if robots_alone and not self.denies:
+            return self._for_robots(after) or self._substituted(clauses or [], after)
+        if not clauses:
             return None
         found = self._substituted(clauses, after)
         kinds = {e["kind"] for c in found or () for e in c.effects}
@@ -200,6 +212,18 @@ class Line:
             effects = followup_turns.corrected([dict(e) for e in self.standing.edits], edits)
             return [replace(found[0], effects=tuple(effects), frame="corrected")]
         return found
+
+    def _for_robots(self, after: Sequence[Chunk]) -> list[Clause] | None:
+        """The last edit for other robots: "and robot 3 too"."""
+        robots = [r for c in after for r in c.kinds.get("robots", ())]
+        last = dict(self.standing.edits[-1]) if len(self.standing.edits) == 1 else {"kind": ""}
+        if not robots or any("stay" in c.kinds for c in after):
+            return None
+        if last["kind"] == "place" and "to" not in last:
+            return [Clause((), "again", tuple(last | {"robot": r} for r in robots))]
+        if last.get("robots") and last["kind"] in ("remove", "skip", "target"):
+            return [Clause((), "again", (last | {"robots": robots},))]
+        return None
 
     def _substituted(
         self, clauses: Sequence[Clause], after: Sequence[Chunk]
@@ -211,6 +235,11 @@ class Line:
             if clause is not None and clause.frame == clauses[at].frame:
                 return [*clauses[:at], clause, *clauses[at + 1 :]]
         return None
+
+
+def _as_team(chunk: Chunk) -> Chunk:
+    """A phrase for the others as one for all that are not said to stay."""
+    return replace(chunk, kinds={"team": ""})
 
 
 def is_empty(chunk: Chunk) -> bool:

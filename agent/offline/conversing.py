@@ -5,6 +5,7 @@ instruction is left to the planner.
 """
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -136,22 +137,25 @@ class _Steps:
         return self._change(standing)
 
     def _query(self, standing: Standing) -> Reply:
-        query: dict[str, Any] = self.followup.query or {}
-        measured = self.done.get("measure")
-        if measured is not None:
-            text = (
-                measured.text
-                if measured.error
-                else said_of_query(query, json.loads(measured.text), self.task.metres_per_pixel)
-            )
-            return Reply(text=text)
-        robots, thing = query.get("robots", []), query.get("thing", "")
+        """Measure what is asked, then say it."""
+        query: dict[str, Any] = dict(self.followup.query or {})
+        measured, scale = self.done.get("measure"), self.task.metres_per_pixel
+        robots, thing = query.get("robots", []), str(query.get("thing", ""))
         unnamed = all(label.startswith(UNNAMED) for _, label in standing.things)
-        if str(thing).startswith("?") and unnamed and len(standing.things) == 1:
+        if thing.startswith("?") and unnamed and len(standing.things) == 1:
             thing = standing.things[0][0]
-        if str(thing).startswith("?"):
+        if thing.startswith("?"):
             return Reply(text=f'"{thing[1:]}" is not measured yet: point at it, and ask again.')
-        if thing or len(robots) == 2:
+        if measured is not None and measured.error:
+            return Reply(text=measured.text)
+        if measured is not None:
+            data = json.loads(measured.text)
+            if query["about"] == "nearest" and thing and thing not in standing.targets:
+                data = _seen_from((standing.centre or {}).get(thing, (0.0, 0.0)), thing, data)
+            opened = [g.get("opening") is not None or bool(g.get("sides")) for g in standing.groups]
+            return Reply(text=said_of_query(query | {"opened": opened}, data, scale))
+        two = len(robots) == 2 and "each" not in query
+        if (thing or two) and query["about"] != "nearest":
             ends = [*(f"r{r}" for r in robots), *([thing] if thing else [])]
             ends = ends if len(ends) > 1 else [standing.targets[0], *ends]
             return _calling("measure", {"a": ends[0], "b": ends[1]})
@@ -163,7 +167,12 @@ class _Steps:
         ids: dict[str, str] = {}
         prompts: list[dict[str, Any]] = []
         for phrase in followup.things:
-            found = _found(phrase, standing, self.messages)
+            found = _known(phrase, standing, self.messages) or _found(
+                phrase, standing, self.messages
+            )
+            if isinstance(found, str):
+                ids[f"?{phrase}"] = found
+                continue
             if isinstance(found, Step):
                 return _calling(found.name, found.arguments)
             known = [name for name, _ in standing.things]
@@ -270,6 +279,27 @@ class _Steps:
         return Reply(text=f"{told} {text}".strip())
 
 
+def _known(phrase: str, standing: Standing, messages: History) -> str | Step | None:
+    """The one known thing, none of the plan's, that fits words; what to do first, or None."""
+    others = {t: at for t, at in (standing.centre or {}).items() if t in standing.others()}
+    things = described([phrase])
+    if not others or len(things) != 1 or phrase.startswith(("other ", OTHER[1:])):
+        return None
+    return one_at(things[0].whole_query, others, messages)
+
+
+def one_at(
+    query: dict[str, Any], centres: Mapping[str, Sequence[float]], messages: History
+) -> str | Step | None:
+    """The one of some known things that fits a query, what to do first, or None."""
+    reply = located(query or None, messages)
+    if reply is None:
+        return Step("locate_object", {"query": query} if query else {})
+    ids = (measured_at(c["id"], centres, messages) for c in reply["candidates"])
+    fitting = list(dict.fromkeys(i for i in ids if i is not None))
+    return fitting[0] if len(fitting) == 1 else None
+
+
 def _found(phrase: str, standing: Standing, messages: History) -> Found | Step:
     """The candidate that words for a thing mean, or what to do to learn it."""
     if re.fullmatch(r"c[0-9]+", phrase):
@@ -311,6 +341,15 @@ def _other(phrase: str, standing: Standing, messages: History) -> Found | Step:
         "ask_user",
         {"question": "Which one is the other one? Answer with its number.", "candidates": ids},
     )
+
+
+def _seen_from(centre: tuple[float, float], thing: str, data: dict[str, Any]) -> dict[str, Any]:
+    """What was measured of the plan, with distances to the centre of another thing."""
+    rows = [
+        row | {"target": thing, "target_px": round(math.dist(row["place"], centre), 1)}
+        for row in data["each"]
+    ]
+    return data | {"each": rows}
 
 
 def measured_at(

@@ -196,6 +196,7 @@ def _of_kind(edits: list[Effect], *kinds: str) -> Effect | None:
 def mirror(slots: Slots, said: Said) -> Effects:
     """Left for right, unless said otherwise."""
     across = {"left": "left-right", "right": "left-right", "up": "top-bottom", "down": "top-bottom"}
+    slots.has("opposite")
     axis = (slots.get("axis") or [across[d] for d in slots.get("dir", ())] or ["left-right"])[0]
     return [{"kind": "mirror", "axis": axis}]
 
@@ -279,7 +280,7 @@ def place(slots: Slots, said: Said) -> Effects:
 
 def heading(slots: Slots, said: Said) -> Effects:
     """Which way robots look."""
-    slots.has("turn")
+    slots.has("turn", "where")
     if "unface" in slots:
         return [{"kind": "heading", "to": None}]
     if "there" in slots or "other" in slots or "thing" in slots:
@@ -321,6 +322,9 @@ def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Eff
     if "there" in slots and standing.pointed:
         return standing.pointed[0]
     others = standing.others()
+    last = [str(e["to"]) for e in said.last if e["kind"] == "target"]
+    if "there" in slots and not others and last and len(standing.groups) > 1:
+        return last[-1]
     if len(others) == 1:
         return others[0]
     if others:

@@ -4,6 +4,7 @@ import re
 
 from ...tools.formation.contract import MAX_ROBOTS
 from .followup_edits import (
+    LEAST_BARE,
     OPPOSITE,
     RINGS,
     SIDE_OF,
@@ -73,6 +74,9 @@ def leave(slots: Slots, said: Said) -> Effects:
 def leave_others(slots: Slots, said: Said) -> Effects:
     """All but those named leave."""
     slots.has("all")
+    words = said.words.lower()
+    if words.find("stay") > max(words.find(w) for w in ("leave", "go", "away", "out")):
+        return None  # "robot 5 leaves, everybody else stays"
     named = {r for robots in slots["robots"] for r in robots}
     others = [int(r) for r in said.standing.robots if int(r) not in named]
     return [{"kind": "remove", "robots": others}] if others else None
@@ -130,6 +134,8 @@ def swap(slots: Slots, said: Said) -> Effects:
     strange = [r for r in robots if str(r) not in said.standing.robots]
     if strange:
         return refuse(f"There is no robot {strange[0]}; there are {listed(said.standing.robots)}.")
+    if len(robots) > 2:
+        return None
     if len(robots) != 2:
         return ask(f"Which two robots swap? Of {listed(said.standing.robots)} two.")
     if robots[0] == robots[1]:
@@ -139,6 +145,7 @@ def swap(slots: Slots, said: Said) -> Effects:
 
 def target(slots: Slots, said: Said) -> Effects:
     """The same around another thing."""
+    slots.has("back")
     to = where(slots, said)
     if isinstance(to, list):
         return to
@@ -186,7 +193,8 @@ def split(slots: Slots, said: Said) -> Effects:
     to = where(slots, said, f"{listed(named) if named else some} of them to {{}}")
     if isinstance(to, list):
         return to
-    if to in said.standing.targets:
+    joins = len(said.standing.groups) > 1 and not slots.has("leavegap")
+    if to in said.standing.targets and not joins:
         return None
     moved: Effect = {"kind": "target", "to": to}
     if some == said.count:
@@ -233,6 +241,25 @@ def merge_to(slots: Slots, said: Said) -> Effects:
         return target(slots, said)
     slots.has("back", "relation")
     return [{"kind": "merge", "to": slots["thing"][0]}]
+
+
+def even_out(slots: Slots, said: Said) -> Effects:
+    """The gaps that were left are shared out."""
+    slots.has("rest")
+    demands = {"relation": said.standing.relation, "spacing": "even"}
+    return [{"kind": "arrange", "demands": demands}]
+
+
+def few_away(slots: Slots, said: Said) -> Effects:
+    """Two away: so few are robots, not pixels."""
+    few = slots["num"][0] < LEAST_BARE
+    return remove_some(slots, said) if few else None
+
+
+def swap_again(slots: Slots, said: Said) -> Effects:
+    """Two more robots, after others were swapped."""
+    swapped = said.last and said.last[-1]["kind"] == "swap"
+    return swap(slots, said) if swapped else None
 
 
 def add_one(slots: Slots, said: Said) -> Effects:
@@ -298,6 +325,8 @@ def gap(slots: Slots, said: Said) -> Effects:
         if isinstance(to, list):
             return to
         opening["towards"] = to
+    if "angle" in slots:
+        opening["towards"] = float(slots["angle"][0])
     facing = [SIDE_OF[d] for d in (*slots.get("dir", ()), *slots.get("side", ())) if d in SIDE_OF]
     if len(set(facing)) > 1 or (facing and "towards" in opening):
         return None
@@ -333,6 +362,9 @@ def wider(slots: Slots, said: Said) -> Effects:
     """Wider alone: the gap, where there is one."""
     if said.standing.groups[0].get("opening") is not None:
         return gap(slots, said)
+    if any(e["kind"] == "spacing" for e in said.last):
+        factor = factor_of(slots) ** (1 if slots["wide"][0] == "wider" else -1)
+        return [{"kind": "spacing", "factor": rounded(factor)}]
     if slots["wide"][0] == "wider":
         return ask("What should be wider?", "further out", "further apart")
     return ask("What should be narrower?", "closer", "closer together")
@@ -358,6 +390,11 @@ def arrange(slots: Slots, said: Said) -> Effects:
     """Another arrangement of the same robots."""
     named = list(dict.fromkeys(slots["relation"]))
     named = [r for r in named if r != "around"] or named
+    slots.has("back")
+    if "both" in named:
+        ends = [name for name, _ in said.standing.things]
+        between = {"relation": "between", "targets": ends}
+        return [{"kind": "arrange", "demands": between}] if len(ends) == 2 else None
     if len(named) != 1 or named[0] == "shape":
         return None
     relation = named[0]

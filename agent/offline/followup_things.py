@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from .followup_edits import SIDE_OF, listed
 from .followup_words import Chunk
+from .phrases import table
 from .standing import Standing
 
 POINTING = ("that", "this", "here")
@@ -38,6 +39,11 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
     if re.fullmatch(r"[tc][0-9]+", phrase):
         return phrase if phrase[0] == "t" else f"?{phrase}"
     words = set(re.findall(r"[a-z]+", phrase)) - {"one", "the", "thing", "object", "of", "two"}
+    places = [int(place) - 1 for w, place in table()["ordinals"].items() if w in words]
+    if len(places) == 1 and len(standing.things) > places[0]:  # "the first coin": in their order
+        return standing.things[places[0]][0]
+    if other and len(standing.others()) == 1 and standing.targets:
+        return standing.others()[0]
     sides = [SIDE_OF.get(SIDES.get(word, word), "") for word in words]
     side, rest = max(sides, default=""), {w for w in words if not SIDE_OF.get(SIDES.get(w, w))}
     named = [t for t, label in standing.things if rest <= {*re.findall(r"[a-z]+", label.lower())}]

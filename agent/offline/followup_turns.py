@@ -102,6 +102,11 @@ def again(slots: Slots, said: Said) -> Effects:
     return edits or None
 
 
+def keep(slots: Slots, said: Said) -> Effects:
+    """It stays as it is."""
+    return [{"kind": "talk", "about": "already"}]
+
+
 def steps(slots: Slots, said: Said) -> Effects:
     """How many steps can be taken back."""
     return [{"kind": "talk", "about": "steps"}]
@@ -167,7 +172,7 @@ def _further(last: Effect, way: float | None) -> Effect | None:
 
 def less(slots: Slots, said: Said) -> Effects:
     """Half of the last change taken back, however it is said."""
-    slots.has("much")
+    slots.has("much", "ratio", "back")
     last = next((e for e in reversed(said.last) if e["kind"] in RELATIVE), None)
     halved = None if last is None else _scaled(last, -0.5)
     if halved is None:
@@ -297,6 +302,9 @@ def bare(slots: Slots, said: Said) -> Effects:
         px = f"{slots['px'][0]:g} px"
         moves = (f"{px} further out", f"{px} closer") if slots["px"][0] > 0 else ()
         return ask(f"{px} of what?", f"{px} away from it", *moves)
+    last = said.last[-1] if len(said.last) == 1 else {}
+    if "num" in slots and "px" in last and last["kind"] in ("distance", "spacing", "opening"):
+        return [last | {"px": float(slots["num"][0])}]
     if "num" in slots:
         n = f"{slots['num'][0]:g}"
         return ask(f"{n} of what?", f"make it {n} in all", f"{n} more", f"turn it {n} degrees")
@@ -333,6 +341,8 @@ def asked(slots: Slots, said: Said, about: str) -> Effects:
     query: Effect = {"kind": "query", "about": about}
     if about == "distance" and ("spacing" in slots or "apart" in slots):
         query["about"] = "spacing"
+    if about == "compared":
+        query = {"kind": "query", "about": "distance", "each": True}
     if about == "nearest":
         query["most"] = (slots.get("nearest") or ["nearest"])[0]
     return [

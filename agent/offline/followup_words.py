@@ -17,7 +17,7 @@ from ...tools.formation.number_words import SMALL
 from ...tools.formation.quantities import Quantity, quantities_in
 from .descriptions import Description
 from .lexicon import fillers
-from .phrases import HEADS
+from .phrases import HEADS, table
 from .phrases import phrase as thing_phrase
 from .standing import Standing
 
@@ -231,7 +231,8 @@ class _Reader:
         description = Description(self.plain, start)
         end = description.at
         led = at > 0 and self.plain[at - 1] in (*BEFORE_THINGS, *ARTICLES)
-        if description.thing.noun and not description.thing.plural:
+        strange = any(map(_tells_otherwise, self.plain[start:end]))
+        if description.thing.noun and not description.thing.plural and not strange:
             heads = [w for w in self.plain[start:end] if w in word_set("formation_nouns")]
             if heads and not (at > 0 and self.plain[at - 1] in BEFORE_THINGS):
                 return None
@@ -285,6 +286,13 @@ def _is_headed(words: Sequence[str]) -> bool:
         (found := thing_phrase(words, k)) is not None and found.kind in HEADS
         for k in range(len(words))
     )
+
+
+def _tells_otherwise(word: str) -> bool:
+    """Whether a word says something else here than where or which a thing is."""
+    kinds = {"filler"} if thing_phrase([word], 0) else set(lexicon().get((word,), {"filler": ""}))
+    placing = {"filler", "dir", "side", "towards", "about", "onword", "relation", "it", "there"}
+    return not kinds & placing and word not in table()["determiners"]
 
 
 @cache

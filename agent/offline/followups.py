@@ -182,8 +182,11 @@ def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
     """The clauses without what others make moot: "too much, go back", "never mind, closer"."""
     undone = any(c.frame in ("undo", "first") for c in clauses)
     kept = [c for c in clauses if not (undone and c.frame in ADDING)]
-    waved = [c for c in kept if "mind" in line.words_of(c.chunks).lower().split()]
-    return [c for c in kept if c not in waved] or kept
+    waving = {"mind", "forget"}
+    waved = [c for c in kept if waving & set(line.words_of(c.chunks).lower().split())]
+    lessened = [c for c in kept if c.frame in ("less", "toofar")]
+    moot = [*waved, *lessened[1:]]
+    return [c for c in kept if c not in moot] or kept
 
 
 def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
@@ -192,6 +195,9 @@ def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
     if {"out", "in"} <= {*alone}:
         says = "says both further out and closer. Which?"
         return _asked(line, f'"{line.words}" {says}', ("further out", "closer"))
+    stated = [k for k in ("distance", "count", "sides", "side") if alone.count(k) > 1]
+    if stated:
+        return _asked(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
     if alone.count("target") > 1:
         return _asked(line, f'"{line.words}" names several things. Around which one?')
     return None

@@ -5,6 +5,7 @@ asks when the words do not settle what to do. It is no language model: it sees m
 """
 
 import json
+from dataclasses import replace
 from typing import Any
 
 from ...tools.formation.units import length_text
@@ -61,14 +62,11 @@ def _next_step(turn: History, before: History) -> Reply:
 
 def _begin(task: Task, history: History, before: History) -> Reply:
     """Propose a formation, or find and ask what is missing."""
-    agreed = _agreed(task, history)
-    if agreed is not None:
-        return agreed
-    narrow = narrowed(task, history)
-    if isinstance(narrow, Step):
-        return _call(narrow.name, narrow.arguments)
-    shown, task = task.pointed, narrow
-    reading = read_instruction(_said(task, history), task.metres_per_pixel)
+    chosen = _narrowed(task, history)
+    if isinstance(chosen, Reply):
+        return chosen
+    shown, task = task.pointed, chosen
+    reading = read_instruction(task.instruction, task.metres_per_pixel)
     wording = reading.robots or (reading.form.robots if reading.form else None)
     robots = task.robots or wording or _number_answered(history) or _standing_count(task)
     question = question_of(task, reading, robots)
@@ -80,6 +78,8 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         return _call("ask_user", asked)
     needed = things_needed(reading)
     ids, others = _target_ids(task)[:needed], _target_ids(task)[needed:]
+    if not ids and not reading.things and task.standing:  # "it" is what they stand about
+        ids = list(task.standing["contract"]["groups"][0].get("targets", ()))[:needed]
     prompts = [p for p in shown if p["id"] not in task.targets]
     named = [] if others else [*reading.others, *([reading.faced] if reading.faced else [])]
     found = _found(task, reading, named, history, pointed=bool(ids))
@@ -111,6 +111,15 @@ def _found(
             return other
         found += other
     return found
+
+
+def _narrowed(task: Task, history: History) -> Task | Reply:
+    """The task about what its words choose of what is pointed at, or what comes before that."""
+    agreed = _agreed(task, history)
+    if agreed is not None:
+        return agreed
+    chosen = narrowed(replace(task, instruction=_said(task, history)), history)
+    return _call(chosen.name, chosen.arguments) if isinstance(chosen, Step) else chosen
 
 
 def _in_unit(task: Task, contract: dict[str, Any]) -> dict[str, Any]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..first_message import Task
 from ..messages import History
-from .choosing import Step, find
-from .conversing import measured_at
+from .choosing import Step
+from .conversing import one_at
 from .followup_things import UNNAMED, resolved
 from .followup_words import chunks_of
 from .references import described
@@ -37,10 +37,11 @@ def narrowed(task: Task, history: History) -> Task | Step:
         return task
     chunk, name = named[0]
     if name not in centres:
-        looked = find(described([name.removeprefix("?")]), 1, history)
+        things = described([name.removeprefix("?")])
+        looked = one_at(things[0].whole_query, centres, history) if len(things) == 1 else None
         if isinstance(looked, Step):
-            return looked if looked.name == "locate_object" else task
-        name = measured_at(looked[0].candidate, centres, history) or name
+            return looked
+        name = looked or name
     if name not in centres:
         return task
     text = task.instruction
