@@ -3,7 +3,7 @@
 So the distance that an edit gave stays. Frame: image pixels, x right, y down.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from itertools import islice
 
@@ -19,7 +19,7 @@ from ..placement.caging import escape_proof
 from ..placement.place import Site
 from ..plan import Plan, make_plan
 from .draft import Draft
-from .part import ON_CURVE, Part, taken
+from .part import ON_CURVE, IntArray, Part, taken
 from .respacing import Track
 
 EXACT = frozenset({"rotate", "mirror", "shift", "scale", "swap", "skip", "place", "heading"})
@@ -72,10 +72,10 @@ def _rearranged(plan: Plan, draft: Draft, site: Site) -> Plan:
     return again if again.verdict.certified else plan
 
 
-def _members(draft: Draft) -> list[NDArray[np.intp]]:
+def _members(draft: Draft) -> list[IntArray]:
     """For each group which of all robots are its own."""
     ends = np.cumsum([len(part.points) for part in draft.parts])
-    return np.split(np.arange(ends[-1]), ends[:-1])
+    return np.split(np.arange(len(draft.was)), ends[:-1])
 
 
 class _Slides:
@@ -123,7 +123,7 @@ class _Slides:
                 self._best = plan
                 return
 
-    def _alone(self, line: Track, mine: Sequence[int], i: int) -> Iterator[FloatArray]:
+    def _alone(self, line: Track, mine: IntArray, i: int) -> Iterator[FloatArray]:
         """One robot at other places of its curve, the nearest first."""
         points = self._best.formation.points
         reach = REACH * line.curve.length / len(mine)
@@ -135,9 +135,7 @@ class _Slides:
             if not len(apart) or apart.min() >= self._floor:
                 yield way
 
-    def _together(
-        self, line: Track, mine: Sequence[int], points: FloatArray
-    ) -> Iterator[FloatArray]:
+    def _together(self, line: Track, mine: IntArray, points: FloatArray) -> Iterator[FloatArray]:
         """All robots of a curve slid along it by as much, the fewest on things and least first."""
         ways = [_slid(line, points, s) for s in _shifts(REACH * line.curve.length / len(mine))]
         for own in sorted(ways, key=lambda way: int(self._on(way).sum())):

@@ -17,6 +17,7 @@ from ...geometry.assignment import EXACT, assign
 from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import nearest
 from ..checking.check import certify
+from ..checking.finding import Finding
 from ..contract import Contract, Group, broken_rules, pitch_slack, with_defaults
 from ..placement.group_conflicts import Stand
 from ..placement.place import Site, reference_curve, stand_of
@@ -60,8 +61,8 @@ class Part:
 
     @property
     def centre(self) -> FloatArray:
-        """Of the target; of the robots where there is none, or more than one."""
-        if len(self.group.targets) != 1:
+        """Of the target; of the robots where there is not one, or they are gathered in it."""
+        if len(self.group.targets) != 1 or self.group.relation == "centre":
             return self.points.mean(axis=0)
         outline = self.site.outlines[self.group.targets[0]]
         return shapely.get_coordinates(outline.filled.centroid)[0]
@@ -80,11 +81,16 @@ class Part:
         return apart
 
     @property
-    def certified(self) -> bool:
-        """Whether it alone is what its group demands."""
+    def findings(self) -> tuple[Finding, ...]:
+        """In what it alone is not what its group demands."""
         group = self.group.model_copy(update={"robots": len(self.points)})
         alone = Contract.model_construct(groups=(group,), robot_radius=self.radius)
-        return certify(self.points, alone, self.site).certified
+        return certify(self.points, alone, self.site).findings
+
+    @property
+    def certified(self) -> bool:
+        """Whether it alone is what its group demands."""
+        return not self.findings
 
     def track(self, count: int) -> Track:
         """The curve its robots stand on, and would if there were `count`."""
@@ -189,6 +195,19 @@ def skipped(part: Part, stay: FloatArray) -> Part:
     if part.group.relation == "corners" and not left.certified:  # fewer would be at other corners
         return part.to(stay, relation="at", clearance=None)
     return left
+
+
+def free_targets(group: Group) -> tuple[str, ...]:
+    """The thing that robots of a group stay off when they are at places of their own."""
+    return () if group.enters or len(group.targets) != 1 else group.targets
+
+
+def at_points(part: Part, mine: NDArray[np.bool_]) -> Part:
+    """Those of a group's robots that are chosen, (n,), at points of their own."""
+    group, points = part.group, part.points[mine]
+    demands = {"relation": "at", "targets": free_targets(group), "robots": len(points)}
+    single = part.demanding(demands | {"points": pairs(points), "heading": group.heading})
+    return replace(part, group=single, points=points, was=part.was[mine])
 
 
 def pairs(points: FloatArray) -> tuple[tuple[float, float], ...]:

@@ -16,7 +16,7 @@ from ..contract import DIRECTIONS, ONLY_IN, OUTSIDE, has_default_clearance
 from ..placement.group_conflicts import Stand
 from .draft import Draft
 from .edit_kinds import Arrange, Merge, Target
-from .edit_rules import rigid
+from .moving import rigid
 from .part import IntArray, Part, check_known, closed_up, skipped, slots_for, taken
 
 Leave = Callable[[Part, FloatArray], Part]

@@ -25,8 +25,8 @@ from ..placement.caging import demand_of, escape_proof
 from ..placement.pitch import pitch_offset
 from ..site import Site
 from .edit_forms import DECIMALS
-from .edit_kinds import Closure, Distance, Heading, Opening, Scale, Sides, Spacing
-from .edit_rules import QUARTERS, scaled
+from .edit_kinds import Closure, Distance, Heading, Opening, Sides, Spacing
+from .moving import QUARTERS, scaled
 from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
 from .respacing import moved_out, track, track_at
 
@@ -67,7 +67,7 @@ def _spaced(part: Part, edit: Spacing) -> Part:
     group, count = part.group, len(part.points)
     if count < 2:
         raise ToolError("One robot alone has no neighbours.")
-    if group.relation in ("between", "corners", "at"):
+    if group.relation in ("between", "corners"):
         raise ToolError(
             f"How far apart robots are follows from where they stand: {group.relation}."
         )
@@ -77,7 +77,7 @@ def _spaced(part: Part, edit: Spacing) -> Part:
     if group.relation == "inside":
         return _inside_spaced(part, px, loose)
     if group.relation not in ON_CURVE:
-        larger = scaled(part, Scale(factor=px / now))
+        larger = scaled(part, px / now)
         pitch = px if edit.px and (group.line or group.shape) else None
         return replace(larger, group=larger.valid_group(**loose, pitch=pitch))
     whole = group.relation != "along" and group.sides is None and not group.opens

@@ -8,11 +8,10 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...geometry.outline import FloatArray, distances
 from .draft import Draft
-from .part import Part, pairs, skipped
+from .part import Part, at_points, skipped
 
 STILL = 0.5
 """Px by which a robot that stays may miss its place on a curve, before it is put there."""
@@ -79,19 +78,11 @@ def alone(draft: Draft, robots: Collection[int]) -> Draft:
         if not mine.any() or (mine.all() and (part.group.relation == "at" or draft.held)):
             left.append(part)
             continue
-        singles.append(_at_points(part, mine))
+        singles.append(at_points(part, mine))
         if not mine.all():
             rest = skipped(_unringed(part), part.points[~mine])
             left.append(replace(rest, was=part.was[~mine]))
     return draft.with_parts([*left, *singles])
-
-
-def _at_points(part: Part, mine: NDArray[np.bool_]) -> Part:
-    group, points = part.group, part.points[mine]
-    targets = () if group.enters or len(group.targets) != 1 else group.targets
-    demands = {"relation": "at", "targets": targets, "robots": len(points)}
-    single = part.demanding(demands | {"points": pairs(points), "heading": group.heading})
-    return replace(part, group=single, points=points, was=part.was[mine])
 
 
 def _unringed(part: Part) -> Part:

@@ -30,6 +30,7 @@ from .edit_kinds import (
     Skip,
     Swap,
 )
+from .moving import carried_out
 from .part import ON_CURVE, Part, check_known, closed_up, skipped
 from .regrouping import arranged, left_of, merged, more_of, targeted, without
 from .ring_rules import closed, ringed, robots_to_close
@@ -185,4 +186,5 @@ TEAM_RULES: Mapping[str, Callable[..., Draft]] = {
     "arrange": arranged,
     "place": _placed,
     "keep-out": _kept_off,
+    **dict.fromkeys(("rotate", "mirror", "shift", "scale"), carried_out),
 }

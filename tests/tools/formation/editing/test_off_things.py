@@ -56,7 +56,8 @@ STANDS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("relation", STANDS)
 @pytest.mark.parametrize(
-    "edit", [{"kind": "out", "factor": 1.25}, {"kind": "in", "px": 4}, {"kind": "distance", "px": 30}]
+    "edit",
+    [{"kind": "out", "factor": 1.25}, {"kind": "in", "px": 4}, {"kind": "distance", "px": 30}],
 )
 @pytest.mark.parametrize("robot", [0, 2])
 def test_a_distance_that_an_edit_gives_is_kept_beside_other_things(

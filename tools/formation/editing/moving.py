@@ -1,0 +1,283 @@
+"""Motions of whole groups: turned, mirrored, moved and scaled as said.
+
+Where the arrangement demands what no longer holds then, robots keep their form at places of their
+own and a note says so; lengths that were stated are not given up. Frame: image pixels, y down.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, MultiPoint, Point
+
+from ...geometry.outline import FloatArray, distances
+from ..checking.finding import Finding
+from ..contract import MAX_LENGTH, OUTSIDE, SideName, has_default_clearance
+from ..placement.caging import escape_proof
+from ..placement.figure import figure_of
+from ..placement.ring_parts import opening_way
+from .draft import Draft
+from .edit_forms import DECIMALS, Affine, form_after
+from .edit_kinds import Mirror, Rotate, Scale, Shift
+from .part import ON_CURVE, Part, at_points, free_targets, taken
+from .respacing import respaced, track_at
+
+HELD_TO = {
+    "wrong_side": "on their side of {thing}",
+    "off_sides": "on their side of {thing}",
+    "wrong_edge": "along their edge of {thing}",
+    "off_corner": "at the corners of {thing}",
+    "too_near": "at their distance from {thing}",
+    "too_far": "at their distance from {thing}",
+    "not_inside": "as far from the edge of {thing}",
+    "too_deep": "as near to the edge of {thing}",
+    "outside": "inside {thing}",
+    "uncovered": "spread over {thing}",
+    "uneven": "spread over {thing}",
+    "off_centre": "in the middle of {thing}",
+    "not_enclosed": "a closed ring around {thing}",
+    "opening": "a closed ring around {thing}",
+    "opening_at_border": "a closed ring around {thing}",
+    "narrow_opening": "with their opening to its side",
+    **dict.fromkeys(("gap", "crowded", "bare_end", "bare_stretch"), "evenly along {thing}"),
+    **dict.fromkeys(("off_curve", "crowded_figure", "off_grid", "same_place"), "that form exactly"),
+}
+"""What a group can be free of, by the kind of the finding that says it is."""
+SAME_WIDTH, HALVINGS = 1e-3, 40
+STRAIGHT = 0.5
+"""Robots this near to a line, px, stand on it."""
+QUARTERS: tuple[SideName, ...] = ("left", "top", "right", "bottom")
+"""Clockwise as seen."""
+OPPOSITE: Mapping[str, Mapping[str, SideName]] = {
+    "left-right": {"left": "right", "right": "left"},
+    "top-bottom": {"top": "bottom", "bottom": "top"},
+}
+ROUND = frozenset({"around", "cage", "corners", "inside", "centre"})
+
+
+def carried_out(draft: Draft, edit: Rotate | Mirror | Shift | Scale) -> Draft:
+    """The draft with groups moved as said, by name or as free places."""
+    for k in draft.chosen(edit):
+        old = draft.parts[k]
+        new, gone = _moved(old, edit)
+        draft = draft.with_parts(new if part is old else part for part in draft.parts)
+        if gone:
+            thing = " and ".join(old.group.targets) or "their line"
+            what = " or ".join(dict.fromkeys(HELD_TO[f.kind].format(thing=thing) for f in gone))
+            note = f"The robots keep their form at places of their own, no longer {what}."
+            draft = replace(draft, notes=(*draft.notes, note))
+    return draft
+
+
+def _moved(part: Part, edit: Rotate | Mirror | Shift | Scale) -> tuple[Part, tuple[Finding, ...]]:
+    """A group after a motion, and what it is free of then."""
+    if isinstance(edit, Rotate):
+        there = _rotated(part, edit.degrees)
+    elif isinstance(edit, Scale):
+        there = scaled(part, edit.factor)
+    else:
+        there = _mirrored(part, edit) if isinstance(edit, Mirror) else _shifted(part, edit)
+    findings = there.findings
+    if findings and isinstance(edit, Mirror):
+        there = _on_curve(there, part)
+    elif part.group.relation not in ROUND and any(f.kind == "on_target" for f in findings):
+        there = _beside(there, part) if isinstance(edit, Rotate | Scale) else there
+    findings = there.findings if findings else ()
+    kept = _kept(part) if findings else set[str]()
+    if not findings or any(f.kind in kept or f.kind not in HELD_TO for f in findings):
+        return there, ()
+    return _freed(there), findings
+
+
+def _kept(part: Part) -> set[str]:
+    """Kinds of findings that a group is not freed of: those of lengths that were stated."""
+    group, kept = part.group, set[str]()
+    if escape_proof(group):
+        return set(HELD_TO)
+    if group.clearance is not None and not _usual_range(part):
+        kept |= {"too_near", "too_far", "not_inside", "too_deep"}
+    if group.opening:
+        kept.add("narrow_opening")
+    if group.max_gap is not None:
+        kept |= {"opening", "opening_at_border"}
+    return kept | ({"off_curve"} if group.radius is not None else set())
+
+
+def _usual_range(part: Part) -> bool:
+    """Whether a clearance is as wide a range as the one of no stated distance, however far out."""
+    if part.group.radius is not None or part.group.solves_clearance:
+        return True
+    usual = part.valid_group(clearance=None).clearance
+    widths = [pair[1] - pair[0] for pair in (usual, part.group.clearance) if pair is not None]
+    return len(widths) == 2 and abs(widths[0] - widths[1]) < SAME_WIDTH
+
+
+def _freed(part: Part) -> Part:
+    """A group at places of its own: on a line if they are on one, else at points."""
+    group, points = part.group, part.points
+    if (group.relation in ("along", "between") or group.line) and len(points) > 1:
+        way = points - points.mean(axis=0)
+        unit = np.linalg.svd(way, full_matrices=False)[2][0]
+        along = way @ unit
+        if np.linalg.norm(way - along[:, None] * unit, axis=1).max() <= STRAIGHT:
+            ends = points[[int(along.argmin()), int(along.argmax())]]
+            kept = {n: getattr(group, n) for n in ("spacing", "pitch", "min_spacing", "heading")}
+            kept |= {"relation": "shape", "robots": len(points), "targets": free_targets(group)}
+            line = tuple(round(float(v), DECIMALS) for v in ends.ravel())
+            row = replace(part, group=part.demanding(kept | {"line": line}))
+            if row.certified:
+                return row
+    return at_points(part, np.ones(len(points), dtype=bool))
+
+
+def _on_curve(image: Part, old: Part) -> Part:
+    """A mirrored group on its curve where its target is not its own mirror image, if that does."""
+    group, count = image.group, len(image.points)
+    if group.relation not in ON_CURVE or group.spacing == "free" or group.pitch is not None:
+        return image
+    there = track_at(group, image.site, image.radius, old.track(count).offset)
+    if not there.curve.lines:
+        return image
+    slots, takes = respaced(there, image.points, count)
+    evenly = replace(image, points=slots[takes])
+    return evenly if evenly.certified else image
+
+
+def _beside(part: Part, old: Part) -> Part:
+    """A form that was turned or enlarged onto its target, moved off it as far as it was before."""
+    way = part.points.mean(axis=0) - part.centre
+    if not free_targets(part.group) or not way.any():
+        return part
+    solid, unit = part.site.outlines[part.group.targets[0]].filled, way / np.linalg.norm(way)
+    low, high = 0.0, float(np.hypot(*part.site.room))
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        off = distances(solid, part.points + middle * unit).min() >= old.offset
+        low, high = (low, middle) if off else (middle, high)
+    return rigid(part, np.eye(2), np.zeros(2), high * unit)
+
+
+def _pivot(part: Part) -> FloatArray:
+    """What a group is turned and scaled about: a target that it is round or in, else its middle."""
+    group, centre = part.group, part.centre
+    placed = group.shape is None and group.line is None and group.relation != "between"
+    if group.relation in ROUND or (
+        placed and MultiPoint(part.points).convex_hull.contains(Point(centre))
+    ):
+        return centre
+    return part.points.mean(axis=0)
+
+
+def _rotated(part: Part, degrees: float) -> Part:
+    here = part.track(len(part.points)) if part.group.relation in ("around", "cage") else None
+    if here is not None and here.curve.closed and here.holds(part.points):
+        arc = here.clockwise * here.curve.length * degrees / 360
+        points = here.at(here.stations(part.points) + arc)
+        return part.to(here.settled(points, distances(here.base, part.points)))
+    quarters = degrees / 90
+    if part.group.opens or (part.group.sides and abs(quarters - round(quarters)) < 1e-9):
+        return part.on_ring(part.valid_group(**_ring_turned(part, degrees)))
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return rigid(part, np.array([[c, s], [-s, c]]), _pivot(part), _pivot(part))
+
+
+def _ring_turned(part: Part, degrees: float) -> dict[str, object]:
+    """Where the opening or the sides of a ring are after a turn, of sides by quarters."""
+    group = part.group
+    if group.sides is None:
+        x, y = opening_way(group, part.site)
+        angle = math.degrees(math.atan2(y, x)) + degrees
+        return {"opening_towards": round((angle + 180) % 360 - 180, DECIMALS)}
+    by = round(degrees / 90) % 4
+    after: dict[str, str] = dict(zip(QUARTERS, (*QUARTERS[by:], *QUARTERS[:by]), strict=True))
+    return {"sides": _sides_by(after, group.sides)}
+
+
+def _sides_by(after: Mapping[str, str], sides: tuple[str, ...]) -> tuple[str, ...]:
+    """Parts of the way round by other names: "left half" may become "top half"."""
+    words = (name.split() for name in sides)
+    return tuple(" ".join([after.get(side, side), *half]) for side, *half in words)
+
+
+def _mirrored(part: Part, edit: Mirror) -> Part:
+    flip = np.diag([-1.0, 1.0] if edit.axis == "left-right" else [1.0, -1.0])
+    side = part.group.side
+    there = rigid(part, flip, part.centre, part.centre)
+    side = side and OPPOSITE[edit.axis].get(side, side)
+    edges = part.group.edges and _edges_after(part, Affine(flip, part.centre, part.centre))
+    sides = part.group.sides and _sides_by(OPPOSITE[edit.axis], part.group.sides)
+    towards = part.group.opening_towards
+    if part.group.opens:
+        x, y = opening_way(part.group, part.site) @ flip
+        towards = round(math.degrees(math.atan2(y, x)), DECIMALS)
+    return there.to(there.points, side=side, edges=edges, sides=sides, opening_towards=towards)
+
+
+def _edges_after(part: Part, there: Affine) -> tuple[int, ...]:
+    """The edges of the target that lie where a map takes the middles of those chosen."""
+    vertices, pairs = part.site.outlines[part.group.targets[0]].graph()
+    ends = np.array([vertices[list(pair)] for pair in pairs])
+    middles = there(ends[list(part.group.edges or ())].mean(axis=1))
+    at = np.argmin(np.stack([distances(LineString(e), middles) for e in ends]), axis=0)
+    return tuple(sorted({int(k) for k in at}))
+
+
+def _shifted(part: Part, edit: Shift) -> Part:
+    """As it stands; a usual distance from the target makes room for that, a named one does not."""
+    group, centre = part.group, part.centre
+    there = rigid(part, np.eye(2), centre, centre + np.array([edit.dx, edit.dy]))
+    usual = has_default_clearance(group, part.site.outlines, part.site.room, part.radius)
+    if group.clearance is None or group.relation not in OUTSIDE or not usual:
+        return there
+    off, (least, greatest) = _edges_off(there), group.clearance
+    if off.min() <= 0:
+        return there
+    least, greatest = min(least, float(off.min())), max(greatest, float(off.max()))
+    clearance = (math.floor(least * 1e3) / 1e3, math.ceil(greatest * 1e3) / 1e3)
+    return there.to(there.points, clearance=clearance)
+
+
+def scaled(part: Part, factor: float) -> Part:
+    """Rigid but for size; clearances demanded grow as those that are kept do."""
+    there = rigid(part, np.eye(2) * factor, _pivot(part), _pivot(part))
+    group = there.group
+    if group.clearance is None or not group.targets:
+        return there
+    old, new = (_edges_off(p) for p in (part, there))
+    if min(old.min(), new.min()) <= 0:
+        return there  # on the outline: the verdict says so
+    if group.radius is not None:
+        return there.to(there.points, radius=round(group.radius * factor, DECIMALS))
+    least, greatest = group.clearance
+    least = round(least * float(new.min() / old.min()), DECIMALS)
+    if greatest < MAX_LENGTH:
+        greatest = round(greatest * float(new.max() / old.max()), DECIMALS)
+    return there.to(there.points, clearance=(least, greatest))
+
+
+def _edges_off(part: Part) -> FloatArray:
+    """How far each robot's edge is from the outline, (n,), px; negative on its wrong side."""
+    outline = part.site.outlines[part.group.targets[0]]
+    within = np.asarray(shapely.intersects_xy(outline.polygon, part.points))
+    apart = distances(outline.polygon.boundary, part.points)
+    return np.where(within == (part.group.relation == "inside"), apart, -apart) - part.radius
+
+
+def rigid(part: Part, linear: FloatArray, origin: FloatArray, to: FloatArray) -> Part:
+    """Every place, and a line or form of the contract, by the same map of row vectors."""
+    there = Affine(linear, origin, to)
+    points, shape = there(part.points), part.group.shape
+    if shape is not None:
+        figure = figure_of(part.group, shape, part.site, part.radius)
+        group, anew = form_after(part.group, figure, there)
+        moved = replace(part, group=group, points=points)
+        if anew:
+            slots = moved.placed(len(points))
+            moved = replace(moved, points=slots[taken(points, slots)])
+        return moved
+    if part.group.line is None:
+        return part.to(points)
+    ends = there(np.reshape(part.group.line, (2, 2)))
+    return part.to(points, line=tuple(round(float(v), DECIMALS) for v in ends.ravel()))
