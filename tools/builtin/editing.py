@@ -18,7 +18,7 @@ from ..formation.plan import Plan
 from ..formation.units import with_metres
 from ..perception.target_prompt import TargetPrompt
 from ..tool import ToolResult, in_thread, tool
-from ..world import PlanNode, Step, World, to_json_values
+from ..world import PlanNode, Step, World
 from .committing import MAX_FINDINGS, proposal_data, tell_of
 from .others import with_others
 from .robots import with_robots
@@ -101,8 +101,8 @@ def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]
 
 
 def _edit_facts(edit: Edit) -> dict[str, Any]:
-    """An edit as JSON, its kind always named."""
-    return {"kind": edit.kind, **to_json_values(edit)}
+    """An edit as JSON, with all that it says."""
+    return edit.model_dump(mode="json", exclude_none=True)
 
 
 def _named(edits: Sequence[Edit]) -> set[str]:

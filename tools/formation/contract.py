@@ -110,6 +110,12 @@ class Group(Value):
         return within or self.relation in ("inside", "centre")
 
     @property
+    def stands_beside(self) -> bool:
+        """Whether its robots have places of their own and only stay off a target."""
+        free = self.relation in ("shape", "at") and not self.keeps_clearance
+        return free and not self.enters and len(self.targets) == 1
+
+    @property
     def opens(self) -> bool:
         """Whether an opening is to be left in its ring."""
         return self.opening is not None or self.opening_towards is not None

@@ -139,7 +139,7 @@ class Draft:
 def _suits(edit: Edit, group: Group) -> bool:
     """Whether an edit that names no group can be meant for this one."""
     if isinstance(edit, Offset):
-        return group.clearance is not None or (group.relation == "at" and bool(group.targets))
+        return group.clearance is not None or group.stands_beside
     if isinstance(edit, Target):
         return group.relation != "at" or bool(group.targets)
     if isinstance(edit, Distance):

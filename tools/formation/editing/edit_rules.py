@@ -7,6 +7,8 @@ does the least sum of squared ways decide. Frame: image pixels, x right, y down.
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from ...errors import ToolError
 from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import along_curve, corner_points, nearest
@@ -14,14 +16,15 @@ from ..contract import MAX_LENGTH, OUTSIDE, exact_clearance
 from ..placement.pitch import pitch_places
 from .edit_forms import DECIMALS
 from .edit_kinds import Offset, SideOnly
+from .moving import rigid
 from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
 from .respacing import Track, feet_on, moved_out, pushed, respaced, track, track_at
 
 
 def _offset(part: Part, edit: Offset) -> Part:
     group = part.group
-    if group.relation == "at" and group.targets:
-        return _pushed(part, edit)
+    if group.stands_beside:
+        return beside(part, _by(edit, part.offset - part.radius, inward=False))
     if group.solves_clearance:  # how far apart they stand gives way
         clearance = exact_clearance(group, part.offset - part.radius)
         group = group.model_copy(update={"clearance": clearance, **without_pitch(group)})
@@ -56,13 +59,21 @@ def _offset(part: Part, edit: Offset) -> Part:
     return even if even.certified else moved
 
 
-def _pushed(part: Part, edit: Offset) -> Part:
-    """Robots at points of their own straight away from the target, or towards it."""
+def beside(part: Part, by: float) -> Part:
+    """Robots at places of their own further from a target, px: a form as it is, others each.
+
+    Raises:
+        ToolError: they would come upon it.
+    """
     solid = part.site.outlines[part.group.targets[0]].filled
-    by = _by(edit, part.offset - part.radius, inward=False)
     if part.offset - part.radius + by <= 0:
         raise ToolError(f"{part.site.length(-by)} nearer to {part.group.targets[0]} is too much.")
-    return part.to(pushed(solid, part.points, feet_on(solid, part.points), by))
+    feet = feet_on(solid, part.points)
+    if part.group.relation == "at":
+        return part.to(pushed(solid, part.points, feet, by))
+    i = int(distances(solid, part.points).argmin())
+    way = part.points[i] - feet[i]
+    return rigid(part, np.eye(2), np.zeros(2), by * way / np.linalg.norm(way))
 
 
 def _resized(part: Part, factor: float, clearance: tuple[float, float]) -> Part:

@@ -14,7 +14,7 @@ from shapely.geometry import LineString, MultiPoint, Point
 
 from ...geometry.outline import FloatArray, distances
 from ..checking.finding import Finding
-from ..contract import MAX_LENGTH, OUTSIDE, SideName, has_default_clearance
+from ..contract import MAX_LENGTH, SideName, has_default_clearance
 from ..placement.caging import escape_proof
 from ..placement.figure import figure_of
 from ..placement.ring_parts import opening_way
@@ -229,7 +229,7 @@ def _shifted(part: Part, edit: Shift) -> Part:
     group, centre = part.group, part.centre
     there = rigid(part, np.eye(2), centre, centre + np.array([edit.dx, edit.dy]))
     usual = has_default_clearance(group, part.site.outlines, part.site.room, part.radius)
-    if group.clearance is None or group.relation not in OUTSIDE or not usual:
+    if group.clearance is None or group.relation not in ("around", "cage") or not usual:
         return there
     off, (least, greatest) = _edges_off(there), group.clearance
     if off.min() <= 0:

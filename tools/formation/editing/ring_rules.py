@@ -26,6 +26,7 @@ from ..placement.pitch import pitch_offset
 from ..site import Site
 from .edit_forms import DECIMALS
 from .edit_kinds import Closure, Distance, Heading, Opening, Sides, Spacing
+from .edit_rules import beside
 from .moving import QUARTERS, scaled
 from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
 from .respacing import moved_out, track, track_at
@@ -44,6 +45,8 @@ OTHER_HALF: Mapping[str, RingPart] = {
 def _distant(part: Part, edit: Distance) -> Part:
     """Everybody straight to the distance where the curve is one; else to places anew."""
     group = part.group
+    if group.stands_beside:
+        return beside(part, edit.px + part.radius - part.offset)
     if group.clearance is None or not group.targets:
         raise ToolError(f"The {group.relation} group keeps no distance from anything.")
     unsolved = without_pitch(group) if group.solves_clearance else {}
