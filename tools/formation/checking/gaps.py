@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.curves import Curve, locate
+from ...geometry.curves import Curve, interpolate, locate
 from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import nearest
 from ..contract import nominal, pitch_slack
@@ -77,8 +77,11 @@ def opening_left(part: Part, curve: Curve, audit: Audit) -> None:
     station = (locate(loop, part.points) - opening_station(group, part.site, loop)) % length
     order = np.argsort(station, kind="stable")
     first, last = order[0], order[-1]
-    width = float(np.linalg.norm(part.points[first] - part.points[last])) - 2 * part.radius
     along, gaps = float(station[first] + length - station[last]), np.diff(station[order])
+    ends = part.points[[first, last]]
+    if along > length / 2:  # wider than the ring is: as wide as it
+        ends[1] = interpolate(loop, (locate(loop, ends[:1]) - length / 2) % length)[0]
+    width = float(np.linalg.norm(ends[0] - ends[1])) - 2 * part.radius
     audit.greatest("opening_px", width)
     others = (part.first + last,)
     least = group.opening or 0.0

@@ -34,6 +34,8 @@ from .respacing import moved_out, track, track_at
 ROUNDS, HALVINGS, INSIDE_SLACK = 2, 12, 0.15
 """How often robots inside are spread anew, by halving for the room they need; and how exactly they
 are then so far apart."""
+NARROWER = 0.98
+"""An opening that is to be narrower is at most this share of what it was."""
 OTHER_HALF: Mapping[str, RingPart] = {
     "left half": "right half",
     "right half": "left half",
@@ -177,13 +179,19 @@ def _sided(part: Part, edit: Sides) -> Part:
 def _opened(part: Part, edit: Opening) -> Part:
     group = part.group
     towards = group.opening_towards if edit.towards is None else edit.towards
+    now = max(float(_steps(part).max()) - 2 * part.radius, 0.0)
     px = group.opening if edit.px is None else edit.px
-    if edit.factor is not None:
-        px = edit.factor * max(float(_steps(part).max()) - 2 * part.radius, 0.0)
-        px = round(px, DECIMALS)
+    px = px if edit.factor is None else round(edit.factor * now, DECIMALS)
     towards = "bottom" if towards is None else towards
     ring = ringed(part, radius=group.radius, opening=px or 0.0, opening_towards=towards)
-    return part.on_ring(ring)
+    opened = part.on_ring(ring)
+    left = float(_steps(opened).max()) - 2 * part.radius
+    if group.opens and px and px < NARROWER * now and left > NARROWER * now:
+        raise ToolError(
+            f"The opening is {part.site.length(now)} wide; narrower it would be as the other gaps. "
+            "Close it, take more robots, or leave it."
+        )
+    return opened
 
 
 def closed(part: Part, edit: Closure) -> Part:

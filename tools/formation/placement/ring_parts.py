@@ -18,8 +18,9 @@ from ...geometry.sampling import arc_length
 from ..contract import DIRECTIONS, MAX_LENGTH, Group
 from ..site import Site
 
-WIDER = 2.0
-"""An opening is left at least so many times as wide as the gaps between the other robots."""
+WIDER, NAMED = 2.0, 1.6
+"""An opening is left at least so many times as wide as the gaps between the other robots, and one
+whose width was named."""
 STEPS, MOST_OPEN = 400, 0.9
 """Widths of an opening that are tried, up to this share of the ring."""
 ROUNDING = 1e-3
@@ -148,9 +149,9 @@ def opening_way(group: Group, site: Site) -> FloatArray:
 def _opening(group: Group, site: Site, radius: float, loop: FloatArray) -> BaseGeometry:
     """The part of the plane before which a ring is left open: from the target's centre outwards."""
     length, station = arc_length(loop), opening_station(group, site, loop)
-    half: FloatArray = np.linspace(
-        WIDER * length / (2 * (group.robots + 1)), MOST_OPEN * length / 2, STEPS
-    )
+    wider = NAMED if group.opening else WIDER
+    least = wider * length / (group.robots - 1 + wider)
+    half: FloatArray = np.linspace(least / 2, MOST_OPEN * length / 2, STEPS)
     ends = [interpolate(loop, (station + sign * half) % length) for sign in (-1, 1)]
     wide = np.linalg.norm(ends[1] - ends[0], axis=1) - 2 * radius - 2 * ROUNDING
     enough = np.flatnonzero(wide >= (group.opening or 0.0))

@@ -143,7 +143,7 @@ def test_an_opening_is_where_it_is_wanted_and_closes_again(towards: Any, px: flo
     assert found.plan.verdict.certified
     middle = {"left": 180, "top": -90, "t2": 0, 30.0: 30}[towards]
     free = np.abs((angles(found) - middle + 180) % 360 - 180).min()
-    assert free > 360 / 12
+    assert free > 1.4 * 360 / 10 / 2
     wider = after(found.plan, {"kind": "opening", "factor": 1.4})
     assert group_of(wider).opening_towards == towards
     assert np.abs((angles(wider) - middle + 180) % 360 - 180).min() > free + 2
@@ -250,3 +250,29 @@ def test_a_ring_with_an_opening_keeps_it_with_fewer_and_with_more(n: int, k: int
     for edit in ({"kind": "remove", "n": k}, {"kind": "add", "n": k}):
         if edit["kind"] == "add" or n - k > 1:
             assert after(plan, edit).plan.verdict.findings == ()
+
+
+def widest(found: Plan | Edited) -> float:
+    x, y = (points(found) - (450, 350)).T
+    ordered = points(found)[np.argsort(np.arctan2(y, x))]
+    return float(np.linalg.norm(np.roll(ordered, -1, axis=0) - ordered, axis=1).max()) - 2 * RADIUS
+
+
+@pytest.mark.parametrize("n", [7, 9, 15])
+@pytest.mark.parametrize("factor", [0.6, 0.85, 1.3])
+def test_a_gap_becomes_as_much_narrower_or_wider_as_a_gap_can(n: int, factor: float) -> None:
+    plan = after(standing(n=n), {"kind": "opening", "towards": "right"}).plan
+    found = after(plan, {"kind": "opening", "factor": factor})
+    assert found.plan.verdict.certified
+    ratio = widest(found) / widest(plan)
+    assert ratio == pytest.approx(factor, abs=0.03) or (factor < ratio < 0.95)
+
+
+def test_a_gap_named_narrower_is_narrower_down_to_what_still_is_one() -> None:
+    plan = after(standing(n=10), {"kind": "opening", "towards": "right", "px": 160}).plan
+    found = after(plan, {"kind": "opening", "px": 110})
+    assert found.plan.verdict.certified
+    assert widest(found) == pytest.approx(110, abs=2)
+    least = after(found.plan, {"kind": "opening", "px": 5})
+    with pytest.raises(ToolError, match="narrower it would be as the other gaps"):
+        after(least.plan, {"kind": "opening", "factor": 0.8})

@@ -149,6 +149,17 @@ def test_a_ring_without_its_opening_or_with_it_elsewhere_is_refused() -> None:
         made(site, opening=400)
 
 
+def test_two_robots_side_by_side_leave_all_the_rest_of_the_ring_open() -> None:
+    site = site_of("disc")
+    plan = made(site, 3.0, robots=2, pitch=20, opening=90, opening_towards="top")
+    assert plan.verdict.certified
+    assert float(plan.verdict.measures["opening_px"]) > 120
+    near = plan.formation.points[:1] + np.array([[0, 0], [0, 30]])
+    assert "narrow_opening" not in kinds(near, plan, site)
+    swapped = made(site, 3.0, robots=2, pitch=20, opening=90, opening_towards="bottom")
+    assert "narrow_opening" in kinds(swapped.formation.points, plan, site)
+
+
 def part_names(x: float, y: float, half: FloatArray) -> set[str]:
     """The sides and halves of a ring about (0, 0) that a place is in, with some slack."""
     u, v, slack = x / half[0], y / half[1], 1e-3
