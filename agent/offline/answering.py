@@ -177,8 +177,7 @@ def _closed(
         group = group | {"closed": group["closed"] and not opened}
         width = length_text(group["widest_opening_px"], scale)
         widest = f"the widest opening, between robots {listed(group['between'])}, is {width}"
-        needed = f"; {group['robots_to_close']} evenly spaced robots would close it"
-        needed = "" if group["closed"] or opened else needed
+        needed = "" if group["closed"] or opened else f"; {_enough(group)}"
         told.append(f"{'Yes, closed' if group['closed'] else 'No, not closed'}: {widest}{needed}.")
     return " ".join(told) or "They stand in no ring, so nothing is closed."
 
@@ -191,8 +190,15 @@ def _needed(
         return "They stand in no ring, so none would close it."
     if rings[0]["closed"]:
         return f"It is closed with the {data['robots']} robots there are."
-    enough = f"{rings[0]['robots_to_close']} evenly spaced robots would close it"
-    return f"{enough}; there are {data['robots']}."
+    enough = _enough(rings[0])
+    return f"{enough[0].upper()}{enough[1:]}; there are {data['robots']}."
+
+
+def _enough(group: Mapping[str, Any]) -> str:
+    """How many robots would close a ring, where a number is known to."""
+    if group["robots_to_close"] is None:
+        return "so far from it no number of robots is known to close it"
+    return f"{group['robots_to_close']} evenly spaced robots would close it"
 
 
 def _count(

@@ -103,7 +103,7 @@ def _group_facts(world: World, plan: Plan, k: int) -> dict[str, Any]:
     data: dict[str, Any] = {"relation": group.relation, "targets": group.targets}
     if len(group.targets) != 1 or group.enters:
         return data
-    ring = ring_of(points, world.outline(group.targets[0]), contract.robot_radius)
+    ring = ring_of(points, group, world.site(contract), contract.robot_radius)
     if ring is None:
         return data
     facts = ring.model_dump() | {"between": [names[i] for i in ring.between]}

@@ -9,9 +9,15 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
+from ...errors import ToolError
 from ...geometry.outline import FloatArray, Outline, distances
-from ..contract import Group
+from ..contract import MAX_ROBOTS, Group
+from ..placement.ring_parts import whole_ring
+from ..site import Site
 from ..value import Value
+
+LEAST_OFFSET = 0.1
+"""As near to an outline, px, a ring is looked at where a robot stands on it."""
 
 
 class Ring(Value):
@@ -22,44 +28,71 @@ class Ring(Value):
         between: those two, counted from 0 within the group.
         min_width_px: of the thing at its narrowest.
         closed: whether the thing is enclosed and no opening is as wide as it at its narrowest.
-        robots_to_close: how many on this ring would close it.
+        robots_to_close: how many evenly on this ring would close it; None where none are known.
     """
 
     widest_opening_px: float
     between: tuple[int, int]
     min_width_px: float
     closed: bool
-    robots_to_close: int
+    robots_to_close: int | None
 
 
-def ring_of(points: FloatArray, outline: Outline, radius: float) -> Ring | None:
+def ring_of(points: FloatArray, group: Group, site: Site, radius: float) -> Ring | None:
     """How closed robots stand around a thing; None of fewer than 2.
 
     Args:
         points: (n, 2), px.
-        outline: of the thing they stand around.
+        group: theirs, about one thing.
         radius: of a robot, px.
     """
     if len(points) < 2:
         return None
-    exterior = outline.filled.exterior
-    order = np.argsort(shapely.line_locate_point(exterior, shapely.points(points)), kind="stable")
+    outline = site.outlines[group.targets[0]]
+    away = distances(outline.filled, points)
+    loop = outline.filled.buffer(float(away.mean())).exterior
+    order = np.argsort(shapely.line_locate_point(loop, shapely.points(points)), kind="stable")
     ring = points[order]
     opening = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) - 2 * radius
     widest = int(np.argmax(opening))
     encloses = len(ring) > 2 and shapely.make_valid(Polygon(ring)).contains(
         shapely.Point(outline.centre)
     )
-    offset = float(distances(outline.filled, points).mean())
-    around = float(outline.filled.buffer(offset).exterior.length)
-    needed = math.ceil(around / (outline.min_width + 2 * radius))
+    try:
+        needed = robots_to_close(group, site, radius, float(away.min()))
+    except ToolError:
+        needed = None
     return Ring(
         widest_opening_px=round(float(opening[widest]), 2),
         between=(int(order[widest]), int(order[(widest + 1) % len(order)])),
         min_width_px=round(outline.min_width, 2),
         closed=bool(encloses and opening[widest] < outline.min_width),
-        robots_to_close=max(needed, 3),
+        robots_to_close=needed,
     )
+
+
+def robots_to_close(group: Group, site: Site, radius: float, offset: float) -> int:
+    """How many robots evenly all round a group's target leave no gap that it could pass through.
+
+    No gap is as wide as it at its narrowest, nor wider than the contract allows.
+
+    Args:
+        offset: of robots' centres from the outline, px.
+
+    Raises:
+        ToolError: no number does, or the picture cuts the ring.
+    """
+    name = group.targets[0]
+    outline, clearance = site.outlines[name], group.clearance or (offset - radius, offset - radius)
+    whole = group.model_copy(update={"radius": None, "clearance": clearance})
+    curve = whole_ring(whole, site, radius, max(offset, LEAST_OFFSET), site.frame(radius))
+    if not curve.closed:
+        raise ToolError(f"The picture's border cuts the ring around {name}: come nearer to it.")
+    widest = min(outline.min_width, math.inf if group.max_gap is None else group.max_gap)
+    needed = max(math.floor(curve.length / max(widest + 2 * radius, 1e-9)) + 1, 3)
+    if needed > MAX_ROBOTS or curve.length / needed < (group.min_spacing or 0.0):
+        raise ToolError(f"No number of robots is known to close the ring around {name}.")
+    return needed
 
 
 def clearance_of(points: FloatArray, outline: Outline, group: Group, radius: float) -> FloatArray:

@@ -1,29 +1,24 @@
 """What edits do to a group around a target: its distance, spacing, sides, opening and closure."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from ...errors import ToolError
-from ...geometry.cages.cage_places import fewest_cage
 from ...geometry.interior import ground
 from ...geometry.outline import FloatArray
 from ...geometry.sampling import along_curve, nearest
 from ..contract import (
     LEAST_SOLVED,
     MAX_LENGTH,
-    MAX_ROBOTS,
     OUTSIDE,
     Group,
     RingPart,
     exact_clearance,
     has_default_clearance,
 )
-from ..placement.caging import demand_of, escape_proof
 from ..placement.pitch import pitch_offset
-from ..site import Site
 from .edit_forms import DECIMALS
 from .edit_kinds import Closure, Distance, Heading, Opening, Sides, Spacing
 from .edit_rules import beside
@@ -209,33 +204,6 @@ def closed(part: Part, edit: Closure) -> Part:
         )
     there = part.on_ring(cage) if group.relation != "cage" else replace(part, group=cage)
     return there if closure == "ring" or there.certified else part.anew(cage)
-
-
-def robots_to_close(group: Group, site: Site, radius: float, offset: float) -> int:
-    """How many robots evenly on a group's ring leave no gap that its target could pass through.
-
-    No gap is wider than the contract allows, or where it says nothing than the target's least
-    width; for an escape-proof cage, as many as are known to be enough.
-
-    Args:
-        offset: of robots' centres from the outline, px.
-
-    Raises:
-        ToolError: no number does, or the picture cuts the ring.
-    """
-    name = group.targets[0]
-    curve = track_at(group, site, radius, offset).curve
-    if not curve.closed:
-        raise ToolError(f"The picture's border cuts the ring around {name}: come nearer to it.")
-    if escape_proof(group):
-        found = fewest_cage(demand_of(group, site, radius), 3)
-        needed = 0 if found is None else len(found)
-    else:
-        widest = site.outlines[name].min_width if group.max_gap is None else group.max_gap
-        needed = max(math.ceil(curve.length / max(widest + 2 * radius, 1e-9)), 3)
-    if not 0 < needed <= MAX_ROBOTS or curve.length / needed < (group.min_spacing or 0.0):
-        raise ToolError(f"No number of robots is known to close the ring around {name}.")
-    return needed
 
 
 def _headed(part: Part, edit: Heading) -> Part:

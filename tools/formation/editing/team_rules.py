@@ -10,14 +10,17 @@ import numpy as np
 import shapely
 
 from ...errors import ToolError
+from ...geometry.cages.cage_places import fewest_cage
 from ...geometry.interior import ground
 from ...geometry.outline import FloatArray
+from ..checking.surroundings import robots_to_close
 from ..contract import (
     MAX_ROBOTS,
     MIN_SPACING,
     default_clearance,
     nominal,
 )
+from ..placement.caging import demand_of, escape_proof
 from ..site import CapacityError
 from .draft import Draft
 from .edit_kinds import (
@@ -33,7 +36,7 @@ from .edit_kinds import (
 from .moving import carried_out
 from .part import ON_CURVE, Part, check_known, closed_up, skipped
 from .regrouping import arranged, left_of, merged, more_of, targeted, without
-from .ring_rules import closed, ringed, robots_to_close
+from .ring_rules import closed, ringed
 from .staying import alone
 
 
@@ -92,8 +95,7 @@ def _counted(draft: Draft, edit: Count) -> Draft:
         return _with_count(draft, k, edit.robots - others)
     if draft.parts[k].group.relation != "cage":
         draft = draft.with_each((k,), lambda part: part.on_ring(ringed(part)))
-    part = draft.parts[k]
-    draft = _with_count(draft, k, robots_to_close(part.group, part.site, part.radius, part.offset))
+    draft = _with_count(draft, k, _needed(draft.parts[k]))
     return draft.with_each((k,), lambda part: closed(part, Closure(kind="close")))
 
 
@@ -102,6 +104,21 @@ def _with_count(draft: Draft, k: int, count: int) -> Draft:
     if more > 0:
         return draft.with_each((k,), lambda part: more_of(part, more))
     return _fewer(draft, k, -more) if more else draft
+
+
+def _needed(part: Part) -> int:
+    """How many robots close a group's ring; for an escape-proof one, as many as surely do.
+
+    Raises:
+        ToolError: none are known to.
+    """
+    if not escape_proof(part.group):
+        return robots_to_close(part.group, part.site, part.radius, part.offset)
+    found = fewest_cage(demand_of(part.group, part.site, part.radius), 3)
+    if found is None:
+        name = part.group.targets[0]
+        raise ToolError(f"No number of robots is known to hold {name} for sure.")
+    return len(found)
 
 
 def _fitting(part: Part) -> int:
