@@ -117,10 +117,17 @@ class Remove(_GroupEdit):
 
 
 class Count(_GroupEdit):
-    """So many robots in all; as many as close the ring, or as fit with the spacing asked for."""
+    """So many robots in all; as many as close the ring, or as fit so far apart where they are."""
 
     kind: Literal["count"] = "count"
     robots: Number | Literal["needed", "fit"]
+    px: Positive | None = None
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if self.px is not None and self.robots != "fit":
+            raise ValueError("px says how far apart as many as fit are")
+        return self
 
 
 class Swap(_Edit):
@@ -230,8 +237,9 @@ EDIT_SCHEMA: dict[str, Any] = {
         "Kinds: out, in: px or factor. distance: px from the outline. spacing: px or factor. "
         "rotate: degrees clockwise. mirror: axis left-right or top-bottom. shift: dx, dy. scale: "
         "factor. add: n. remove: n or robots (numbers); others close up. count: robots, a number, "
-        "needed (to close the ring) or fit. swap: a, b. skip: robots; places stay empty. side: all "
-        "to it. sides: only or without, lists. opening: towards, px wide or factor. close, "
+        "needed (to close the ring) or fit (px apart). swap: a, b. skip: robots; places stay "
+        "empty. side: all to it. sides: only or without, lists. opening: towards, px wide or "
+        "factor. close, "
         "open, escape-proof. arrange: demands, fields of a group. target: to an id; only robots (a "
         "count or numbers), the rest stay. merge. place: robot to [x, y], by [dx, dy] or target. "
         "heading: to. keep-out: ids. group: else all."

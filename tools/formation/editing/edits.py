@@ -18,7 +18,7 @@ from ..placement.place import Site
 from ..plan import Plan, make_plan
 from ..value import Value
 from .draft import Draft, draft_of
-from .edit_kinds import Edit
+from .edit_kinds import Count, Edit, Spacing
 from .edit_rules import RULES
 from .off_things import off_things
 from .part import IntArray
@@ -100,13 +100,23 @@ def edited_all(
 
 
 def _edited_by(draft: Draft, edits: Sequence[Edit]) -> Draft:
-    for edit in edits:
+    for edit in _apart_that_fit(edits):
         if edit.kind in TEAM_RULES:
             draft = TEAM_RULES[edit.kind](draft, edit)
             continue
         rule = RULES.get(edit.kind) or RING_RULES[edit.kind]
         draft = draft.with_each(draft.chosen(edit), lambda part: rule(part, edit))  # noqa: B023
     return draft
+
+
+def _apart_that_fit(edits: Sequence[Edit]) -> Sequence[Edit]:
+    """The edits; a spacing beside as many robots as fit says how far apart those are at least."""
+    fit = next((e for e in edits if isinstance(e, Count) and e.robots == "fit"), None)
+    apart = next((e for e in edits if isinstance(e, Spacing) and e.px is not None), None)
+    if fit is None or apart is None:
+        return edits
+    both = fit.model_copy(update={"px": apart.px, "group": fit.group or apart.group})
+    return [both if edit is fit else edit for edit in edits if edit is not apart]
 
 
 def _called_by_id(verdict: Verdict, draft: Draft) -> Verdict:

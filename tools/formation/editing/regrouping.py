@@ -63,9 +63,14 @@ def _retargeted(part: Part, to: str) -> dict[str, Any]:
     """The demands of a group round another thing: those that say something of its own go along."""
     group, site = part.group, part.site
     check_known(to, site)
+    if group.relation == "between":
+        count = {"robots": len(part.points)}
+        if to in group.targets:
+            return {"relation": "around", "targets": (to,), "heading": group.heading} | count
+        return group.model_dump() | {"targets": (group.targets[0], to)} | count
     if len(group.targets) != 1:
         raise ToolError(
-            f"The {group.relation} group is not about one thing: arrange it anew, or shift it."
+            f"The {group.relation} group is not about a thing: arrange it anew, or shift it."
         )
     (old,) = group.targets
     demands = group.model_dump() | {"targets": (to,), "robots": len(part.points)}
@@ -238,4 +243,7 @@ def _rearranged(part: Part, demands: dict[str, Any]) -> dict[str, Any]:
             kept["clearance"] = group.clearance
         if _placeless(demands):
             kept["targets"] = ()
+        elif relation != "between":
+            known = [name for name in part.site.outlines if name not in part.keep_out]
+            kept["targets"] = group.targets[:1] or (tuple(known) if len(known) == 1 else ())
     return kept | {"relation": relation} | demands

@@ -18,6 +18,7 @@ from ..contract import (
     MAX_ROBOTS,
     MIN_SPACING,
     default_clearance,
+    exact_clearance,
     nominal,
 )
 from ..placement.caging import demand_of, escape_proof
@@ -86,9 +87,9 @@ def _added(draft: Draft, edit: Add) -> Draft:
 def _counted(draft: Draft, edit: Count) -> Draft:
     k = draft.chosen(edit)[0]
     if edit.robots != "needed":
-        part = draft.parts[k]
         if edit.robots == "fit":
-            return _with_count(draft, k, _fitting(part))
+            return _with_as_many_as_fit(draft, k, edit.px)
+        part = draft.parts[k]
         others = 0 if edit.group else len(draft.was) - len(part.points)
         if edit.robots <= others:
             raise ToolError(f"{others} robots stand in other groups: say who is to leave.")
@@ -121,6 +122,26 @@ def _needed(part: Part) -> int:
     return len(found)
 
 
+def _with_as_many_as_fit(draft: Draft, k: int, px: float | None) -> Draft:
+    loose = draft.with_each((k,), lambda part: _loosened(part, px))
+    for count in range(_fitting(loose.parts[k]), 0, -1):
+        fits = _with_count(loose, k, count)
+        if "too_close" not in {f.kind for f in fits.parts[k].findings}:
+            return fits
+    return _with_count(loose, k, 1)
+
+
+def _loosened(part: Part, px: float | None) -> Part:
+    """A group whose robots are to be as far apart as asked, or as it says, wherever they are."""
+    group = part.group
+    if px is None and not group.solves_clearance:
+        return part
+    demands = {"pitch": None, "max_gap": None, "min_spacing": px or group.min_spacing}
+    if group.solves_clearance:
+        demands["clearance"] = exact_clearance(group, part.offset - part.radius)
+    return replace(part, group=part.valid_group(**demands))
+
+
 def _fitting(part: Part) -> int:
     """How many robots the place of a group holds at the spacing asked for.
 
@@ -129,6 +150,10 @@ def _fitting(part: Part) -> int:
     """
     group = part.group
     apart = group.pitch or group.min_spacing or 0.0
+    if group.relation != "corners" and part.radius == 0 and apart <= MIN_SPACING:
+        raise ToolError("Say how far apart they are to be: robots are points, so any number fits.")
+    if group.relation in ON_CURVE and group.pitch is None:  # fewer where it is bent
+        return min(int(part.track(len(part.points)).curve.length / apart) + 1, MAX_ROBOTS)
     if group.relation in ("corners", "centre"):
         most = MAX_ROBOTS
     elif group.relation in (*ON_CURVE, "between") or group.line or group.shape:
@@ -139,8 +164,6 @@ def _fitting(part: Part) -> int:
         most = int(room.area / (0.8 * apart**2) + room.length / apart) + 2
     else:
         raise ToolError(f"How many fit is not known of a {group.relation} group: give a number.")
-    if group.relation != "corners" and part.radius == 0 and apart <= MIN_SPACING:
-        raise ToolError("Say how far apart they are to be: robots are points, so any number fits.")
     try:
         part.placed(min(most, MAX_ROBOTS))
     except CapacityError as error:

@@ -1,4 +1,4 @@
-"""Turned, mirrored, moved and scaled as said, also where the arrangement's own demands do not hold."""
+"""Motions are as said, also where what the arrangement itself demands does not hold then."""
 
 from typing import Any
 
