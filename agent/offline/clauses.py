@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from . import followup_edits, followup_teams, followup_turns
+from . import followup_edits, followup_sides, followup_teams, followup_turns
 from .followup_edits import Effect, Effects, Said, ask
 from .followup_frames import Frame, Slots, frames
 from .followup_things import resolved
@@ -73,7 +73,7 @@ class Line:
 
     def __init__(self, words: str, standing: Standing) -> None:
         self.words, self.standing = spelled(words), standing
-        self.led = ""
+        self.led = self.asking = ""
         self.excepted: tuple[int, ...] = ()
         found = [resolved(c, self.words, standing) for c in chunks_of(self.words, standing)]
         while len(found) > 1 and ("correction" in found[-1].kinds or is_empty(found[-1])):
@@ -157,11 +157,12 @@ class Line:
 
     def _asks(self) -> tuple[bool, bool]:
         """Whether it may be a question, and whether it can be nothing else."""
-        text = re.sub(OPENERS, "", self.words.lower().lstrip("\"' "))
+        words = self.asking or self.words
+        text = re.sub(OPENERS, "", words.lower().lstrip("\"' "))
         word = next(iter(re.findall(r"^[a-z']+", text)), "")
         polite = any(re.match(rf"{p}\b", text) for p in rules()["polite"])
         leads = word in rules()["questions"] and not polite
-        marked = self.words.rstrip().endswith("?")
+        marked = words.rstrip().endswith("?")
         either = word in ("can", "could", "would", "will", "may")
         either = either or (not marked and word in ("have", "do", "is", "are", "any"))
         return leads or marked, leads and not either
@@ -191,27 +192,36 @@ class Line:
                 return None
             return self._substituted(clauses or [], after) or self.clauses(after)
         too = any("too" in c.kinds for c in self.chunks) or "and" in self.led.split()
-        return self._of_last_words(too) if self.standing.words and (self.denies or too) else None
-
-    def _of_last_words(self, too: bool) -> list[Clause] | None:
-        """What was said last, with phrases of this line put in."""
-        last = Line(self.standing.words, replace(self.standing, words="", edits=()))
-        clauses = last.clauses(last.chunks)
         after = [c for c in self.chunks if "too" not in c.kinds and not is_empty(c)]
-        robots_alone = all({"robots", "stay"} & set(c.kinds) for c in after)
-        if not after or (not self.denies and not robots_alone):
+        robots = bool(after) and all({"robots", "stay"} & set(c.kinds) for c in after)
+        if robots and self.standing.said not in ("", self.standing.words):
+            return self._of_words(self.standing.said, after)
+        amounts = bool(after) and all({"px", "angle"} & set(c.kinds) for c in after)
+        if amounts and self.standing.said not in ("", self.standing.words):
+            return self._of_words(self.standing.said, after)
+        if not self.standing.words or not after or not (self.denies or (too and robots)):
             return None
-        if robots_alone and not self.denies:
-            return self._for_robots(after) or self._substituted(clauses or [], after)
-        if not clauses:
-            return None
-        found = self._substituted(clauses, after)
-        kinds = {e["kind"] for c in found or () for e in c.effects}
-        if found and self.denies and self.standing.edits and kinds & {*followup_turns.RELATIVE}:
-            edits = [e for c in found for e in c.effects]
-            effects = followup_turns.corrected([dict(e) for e in self.standing.edits], edits)
-            return [replace(found[0], effects=tuple(effects), frame="corrected")]
+        if robots and not self.denies:
+            return self._for_robots(after) or self._of_words(self.standing.words, after)
+        return self._instead(self._of_words(self.standing.words, after))
+
+    def _of_words(self, words: str, after: Sequence[Chunk]) -> list[Clause] | None:
+        """What was said before, with phrases of this line put in."""
+        line = Line(words, replace(self.standing, words="", said="", edits=()))
+        clauses = line.clauses(line.chunks)
+        self.asking = line.words
+        found = self._substituted(clauses or [], after)
+        self.asking = ""
         return found
+
+    def _instead(self, found: list[Clause] | None) -> list[Clause] | None:
+        """The clauses as one change that takes the last one back first."""
+        kinds = {e["kind"] for c in found or () for e in c.effects}
+        if not found or not self.standing.edits or not kinds & {*followup_turns.RELATIVE}:
+            return found
+        edits = [e for c in found for e in c.effects]
+        effects = followup_turns.corrected([dict(e) for e in self.standing.edits], edits)
+        return [replace(found[0], effects=tuple(effects), frame="corrected")]
 
     def _for_robots(self, after: Sequence[Chunk]) -> list[Clause] | None:
         """The last edit for other robots: "and robot 3 too"."""
@@ -282,7 +292,7 @@ def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
         return followup_turns.asked(slots, said, frame.name.removeprefix("ask_"))
     if frame.name in TALK:
         return [{"kind": "talk", "about": frame.name}]
-    modules = (followup_edits, followup_teams, followup_turns)
+    modules = (followup_edits, followup_sides, followup_teams, followup_turns)
     build: Callable[[Slots, Said], Effects] = next(
         getattr(module, frame.name) for module in modules if hasattr(module, frame.name)
     )

@@ -7,32 +7,31 @@ instruction is left to the planner.
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..first_message import Task
-from ..messages import Call, History, Reply, Result
+from ..first_message import Task, read_task
+from ..messages import Call, History, Reply, Result, User
 from .accounting import read_instruction
 from .answering import arrived, said_of_edit, said_of_query, said_of_undo, talk
-from .choosing import Found, Step, agrees, find, located, prompts_of, sightings
-from .followup_edits import OTHER
+from .choosing import Step, agrees, prompts_of
+from .finding import found_thing, known_thing, measured_at
 from .followup_things import UNNAMED
 from .followups import Followup, read_followup
-from .phrases import table
-from .references import described
 from .spelling import spelled
 from .standing import Standing
 
 DEICTIC = re.compile(
     r"\b(?:over there|there|this one|that one|the other one|that|this)\b", re.IGNORECASE
 )
+FEW = 3
+"""Robots of which it is measured exactly which is the nearest."""
 DECLINED = ("no", "nope", "nothing", "none", "no thanks", "never mind", "leave it")
 
 
 def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task, History]:
     """The next step of a turn, or the task and messages of a whole new instruction."""
-    standing = _standing(task)
+    standing = _standing(task, before)
     words, messages = task.instruction, turn[1:]
     followup = read_followup(words, standing)
     if standing is None and not before and followup.kind != "talk":
@@ -60,7 +59,7 @@ def _typed(words: str) -> str:
     return words
 
 
-def _standing(task: Task) -> Standing | None:
+def _standing(task: Task, before: History) -> Standing | None:
     """The plan that stands, with what this turn points at."""
     if task.standing is None:
         return None
@@ -73,6 +72,9 @@ def _standing(task: Task) -> Standing | None:
         place=place,
         size=task.size,
         metres_per_pixel=task.metres_per_pixel,
+        said=next(
+            (read_task(m.text).instruction for m in reversed(before) if isinstance(m, User)), ""
+        ),
     )
 
 
@@ -139,7 +141,8 @@ class _Steps:
     def _query(self, standing: Standing) -> Reply:
         """Measure what is asked, then say it."""
         query: dict[str, Any] = dict(self.followup.query or {})
-        measured, scale = self.done.get("measure"), self.task.metres_per_pixel
+        results = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"]
+        measured, scale = results[0] if results else None, self.task.metres_per_pixel
         robots, thing = query.get("robots", []), str(query.get("thing", ""))
         unnamed = all(label.startswith(UNNAMED) for _, label in standing.things)
         if thing.startswith("?") and unnamed and len(standing.things) == 1:
@@ -151,7 +154,7 @@ class _Steps:
         if measured is not None:
             data = json.loads(measured.text)
             if query["about"] == "nearest" and thing and thing not in standing.targets:
-                data = _seen_from((standing.centre or {}).get(thing, (0.0, 0.0)), thing, data)
+                return self._nearest_to(thing, data, standing, query)
             opened = [g.get("opening") is not None or bool(g.get("sides")) for g in standing.groups]
             return Reply(text=said_of_query(query | {"opened": opened}, data, scale))
         two = len(robots) == 2 and "each" not in query
@@ -161,13 +164,26 @@ class _Steps:
             return _calling("measure", {"a": ends[0], "b": ends[1]})
         return _calling("measure", {"a": "plan"})
 
+    def _nearest_to(
+        self, thing: str, data: dict[str, Any], standing: Standing, query: dict[str, Any]
+    ) -> Reply:
+        """Of the few whose places are nearest to another thing's centre the one that is."""
+        centre, sign = (standing.centre or {})[thing], -1 if query["most"] == "furthest" else 1
+        rows = sorted(data["each"], key=lambda r: sign * math.dist(r["place"], centre))[:FEW]
+        measured = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"][1:]
+        if len(measured) < len(rows):
+            return _calling("measure", {"a": f"r{rows[len(measured)]['robot']}", "b": thing})
+        ways = [json.loads(m.text).get("nearest_px", math.inf) for m in measured]
+        seen = [r | {"target": thing, "target_px": w} for r, w in zip(rows, ways, strict=True)]
+        return Reply(text=said_of_query(query, {"each": seen}, self.task.metres_per_pixel))
+
     def _change(self, standing: Standing) -> Reply:
         """Take back, find things, measure, edit; then move where asked, and say what came."""
         followup, failed = self.followup, self.done.get("edit_formation")
         ids: dict[str, str] = {}
         prompts: list[dict[str, Any]] = []
         for phrase in followup.things:
-            found = _known(phrase, standing, self.messages) or _found(
+            found = known_thing(phrase, standing, self.messages) or found_thing(
                 phrase, standing, self.messages
             )
             if isinstance(found, str):
@@ -218,10 +234,19 @@ class _Steps:
             for p in self.task.pointed
             if json.dumps(p["id"]) in named and p["id"] not in self.task.targets
         ]
-        arguments: dict[str, Any] = {"edits": json.loads(named)}
+        meant = [e for e in json.loads(named) if not self._stands_there(e)]
+        if not meant:
+            return Reply(text="The robots stand around that already; nothing is changed.")
+        arguments: dict[str, Any] = {"edits": meant}
         arguments |= {"targets": prompts} if prompts else {}
         arguments |= {"stay": list(self.followup.stay)} if self.followup.stay else {}
         return _calling("edit_formation", arguments)
+
+    def _stands_there(self, edit: dict[str, Any]) -> bool:
+        """Whether an edit moves all robots to the thing they stand about."""
+        assert self.standing is not None
+        alone = len(self.standing.groups) == 1 and "robots" not in edit
+        return alone and edit["kind"] == "target" and edit["to"] in self.standing.targets
 
     def _failed(self, failed: Result, *, taken_back: bool) -> Reply:
         """Nothing is changed: what was taken back for it is made again."""
@@ -279,97 +304,11 @@ class _Steps:
         return Reply(text=f"{told} {text}".strip())
 
 
-def _known(phrase: str, standing: Standing, messages: History) -> str | Step | None:
-    """The one known thing, none of the plan's, that fits words; what to do first, or None."""
-    others = {t: at for t, at in (standing.centre or {}).items() if t in standing.others()}
-    things = described([phrase])
-    if not others or len(things) != 1 or phrase.startswith(("other ", OTHER[1:])):
-        return None
-    return one_at(things[0].whole_query, others, messages)
-
-
-def one_at(
-    query: dict[str, Any], centres: Mapping[str, Sequence[float]], messages: History
-) -> str | Step | None:
-    """The one of some known things that fits a query, what to do first, or None."""
-    reply = located(query or None, messages)
-    if reply is None:
-        return Step("locate_object", {"query": query} if query else {})
-    ids = (measured_at(c["id"], centres, messages) for c in reply["candidates"])
-    fitting = list(dict.fromkeys(i for i in ids if i is not None))
-    return fitting[0] if len(fitting) == 1 else None
-
-
-def _found(phrase: str, standing: Standing, messages: History) -> Found | Step:
-    """The candidate that words for a thing mean, or what to do to learn it."""
-    if re.fullmatch(r"c[0-9]+", phrase):
-        return Found(phrase, phrase, ())
-    if f"?{phrase}" == OTHER or phrase.startswith("other "):
-        return _other(phrase, standing, messages)
-    found = find(described([phrase]), 1, messages)
-    return found if isinstance(found, Step) else found[0]
-
-
-def _other(phrase: str, standing: Standing, messages: History) -> Found | Step:
-    """The one like the target, or of another noun, that is none of the targets."""
-    label = next((label for name, label in standing.things if name in standing.targets), "")
-    things = described(
-        [phrase.removeprefix("other ") if f"?{phrase}" != OTHER else label or "thing"]
-    )
-    noun = things[0].noun if things else ""
-    query = table()["nouns"].get(noun, {}).get("query")
-    chosen = (
-        find((), 1, messages)
-        if any(m.name == "ask_user" for m in messages if isinstance(m, Result))
-        else None
-    )
-    if isinstance(chosen, list):
-        return chosen[0]
-    reply = located(query, messages)
-    if reply is None:
-        return Step("locate_object", {"query": query} if query else {})
-    mine = [
-        standing.centre[t] for t in standing.targets if standing.centre and t in standing.centre
-    ]
-    others = [
-        c for c in reply["candidates"] if not any(_holds(c["box"], centre) for centre in mine)
-    ]
-    if len(others) == 1:
-        return Found(others[0]["id"], label or "other one", ())
-    ids = [c["id"] for c in others]
-    return Step(
-        "ask_user",
-        {"question": "Which one is the other one? Answer with its number.", "candidates": ids},
-    )
-
-
-def _seen_from(centre: tuple[float, float], thing: str, data: dict[str, Any]) -> dict[str, Any]:
-    """What was measured of the plan, with distances to the centre of another thing."""
-    rows = [
-        row | {"target": thing, "target_px": round(math.dist(row["place"], centre), 1)}
-        for row in data["each"]
-    ]
-    return data | {"each": rows}
-
-
-def measured_at(
-    candidate: str, centres: Mapping[str, Sequence[float]], messages: History
-) -> str | None:
-    """The id of what is measured already where a candidate lies; None where nothing is."""
-    boxes = [c["box"] for c in sightings([candidate], messages)]
-    there = (t for t, at in centres.items() for box in boxes if _holds(box, (at[0], at[1])))
-    return next(there, None)
-
-
-def _holds(box: Sequence[float], point: tuple[float, float]) -> bool:
-    return box[0] <= point[0] <= box[2] and box[1] <= point[1] <= box[3]
-
-
 def _by_way(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) -> dict[str, Any]:
     """One robot's way out from its target, or in, as a way in x and y."""
-    by: Any = edit.get("by")
-    if not isinstance(by, dict):
+    if not isinstance(edit.get("by"), dict):
         return edit
+    by: dict[str, float] = edit["by"]
     row = next(r for r in measured["each"] if r["robot"] == str(edit["robot"]))
     centre = (standing.centre or {}).get(row.get("target", ""), (0.0, 0.0))
     x, y = row["place"][0] - centre[0], row["place"][1] - centre[1]

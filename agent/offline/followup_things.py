@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from .followup_edits import SIDE_OF, listed
 from .followup_words import Chunk
+from .phrases import phrase as thing_phrase
 from .phrases import table
 from .standing import Standing
 
@@ -24,6 +25,9 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
         kinds["there"] = ""
     if "lone" in kinds and len(standing.robots) == 1:
         kinds["team"] = ""
+    one = "first" in kinds and text[chunk.start : chunk.end].lower().endswith(" one")
+    if one and len(standing.things) > 1:  # the plan, or the thing
+        kinds["thing"] = standing.things[0][0]
     if "thing" in kinds:
         name = _id_of(str(kinds["thing"]), bool(kinds.pop("other", False)), standing)
         kinds["thing"] = name
@@ -40,12 +44,14 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
         return phrase if phrase[0] == "t" else f"?{phrase}"
     words = set(re.findall(r"[a-z]+", phrase)) - {"one", "the", "thing", "object", "of", "two"}
     places = [int(place) - 1 for w, place in table()["ordinals"].items() if w in words]
-    if len(places) == 1 and len(standing.things) > places[0]:  # "the first coin": in their order
-        return standing.things[places[0]][0]
+    rest = words - set(table()["ordinals"])
+    known = all(thing_phrase([word], 0) is not None for word in rest)
+    if len(places) == 1 and len(standing.things) > places[0] and known:
+        return standing.things[places[0]][0]  # "the first coin": in their order
     if other and len(standing.others()) == 1 and standing.targets:
         return standing.others()[0]
-    sides = [SIDE_OF.get(SIDES.get(word, word), "") for word in words]
-    side, rest = max(sides, default=""), {w for w in words if not SIDE_OF.get(SIDES.get(w, w))}
+    sides = {w: side for w in words if (side := SIDE_OF.get(SIDES.get(w, w)))}
+    side, rest = next(iter(sides.values()), ""), words - set(sides)
     named = [t for t, label in standing.things if rest <= {*re.findall(r"[a-z]+", label.lower())}]
     if not named and all(label.startswith(UNNAMED) for _, label in standing.things):
         named = [t for t, _ in standing.things] if side else []

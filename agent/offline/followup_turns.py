@@ -246,9 +246,9 @@ def _joined(first: Effect, then: Effect) -> list[Effect]:
     names = {"rotate": ("degrees",), "shift": ("dx", "dy")}.get(first["kind"], ("none",))
     if names[0] in then:
         return [then | {n: rounded(first[n] + then[n]) for n in names}]
-    a, b = first.get("by"), then.get("by")
-    if isinstance(a, list) and isinstance(b, list):
-        return [then | {"by": [rounded(a[0] + b[0]), rounded(a[1] + b[1])]}]
+    if isinstance(first.get("by"), list) and isinstance(then.get("by"), list):
+        (x, y), (u, v) = first["by"], then["by"]
+        return [then | {"by": [rounded(x + u), rounded(y + v)]}]
     return [first, then]
 
 

@@ -47,6 +47,7 @@ BEFORE_THINGS = frozenset(
         "near",
     )
 )
+PRONOUNS = frozenset(("them", "it", "they", "us", "you"))
 SIDE_WORDS = ("left", "right", "top", "bottom", "upper", "lower", "leftmost", "rightmost", "middle")
 
 
@@ -290,9 +291,11 @@ def _is_headed(words: Sequence[str]) -> bool:
 
 def _tells_otherwise(word: str) -> bool:
     """Whether a word says something else here than where or which a thing is."""
-    kinds = {"filler"} if thing_phrase([word], 0) else set(lexicon().get((word,), {"filler": ""}))
+    if thing_phrase([word], 0) or word in table()["determiners"]:
+        return word in PRONOUNS
+    kinds = set(lexicon().get((word,), {"filler": ""}))
     placing = {"filler", "dir", "side", "towards", "about", "onword", "relation", "it", "there"}
-    return not kinds & placing and word not in table()["determiners"]
+    return not kinds & placing or word in PRONOUNS
 
 
 @cache

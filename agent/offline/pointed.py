@@ -10,9 +10,9 @@ import numpy as np
 from ..first_message import Task
 from ..messages import History
 from .choosing import Step
-from .conversing import one_at
+from .finding import one_at
 from .followup_things import UNNAMED, resolved
-from .followup_words import chunks_of
+from .followup_words import Chunk, chunks_of
 from .references import described
 from .standing import Standing
 
@@ -27,11 +27,15 @@ def narrowed(task: Task, history: History) -> Task | Step:
     """
     centres = {str(p["id"]): _centre(p) for p in task.pointed}
     things = tuple((str(p["id"]), str(p.get("label") or UNNAMED[0])) for p in task.pointed)
-    contract = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}
+    contract: dict[str, Any] = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}
     standing = Standing("", contract, (), things=things, centre=centres)
     found = [resolved(c, task.instruction, standing) for c in chunks_of(task.instruction, standing)]
     named = [(c, str(c.kinds["thing"])) for c in found if "thing" in c.kinds]
-    if not named or (len(task.pointed) < 2 and named[0][1] not in centres):
+    if not named:
+        return task
+    if len(task.pointed) == 1 and _shows(task.instruction, named[0][0]):
+        named = [(named[0][0], str(task.pointed[0]["id"]))]
+    if len(task.pointed) < 2 and named[0][1] not in centres:
         return task
     if len({name for _, name in named}) > 1:
         return task
@@ -50,6 +54,11 @@ def narrowed(task: Task, history: History) -> Task | Step:
     words = f"{text[:start]}{THE_THING}{text[chunk.end :]}"
     chosen = tuple(p for p in task.pointed if p["id"] == name)
     return replace(task, instruction=words, pointed=chosen)
+
+
+def _shows(text: str, chunk: Chunk) -> bool:
+    """Whether a phrase means what is pointed at: "this bench"."""
+    return text[chunk.start : chunk.end].lower().startswith(("this ", "that "))
 
 
 def _centre(prompt: dict[str, Any]) -> tuple[float, float]:

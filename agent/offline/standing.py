@@ -14,6 +14,7 @@ class Standing:
         contract: of the plan, as JSON; lengths px.
         robots: ids in the order of positions.
         deployed: whether the robots stand there.
+        said: words of the turn before, whatever came of them.
         words, edits: what was said last that changed the plan, and the changes; none at first.
         things: ids and labels of what was measured.
         steps, redo: how many changes can be taken back, and how many made again.
@@ -37,6 +38,7 @@ class Standing:
     place: tuple[float, float] | None = None
     size: tuple[int, int] = (0, 0)
     metres_per_pixel: float | None = None
+    said: str = ""
 
     @classmethod
     def of(cls, facts: Mapping[str, Any], **told: Any) -> "Standing":

@@ -1,0 +1,90 @@
+"""Things that a follow-up names: among what is measured, or else in the picture."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..messages import History, Result
+from .choosing import Found, Step, find, located, sightings
+from .followup_edits import OTHER
+from .phrases import table
+from .references import described
+from .standing import Standing
+
+
+def known_thing(phrase: str, standing: Standing, messages: History) -> str | Step | None:
+    """The one known thing, none of the plan's, that fits words; what to do first, or None."""
+    others = {t: at for t, at in (standing.centre or {}).items() if t in standing.others()}
+    things = described([phrase])
+    vague = len(things) != 1 or not things[0].noun or things[0].unknown or things[0].refused
+    if not others or vague or phrase.startswith(("other ", OTHER[1:])):
+        return None
+    return one_at(things[0].whole_query, others, messages)
+
+
+def one_at(
+    query: dict[str, Any], centres: Mapping[str, Sequence[float]], messages: History
+) -> str | Step | None:
+    """The one of some known things that fits a query, what to do first, or None."""
+    reply = located(query or None, messages)
+    if reply is None:
+        return Step("locate_object", {"query": query} if query else {})
+    ids = (measured_at(c["id"], centres, messages) for c in reply["candidates"])
+    fitting = list(dict.fromkeys(i for i in ids if i is not None))
+    return fitting[0] if len(fitting) == 1 else None
+
+
+def found_thing(phrase: str, standing: Standing, messages: History) -> Found | Step:
+    """The candidate that words for a thing mean, or what to do to learn it."""
+    if re.fullmatch(r"c[0-9]+", phrase):
+        return Found(phrase, phrase, ())
+    if f"?{phrase}" == OTHER or phrase.startswith("other "):
+        return _other(phrase, standing, messages)
+    found = find(described([phrase]), 1, messages)
+    return found if isinstance(found, Step) else found[0]
+
+
+def _other(phrase: str, standing: Standing, messages: History) -> Found | Step:
+    """The one like the target, or of another noun, that is none of the targets."""
+    label = next((label for name, label in standing.things if name in standing.targets), "")
+    things = described(
+        [phrase.removeprefix("other ") if f"?{phrase}" != OTHER else label or "thing"]
+    )
+    noun = things[0].noun if things else ""
+    query = table()["nouns"].get(noun, {}).get("query")
+    chosen = (
+        find((), 1, messages)
+        if any(m.name == "ask_user" for m in messages if isinstance(m, Result))
+        else None
+    )
+    if isinstance(chosen, list):
+        return chosen[0]
+    reply = located(query, messages)
+    if reply is None:
+        return Step("locate_object", {"query": query} if query else {})
+    mine = [
+        standing.centre[t] for t in standing.targets if standing.centre and t in standing.centre
+    ]
+    others = [
+        c for c in reply["candidates"] if not any(_holds(c["box"], centre) for centre in mine)
+    ]
+    if len(others) == 1:
+        return Found(others[0]["id"], label or "other one", ())
+    ids = [c["id"] for c in others]
+    return Step(
+        "ask_user",
+        {"question": "Which one is the other one? Answer with its number.", "candidates": ids},
+    )
+
+
+def measured_at(
+    candidate: str, centres: Mapping[str, Sequence[float]], messages: History
+) -> str | None:
+    """The id of what is measured already where a candidate lies; None where nothing is."""
+    boxes = [c["box"] for c in sightings([candidate], messages)]
+    there = (t for t, at in centres.items() for box in boxes if _holds(box, (at[0], at[1])))
+    return next(there, None)
+
+
+def _holds(box: Sequence[float], point: tuple[float, float]) -> bool:
+    return box[0] <= point[0] <= box[2] and box[1] <= point[1] <= box[3]
