@@ -6,6 +6,7 @@ written down before anything follows from it, so that the log opens again after 
 
 import gc
 import hashlib
+import io
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from typing import Any, TypedDict
 from pydantic import ValidationError
 
 from ..tools.context import Artefacts, Context, Services, Settings
+from ..tools.draw import draw_plan
 from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture, load_picture, picture_file, picture_from_file
 from ..tools.perception.target_prompt import TargetPrompt
@@ -91,6 +93,15 @@ class Run:
     def __repr__(self) -> str:
         """In short: a run holds the whole conversation."""
         return f"Run({self.report.status!r}, plan_id={self.report.plan_id!r})"
+
+    def _repr_png_(self) -> bytes | None:
+        """The plan that stands, for notebooks."""
+        node, file = self.world.plans.get(self.report.plan_id or ""), io.BytesIO()
+        if node is None or self.world.is_void(node.plan):
+            return None
+        title = self.report.instruction
+        draw_plan(self.context.picture, self.world, node.plan, title).save(file, "PNG")
+        return file.getvalue()
 
     @property
     def steps(self) -> tuple[Step, ...]:

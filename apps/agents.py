@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from opentelemetry.trace import Tracer
 
 
+CONVERSE = "converse"
+
+
 @contextmanager
 def agent_of(
     model: str | Model,
@@ -26,8 +29,16 @@ def agent_of(
     prompts: Path | None,
     limit: list[str] | None,
     policies: list[str] | None,
+    *,
+    talks: bool = False,
 ) -> Generator[Agent, None, None]:
-    """The agent that was chosen; the offline planner goes without a prompt."""
+    """The agent that was chosen; the offline planner goes without a prompt.
+
+    Args:
+        talks: whether by default a language model is given the prompt for conversations.
+    """
+    if talks and prompt is None and planner is None and model != "offline":
+        prompt = CONVERSE
     limits, policy = arguments.limits(limit), arguments.policy(policies)
     with tracer_of_environment() as tracer:
         agent = Agent(

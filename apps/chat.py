@@ -89,9 +89,9 @@ def chat(
     rest = (planner, base_url, prompt, prompts, limit, rules)
     if auto and plan_only:
         raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
-    with agent_of(model, *rest) as agent, Folder(out) as home:
+    with agent_of(model, *rest, talks=True) as agent, Folder(out) as home:
         service, lines = Service(agent, store_at(store), auto=auto), _lines(script, as_json)
-        talk = Talk(service, home, lambda name: agent_of(name, *rest))
+        talk = Talk(service, home, lambda name: agent_of(name, *rest, talks=True))
         raise typer.Exit(asyncio.run(_serve(talk, begin, lines, plain=plain, as_json=as_json)))
 
 

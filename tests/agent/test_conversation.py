@@ -138,7 +138,10 @@ def test_it_works_inside_a_running_event_loop(session: Session) -> None:
     async def notebook() -> Run:
         return session.say("a bit further out")
 
-    assert asyncio.run(notebook()).report.status == "planned"
+    shown = asyncio.run(notebook())
+    assert shown.report.status == "planned"
+    assert (shown._repr_png_() or b"").startswith(b"\x89PNG")
+    assert repr(shown) == f"Run('planned', plan_id={shown.report.plan_id!r})"
 
 
 def test_commands_before_anything_was_said_are_refused(picture: Picture) -> None:
