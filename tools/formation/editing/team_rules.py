@@ -136,7 +136,8 @@ def _loosened(part: Part, px: float | None) -> Part:
     group = part.group
     if px is None and not group.solves_clearance:
         return part
-    demands = {"pitch": None, "max_gap": None, "min_spacing": px or group.min_spacing}
+    demands: dict[str, object] = {"pitch": None, "max_gap": None}
+    demands["min_spacing"] = px or group.min_spacing
     if group.solves_clearance:
         demands["clearance"] = exact_clearance(group, part.offset - part.radius)
     return replace(part, group=part.valid_group(**demands))
