@@ -4,6 +4,7 @@ Frame: image pixels, x right, y down.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import ToolError
 from ...geometry.outline import FloatArray, distances
-from ..contract import DIRECTIONS, ONLY_IN, OUTSIDE, has_default_clearance
+from ..contract import DIRECTIONS, ONLY_IN, OUTSIDE, exact_clearance, has_default_clearance
 from ..placement.group_conflicts import Stand
 from .draft import Draft
 from .edit_kinds import Arrange, Merge, Target
@@ -20,6 +21,8 @@ from .moving import rigid
 from .part import IntArray, Part, check_known, closed_up, skipped, slots_for, taken
 
 Leave = Callable[[Part, FloatArray], Part]
+KEEP_DISTANCE = frozenset({"around", "cage", "along"})
+"""Round another thing these keep the distance they have, where there is room for it."""
 KEPT = ("targets", "heading", "min_spacing", "max_gap", "pitch")
 """What an arrangement of another kind takes over, where it can."""
 EITHER = (
@@ -115,7 +118,13 @@ def _taken_to(part: Part, to: str) -> Part:
         there = replace(part, group=group.model_copy(update={"targets": (to,)}))
         moved = rigid(part, np.eye(2), part.centre, there.centre)
         return moved.to(moved.points, targets=(to,))
-    return part.anew(part.demanding(_retargeted(part, to)))
+    demands = _retargeted(part, to)
+    if demands.get("clearance") is None and group.relation in KEEP_DISTANCE:
+        outline = part.site.outlines[group.targets[0]].filled
+        here = float(distances(outline, part.points).min()) - part.radius
+        with suppress(ToolError):  # there may be less room there
+            return part.anew(part.demanding(demands | {"clearance": exact_clearance(group, here)}))
+    return part.anew(part.demanding(demands))
 
 
 def _side_of(part: Part) -> str:
