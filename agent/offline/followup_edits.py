@@ -301,7 +301,7 @@ def heading(slots: Slots, said: Said) -> Effects:
         return [
             {"kind": "heading", "to": {"towards": "away", "away": "towards"}[to] if backs else to}
         ]
-    return [{"kind": "heading", "to": float(slots.get("angle", slots.get("num", [0]))[0])}]
+    return [{"kind": "heading", "to": float(slots["angle"][0])}]
 
 
 def keepout(slots: Slots, said: Said) -> Effects:

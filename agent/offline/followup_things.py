@@ -48,7 +48,7 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
     known = all(thing_phrase([word], 0) is not None for word in rest)
     if len(places) == 1 and len(standing.things) > places[0] and known:
         return standing.things[places[0]][0]  # "the first coin": in their order
-    if other and len(standing.others()) == 1 and standing.targets:
+    if other and known and len(standing.others()) == 1 and standing.targets:
         return standing.others()[0]
     sides = {w: side for w in words if (side := SIDE_OF.get(SIDES.get(w, w)))}
     side, rest = next(iter(sides.values()), ""), words - set(sides)
@@ -59,7 +59,6 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
     if side and len(placed) > 1:
         x, sign = int(side in ("top", "bottom")), -1 if side in ("left", "top") else 1
         named = [max(placed, key=lambda t: sign * placed[t][x])]
-        other = other or len(standing.things) == 1
     elif side:
         named = []
     named = [t for t in named if words and not ((other or side) and t in standing.targets)]

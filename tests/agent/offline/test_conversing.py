@@ -1,0 +1,132 @@
+"""Dialogues with the offline planner about a plan that stands, with the real tools."""
+
+import numpy as np
+import pytest
+from formup.agent.agent import Agent
+from formup.agent.outcomes import Paused
+from formup.agent.session import Run
+from formup.tools.context import Settings
+from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.target_prompt import TargetPrompt
+
+RED, BLUE = (250, 220), (560, 300)
+PLAN = Settings(may_deploy=False)
+
+
+@pytest.fixture(scope="module")
+def picture() -> Picture:
+    """A red disc and a blue one, 45 and 40 px in radius."""
+    pixels = np.full((432, 768, 3), 200, np.uint8)
+    y, x = np.mgrid[:432, :768]
+    for (cx, cy), radius, colour in ((RED, 45, (200, 40, 40)), (BLUE, 40, (40, 60, 210))):
+        pixels[(x - cx) ** 2 + (y - cy) ** 2 < radius**2] = colour
+    return picture_from_array(pixels)
+
+
+@pytest.fixture
+def ring(picture: Picture) -> Run:
+    """Eight robots around the red disc, planned only."""
+    pointed = [TargetPrompt(points=(RED,))]
+    return Agent().run(picture, "surround it with 8 robots", settings=PLAN, pointed=pointed)
+
+
+def say(run: Run, *lines: str) -> Run:
+    for words in lines:
+        run = Agent().say(run, words, settings=PLAN)
+    return run
+
+
+def distances(run: Run, centre: tuple[int, int] = RED) -> list[float]:
+    return [float(np.hypot(*np.subtract(at, centre))) for at in run.report.positions or ()]
+
+
+def test_a_change_is_a_child_of_the_plan_that_stood(ring: Run) -> None:
+    out = say(ring, "a bit further out")
+    assert (out.report.status, out.report.parent) == ("planned", ring.report.plan_id)
+    assert min(distances(out)) > max(distances(ring))
+    more = say(out, "hm, a bit more")
+    assert min(distances(more)) > max(distances(out))
+    back = say(more, "back to the first one")
+    assert back.report.plan_id == ring.report.plan_id
+
+
+def test_the_other_way_turns_as_far_on_the_other_side(ring: Run) -> None:
+    turned = say(ring, "turn it 20 degrees")
+    other = say(turned, "the other way")
+    straight = say(ring, "turn it 20 degrees counterclockwise")
+    assert other.report.parent == turned.report.plan_id
+    places = np.asarray(other.report.positions)
+    assert places == pytest.approx(np.asarray(straight.report.positions), abs=1.0)
+
+
+def test_the_only_other_thing_in_the_picture_is_the_other_one(ring: Run) -> None:
+    moved = say(ring, "no, the other one")
+    assert moved.report.status == "planned"
+    assert max(distances(moved, BLUE)) < 100
+    half = say(moved, "half of them back to the first one")
+    near = [d < 100 for d in distances(half)]
+    assert (sum(near), len(near)) == (4, 8)
+
+
+def test_one_robot_goes_out_from_its_thing(ring: Run) -> None:
+    moved = say(ring, "robot 2 further out by 20 px")
+    ways = [b - a for a, b in zip(distances(ring), distances(moved), strict=True)]
+    assert ways[1] == pytest.approx(20, abs=0.5)
+    assert ways[:1] + ways[2:] == pytest.approx([0.0] * 7, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("how many robots are there?", "8 robots: 1, 2, 3, 4, 5, 6, 7 and 8."),
+        ("are they all there?", "No: no robot has moved to this plan yet; say go."),
+        ("thanks", "You are welcome."),
+        ("robot 9 left", "There is no robot 9: there are robots 1 to 8. Name one of those."),
+    ],
+)
+def test_what_changes_nothing_is_answered(ring: Run, words: str, told: str) -> None:
+    answered = say(ring, words)
+    assert (answered.report.status, answered.report.plan_id) == ("answered", ring.report.plan_id)
+    assert answered.report.message == told
+
+
+def test_distances_are_those_that_are_measured(ring: Run) -> None:
+    told = say(ring, "how far is robot 4?").report.message
+    assert told.startswith("Robot 4 is ")
+    assert float(told.split(" ")[3]) == pytest.approx(distances(ring)[3] - 45, abs=1.5)
+
+
+def test_a_question_is_answered_by_the_number_of_an_option(ring: Run) -> None:
+    asked = say(ring, "more robots")
+    assert isinstance(asked.outcome, Paused)
+    assert "2: two more robots" in asked.report.message
+    answered = Agent().resume(asked, answer="2")
+    assert len(answered.report.positions or ()) == 10
+
+
+def test_an_answer_completes_what_was_asked_about(ring: Run) -> None:
+    asked = say(ring, "20 px")
+    answered = Agent().resume(asked, answer="further out")
+    assert min(distances(answered)) - max(distances(ring)) == pytest.approx(20, abs=1.0)
+
+
+def test_what_cannot_be_certified_changes_nothing(ring: Run) -> None:
+    failed = say(ring, "move it 400 px to the left")
+    assert failed.report.status == "impossible"
+    assert failed.world.current == ring.report.plan_id
+
+
+def test_a_sequence_is_confirmed_step_by_step(ring: Run) -> None:
+    first = say(ring, "first further out, then two more")
+    assert isinstance(first.outcome, Paused)
+    assert min(distances(first)) > max(distances(ring))
+    assert len(first.world.plan().plan.formation.positions) == 8
+    assert len(Agent().resume(first, answer="yes").report.positions or ()) == 10
+
+
+def test_words_choose_among_several_things_pointed_at(picture: Picture) -> None:
+    pointed = [TargetPrompt(points=(RED,)), TargetPrompt(id="t2", points=(BLUE,))]
+    for words, centre in (("put 6 robots around the right one", BLUE), ("6 robots around t1", RED)):
+        run = Agent().run(picture, words, settings=PLAN, pointed=pointed)
+        assert run.report.status == "planned"
+        assert max(distances(run, centre)) < 100
