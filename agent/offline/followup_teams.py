@@ -178,7 +178,7 @@ def split(slots: Slots, said: Said) -> Effects:
         return None
     if named and not slots.has("rest", "portion", "split"):
         return None if "num" in slots else place(slots, said)
-    some = named or _how_many(slots, said)
+    some = named or _number_going(slots, said)
     fresh = PLACING.search(said.words) and not slots.has("rest", "here", "stay")
     if some is None or (fresh and not named):
         return None
@@ -198,7 +198,7 @@ def split(slots: Slots, said: Said) -> Effects:
     return [moved | {"robots": some} | stays]
 
 
-def _how_many(slots: Slots, said: Said) -> int | None:
+def _number_going(slots: Slots, said: Said) -> int | None:
     """How many of the robots go elsewhere; None where that is not said, or not so many there."""
     if "portion" in slots:
         part = said.count // SHARES[slots["portion"][0]]

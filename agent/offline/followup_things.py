@@ -50,7 +50,7 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
         return standing.things[places[0]][0]  # "the first coin": in their order
     if other and known and len(standing.others()) == 1 and standing.targets:
         return standing.others()[0]
-    sides = {w: side for w in words if (side := SIDE_OF.get(SIDES.get(w, w)))}
+    sides = {w: side for w in words if (side := SIDE_OF.get(str(SIDES.get(w, w))))}
     side, rest = next(iter(sides.values()), ""), words - set(sides)
     named = [t for t, label in standing.things if rest <= {*re.findall(r"[a-z]+", label.lower())}]
     if not named and all(label.startswith(UNNAMED) for _, label in standing.things):

@@ -233,11 +233,11 @@ def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
     if len(found) < len(back):
         return [{"kind": "undo", "steps": 1}, *edits]
     if len(found) == len(edits) == 1:
-        return _joined(found[0], edits[0])
+        return _merged(found[0], edits[0])
     return [*found, *edits]
 
 
-def _joined(first: Effect, then: Effect) -> list[Effect]:
+def _merged(first: Effect, then: Effect) -> list[Effect]:
     """Two edits as one where they are of one kind."""
     if first["kind"] != then["kind"] or first.get("robot") != then.get("robot"):
         return [first, then]

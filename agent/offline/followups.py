@@ -124,7 +124,7 @@ def _said_nothing(line: Line, *, there: bool) -> Followup:
     """Talk, or yes and no to nothing that was asked."""
     if line.denies:
         options = ("undo", "a bit further out", "a bit closer")
-        return _asked(line, "What should be different? Nothing was asked.", options)
+        return _questioned(line, "What should be different? Nothing was asked.", options)
     if "thanks" in line.led and "ok " not in line.led:
         return Followup("talk", about="thanks")
     if "hello" in line.led:
@@ -144,7 +144,7 @@ def _without_plan(line: Line, clauses: Sequence[Clause] | None) -> Followup:
     return Followup("refuse", text=NO_PLAN)
 
 
-def _asked(line: Line, question: str, options: tuple[str, ...] = ()) -> Followup:
+def _questioned(line: Line, question: str, options: tuple[str, ...] = ()) -> Followup:
     """A question with its options; undo is one only where something was changed."""
     offered = tuple(o for o in options if line.standing.edits or o != "undo")
     return Followup("ask", text=question, options=offered)
@@ -194,15 +194,15 @@ def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
     alone = [e["kind"] for e in edits if "group" not in e and not e.get("robots")]
     if {"out", "in"} <= {*alone}:
         says = "says both further out and closer. Which?"
-        return _asked(line, f'"{line.words}" {says}', ("further out", "closer"))
+        return _questioned(line, f'"{line.words}" {says}', ("further out", "closer"))
     stated = [k for k in ("distance", "count", "sides", "side") if alone.count(k) > 1]
     if stated:
-        return _asked(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
+        return _questioned(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
     parted = [e["to"] for e in edits if e["kind"] == "target" and e.get("robots")]
     if len(set(parted)) < len(parted):
-        return _asked(line, f'"{line.words}": which robots are to go, and where? Name them.')
+        return _questioned(line, f'"{line.words}": which robots are to go, and where? Name them.')
     if alone.count("target") > 1:
-        return _asked(line, f'"{line.words}" names several things. Around which one?')
+        return _questioned(line, f'"{line.words}" names several things. Around which one?')
     return None
 
 
@@ -212,13 +212,13 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
     stays = [r for e in effects if e["kind"] == "stay" for r in e["robots"]] + [*line.excepted]
     if stays and not edits:
         if not line.standing.edits:
-            return _asked(line, f"Robot {listed(stays)} stays. What should the others do?")
+            return _questioned(line, f"Robot {listed(stays)} stays. What should the others do?")
         undo, edits = 1, [dict(e) for e in line.standing.edits]
     if "rest" in kinds:
         moved = ("out", "in", "rotate", "shift", "scale", "spacing")
         if not edits or any(e["kind"] in moved for e in edits):
             which = "which robots are to move, and which stay? Name them by number."
-            return _asked(line, f'"{line.words}": {which}')
+            return _questioned(line, f'"{line.words}": {which}')
         edits = [e | {"stay": True} if e["kind"] == "target" else e for e in edits]
     query = next((e for e in effects if e["kind"] == "query"), None)
     to = next((e["to"] for e in effects if e["kind"] == "undo" and "to" in e), "")
@@ -275,12 +275,12 @@ def _not_understood(line: Line) -> Followup:
         clear = [known] if known and _is_clear(line, known) else []
     if not clear:
         options = ("undo", "a bit further out", "turn it 30 degrees")
-        return _asked(line, f"I do not know what to do with {quoted}. {PLAIN}", options)
+        return _questioned(line, f"I do not know what to do with {quoted}. {PLAIN}", options)
     words = [[line.words[c.start : c.end] for c in part] for part in clear]
     understood = ", ".join(" ".join(w for w in part if w not in ",.;!?") for part in words)
     advice = "Say it another way, or leave it out."
     question = f'"{understood}" is clear; I do not know what to do with {quoted}. {advice}'
-    return _asked(line, question, (understood,))
+    return _questioned(line, question, (understood,))
 
 
 def _is_clear(line: Line, chunks: Sequence[Chunk]) -> bool:
