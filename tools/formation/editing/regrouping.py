@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 
 from ...errors import ToolError
 from ...geometry.outline import FloatArray, distances
-from ..contract import DIRECTIONS, ONLY_IN, OUTSIDE, exact_clearance, has_default_clearance
+from ..contract import DIRECTIONS, ONLY_IN, OUTSIDE, Group, exact_clearance, has_default_clearance
 from ..placement.group_conflicts import Stand
 from .draft import Draft
 from .edit_kinds import Arrange, Merge, Target
 from .moving import rigid
-from .part import IntArray, Part, check_known, closed_up, skipped, slots_for, taken
+from .part import ON_CURVE, IntArray, Part, check_known, closed_up, skipped, slots_for, taken
 
 Leave = Callable[[Part, FloatArray], Part]
-KEEP_DISTANCE = frozenset({"around", "cage", "along"})
-"""Round another thing these keep the distance they have, where there is room for it."""
 KEPT = ("targets", "heading", "min_spacing", "max_gap", "pitch")
 """What an arrangement of another kind takes over, where it can."""
 EITHER = (
@@ -118,13 +116,20 @@ def _taken_to(part: Part, to: str) -> Part:
         there = replace(part, group=group.model_copy(update={"targets": (to,)}))
         moved = rigid(part, np.eye(2), part.centre, there.centre)
         return moved.to(moved.points, targets=(to,))
-    demands = _retargeted(part, to)
-    if demands.get("clearance") is None and group.relation in KEEP_DISTANCE:
-        outline = part.site.outlines[group.targets[0]].filled
-        here = float(distances(outline, part.points).min()) - part.radius
-        with suppress(ToolError):  # there may be less room there
-            return part.anew(part.demanding(demands | {"clearance": exact_clearance(group, here)}))
-    return part.anew(part.demanding(demands))
+    return _as_near(part, part.demanding(_retargeted(part, to)))
+
+
+def _as_near(part: Part, group: Group) -> Part:
+    """A group round another thing, as far from it as from the one before where there is room."""
+    usual = group.clearance
+    if usual is not None and group.relation in ON_CURVE and group.pitch is None:
+        exact = exact_clearance(group, part.offset - part.radius)
+        with suppress(ToolError):
+            there = part.anew(group.model_copy(update={"clearance": exact}))
+            for near in (there.to(there.points, clearance=usual), there):
+                if near.certified:
+                    return near
+    return part.anew(group)
 
 
 def _side_of(part: Part) -> str:
@@ -153,7 +158,7 @@ def targeted(draft: Draft, edit: Target) -> Draft:
         for k, part in enumerate(others):
             if (part.group.relation, part.group.targets) == (group.relation, group.targets):
                 return left.with_each((k,), lambda part: more_of(part, len(going), coming))
-    return draft.with_parts((*others, _beside_others(coming, others).anew(group)))
+    return draft.with_parts((*others, _as_near(_beside_others(coming, others), group)))
 
 
 def _beside_others(part: Part, others: Sequence[Part]) -> Part:

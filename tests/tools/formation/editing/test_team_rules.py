@@ -202,6 +202,24 @@ def test_as_many_as_fit_so_far_apart_stay_as_far_from_the_thing(
     assert "too_close" in {f.kind for f in one_more.findings}
 
 
+@pytest.mark.parametrize("relation", ["around", "cage", "along"])
+@pytest.mark.parametrize("px", [14, 24])
+@pytest.mark.parametrize("robots", [None, 3])
+def test_the_same_around_another_thing_is_as_near_to_it(
+    relation: str, px: float, robots: int | None
+) -> None:
+    more = {"side": "left"} if relation == "along" else {}
+    plan = after(standing(relation, **more), {"kind": "distance", "px": px}).plan
+    usual = standing(relation, **more).formation.contract.groups[0].clearance
+    group = plan.formation.contract.groups[0].model_copy(update={"clearance": usual})
+    contract = plan.formation.contract.model_copy(update={"groups": (group,)})
+    plan = make_plan(contract, SITE, "s", plan.formation.points)
+    found = after(plan, {"kind": "target", "to": "t2", "robots": robots})
+    assert found.plan.verdict.certified
+    there = found.plan.formation.points[-(robots or 8) :]
+    assert distances(POST.filled, there).min() - RADIUS == pytest.approx(px, abs=0.2)
+
+
 @pytest.mark.parametrize("relation", ["around", "cage", "corners", "inside", "centre"])
 @pytest.mark.parametrize("start", ["between", "centre"])
 def test_from_between_or_the_middle_to_about_the_first_or_the_one_named(
