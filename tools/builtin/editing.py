@@ -13,7 +13,7 @@ from pydantic import WithJsonSchema
 from ..context import Context
 from ..errors import ToolError
 from ..formation.editing.edit_kinds import Edit
-from ..formation.editing.edits import Edited, edited_all
+from ..formation.editing.edits import Edited, edited
 from ..formation.plan import Plan
 from ..formation.units import with_metres
 from ..perception.target_prompt import TargetPrompt
@@ -86,7 +86,7 @@ def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]
     Raises:
         ToolError: an edit makes no sense, or what comes of it is not certified: nothing changed.
     """
-    made = edited_all(plan, edits, world.whole_site, world.version_of, stay)
+    made = edited(plan, edits, world.whole_site, world.version_of, stay)
     verdict = made.plan.verdict
     if not verdict.certified:
         findings = [finding.sentence for finding in verdict.findings]

@@ -11,14 +11,14 @@ import numpy as np
 
 from ...errors import ToolError
 from ...geometry.outline import FloatArray, distances
-from ...geometry.sampling import along_curve, corner_points, nearest
+from ...geometry.sampling import corner_points, nearest
 from ..contract import MAX_LENGTH, OUTSIDE, exact_clearance
 from ..placement.pitch import pitch_places
 from .edit_forms import DECIMALS
 from .edit_kinds import Offset, SideOnly
 from .moving import rigid
 from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
-from .respacing import Track, feet_on, moved_out, pushed, respaced, track, track_at
+from .respacing import Track, feet_on, moved_out, pushed, track, track_at
 
 
 def _offset(part: Part, edit: Offset) -> Part:
@@ -53,9 +53,7 @@ def _offset(part: Part, edit: Offset) -> Part:
     moved = part.to(_beyond(part, here, by, (least, greatest)), clearance=(least, greatest))
     if here is None or group.pitch is not None or moved.certified or not part.certified:
         return moved
-    there = track_at(moved.group, part.site, part.radius, here.offset + by)
-    slots, takes = respaced(there, moved.points, len(moved.points))
-    even = replace(moved, points=slots[takes])
+    even = moved.evenly_at(moved.group, here.offset + by)
     return even if even.certified else moved
 
 
@@ -121,10 +119,7 @@ def _to_side(part: Part, edit: SideOnly) -> Part:
     other = {"relation": "along", "side": edit.side, "edges": None, "facing": None}
     gone = dict.fromkeys((*RING, "max_gap"))
     along = group.model_copy(update={**other, **gone, **without_pitch(group)})
-    there = track_at(along, part.site, part.radius, part.offset)
-    check_room(part, there)
-    slots = along_curve(there.curve, len(part.points))
-    return replace(part, group=along, points=slots[taken(part.points, slots)])
+    return part.evenly_at(along, part.offset)
 
 
 RULES: Mapping[str, Callable[..., Part]] = {

@@ -8,8 +8,6 @@ places themselves are new, the least sum of squared ways decides who takes which
 from collections.abc import Callable, Collection, Sequence
 from itertools import count
 
-import numpy as np
-
 from ...errors import ToolError
 from ...geometry.cages.budget import search_budget
 from ..checking.verdict import Verdict
@@ -21,30 +19,13 @@ from .draft import Draft, draft_of
 from .edit_kinds import Count, Edit, Spacing
 from .edit_rules import RULES
 from .off_things import off_things
-from .part import IntArray
 from .ring_rules import RING_RULES
 from .staying import held, holding, moved_in, settled
 from .team_rules import TEAM_RULES
 
 
-class Diff(Value):
-    """What edits change; robots are numbered from 1 in the order of the plans' `points`.
-
-    Attributes:
-        was: for each robot of the new plan its number in the old one; None for one added.
-        moved_px: how far each has to go; None for one added.
-        added: new numbers of robots that were not there.
-        removed: old numbers of robots that are not there any more.
-    """
-
-    was: tuple[int | None, ...]
-    moved_px: tuple[float | None, ...]
-    added: tuple[int, ...]
-    removed: tuple[int, ...]
-
-
 class Edited(Value):
-    """The plan after edits, certified or with findings, and what they changed.
+    """The plan after edits, certified or with findings.
 
     Attributes:
         robots: for each of the new plan's `points` the id of the robot that goes there; None for
@@ -53,16 +34,10 @@ class Edited(Value):
 
     plan: Plan
     parent: str
-    diff: Diff
     robots: tuple[str | None, ...]
 
 
-def edited(plan: Plan, edit: Edit, site: Site, version: Callable[[Contract], str]) -> Edited:
-    """The plan, certified or not, after an edit; see `edited_all`."""
-    return edited_all(plan, (edit,), site, version)
-
-
-def edited_all(
+def edited(
     plan: Plan,
     edits: Sequence[Edit],
     site: Site,
@@ -93,10 +68,9 @@ def edited_all(
         after = make_plan(contract, site, version(contract), draft.points)
         after = off_things(after, draft, plan.formation.points, {edit.kind for edit in edits})
     after = after.model_copy(update={"verdict": _called_by_id(after.verdict, draft)})
-    was = draft.was
     names = plan.formation.robot_of_place
-    robots = tuple(None if i < 0 else names[i] for i in map(int, was))
-    return Edited(plan=after, parent=plan.id, diff=_diff(plan, after, was), robots=robots)
+    robots = tuple(None if i < 0 else names[i] for i in map(int, draft.was))
+    return Edited(plan=after, parent=plan.id, robots=robots)
 
 
 def _edited_by(draft: Draft, edits: Sequence[Edit]) -> Draft:
@@ -135,16 +109,3 @@ def _called_by_id(verdict: Verdict, draft: Draft) -> Verdict:
     )
     notes = tuple(dict.fromkeys((*verdict.notes, *draft.notes)))
     return verdict.model_copy(update={"findings": findings, "notes": notes})
-
-
-def _diff(before: Plan, after: Plan, was: IntArray) -> Diff:
-    old, new = before.formation.points, after.formation.points
-    moved = np.linalg.norm(new - old[was], axis=1)
-    kept = was >= 0
-    gone = np.setdiff1d(np.arange(len(old)), was)
-    return Diff(
-        was=tuple(int(i) + 1 if k else None for i, k in zip(was, kept, strict=True)),
-        moved_px=tuple(round(float(d), 3) if k else None for d, k in zip(moved, kept, strict=True)),
-        added=tuple(int(i) + 1 for i in np.flatnonzero(~kept)),
-        removed=tuple(int(i) + 1 for i in gone),
-    )

@@ -6,12 +6,14 @@ own and a note says so; lengths that were stated are not given up. Frame: image 
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point
 
+from ...errors import ToolError
 from ...geometry.outline import FloatArray, distances
 from ..checking.finding import Finding
 from ..contract import MAX_LENGTH, SideName, has_default_clearance
@@ -22,7 +24,6 @@ from .draft import Draft
 from .edit_forms import DECIMALS, Affine, form_after
 from .edit_kinds import Mirror, Rotate, Scale, Shift
 from .part import ON_CURVE, Part, at_points, free_targets, taken
-from .respacing import respaced, track_at
 
 HELD_TO = {
     "wrong_side": "on their side of {thing}",
@@ -134,15 +135,13 @@ def _freed(part: Part) -> Part:
 
 def _on_curve(image: Part, old: Part) -> Part:
     """A mirrored group on its curve where its target is not its own mirror image, if that does."""
-    group, count = image.group, len(image.points)
+    group = image.group
     if group.relation not in ON_CURVE or group.spacing == "free" or group.pitch is not None:
         return image
-    there = track_at(group, image.site, image.radius, old.track(count).offset)
-    if not there.curve.lines:
-        return image
-    slots, takes = respaced(there, image.points, count)
-    evenly = replace(image, points=slots[takes])
-    return evenly if evenly.certified else image
+    with suppress(ToolError):
+        evenly = image.evenly_at(group, old.track(len(old.points)).offset)
+        return evenly if evenly.certified else image
+    return image
 
 
 def _beside(part: Part, old: Part) -> Part:

@@ -141,17 +141,21 @@ class Part:
         slots = there.placed(len(self.points))
         return replace(there, points=slots[taken(self.points, slots)])
 
+    def evenly_at(self, group: Group, offset: float) -> "Part":
+        """Its robots evenly on the curve of other demands at an offset of their centres, px."""
+        there = track_at(group, self.site, self.radius, offset)
+        check_room(self, there)
+        slots, takes = respaced(there, self.points, len(self.points))
+        if not there.curve.closed:
+            takes = taken(self.points, slots)
+        return replace(self, group=group, points=slots[takes])
+
     def on_ring(self, group: Group) -> "Part":
         """Its robots evenly on the curve of other demands, as far from the target as they are."""
         if group.pitch is not None:
             return self.anew(group)
         least, greatest = group.offsets(self.radius)
-        there = track_at(group, self.site, self.radius, min(max(self.offset, least), greatest))
-        check_room(self, there)
-        slots, takes = respaced(there, self.points, len(self.points))
-        if not there.curve.closed:
-            takes = taken(self.points, slots)
-        ring = replace(self, group=group, points=slots[takes])
+        ring = self.evenly_at(group, min(max(self.offset, least), greatest))
         return ring if ring.certified else self.anew(group)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from ...errors import ToolError
 from ...geometry.interior import ground
 from ...geometry.outline import FloatArray
-from ...geometry.sampling import along_curve, nearest
+from ...geometry.sampling import nearest
 from ..contract import (
     LEAST_SOLVED,
     MAX_LENGTH,
@@ -23,7 +23,7 @@ from .edit_forms import DECIMALS
 from .edit_kinds import Closure, Distance, Heading, Opening, Sides, Spacing
 from .edit_rules import beside
 from .moving import QUARTERS, scaled
-from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
+from .part import ON_CURVE, RING, Part, check_room, without_pitch
 from .respacing import moved_out, track, track_at
 
 ROUNDS, HALVINGS, INSIDE_SLACK = 2, 12, 0.15
@@ -58,8 +58,7 @@ def _distant(part: Part, edit: Distance) -> Part:
         points = moved_out(part.points, here, there)
         if there.holds(points):
             return replace(part, group=group, points=points)
-    slots = along_curve(there.curve, len(part.points))
-    return replace(part, group=group, points=slots[taken(part.points, slots)])
+    return part.evenly_at(group, edit.px + part.radius)
 
 
 def _spaced(part: Part, edit: Spacing) -> Part:

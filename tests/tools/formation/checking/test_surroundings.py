@@ -52,7 +52,7 @@ def test_as_many_as_are_said_to_close_a_ring_do(
     plan = make_plan(contract, site, "s")
     if not plan.verdict.certified:
         return
-    found = edited(plan, Count(robots="needed"), site, lambda _: "s").plan
+    found = edited(plan, (Count(robots="needed"),), site, lambda _: "s").plan
     assert found.verdict.certified
     assert len(found.formation.positions) == ring(plan, site).robots_to_close
     after = ring(found, site)
@@ -67,7 +67,7 @@ def test_no_number_is_said_where_the_picture_cuts_the_ring() -> None:
     plan = make_plan(Contract(groups=(group,)), site, "s")
     assert ring(plan, site).robots_to_close is None
     with pytest.raises(ToolError, match="border cuts the ring"):
-        edited(plan, Count(robots="needed"), site, lambda _: "s")
+        edited(plan, (Count(robots="needed"),), site, lambda _: "s")
 
 
 def test_a_gap_that_is_named_takes_more_robots_than_the_thing_does() -> None:

@@ -61,7 +61,7 @@ def standing(name: str, n: int = 12) -> Plan:
 def after(name: str, edit: Edit) -> tuple[Plan, Edited]:
     plan = standing(name)
     assert plan.verdict.certified
-    return plan, edited(plan, edit, SITE, lambda _: "s")
+    return plan, edited(plan, (edit,), SITE, lambda _: "s")
 
 
 def form(found: Edited) -> ShapeSpec | None:
@@ -85,7 +85,7 @@ def test_a_form_scaled_there_and_back_is_itself(name: str, factor: float) -> Non
     plan, found = after(name, Scale(factor=factor))
     assert found.plan.verdict.findings == ()
     assert form(found) is not None
-    again = edited(found.plan, Scale(factor=1 / factor), SITE, lambda _: "s")
+    again = edited(found.plan, (Scale(factor=1 / factor),), SITE, lambda _: "s")
     assert again.plan.verdict.findings == ()
     before, now = (np.ptp(p.formation.points, axis=0) for p in (plan, again.plan))
     assert np.allclose(before, now, atol=0.01)
@@ -151,7 +151,7 @@ def test_a_form_does_not_leave_the_picture() -> None:
 def test_the_side_that_faced_another_thing_gives_way_to_one_that_is_named() -> None:
     group = {"relation": "along", "targets": ("t1",), "robots": 4, "facing": "t2"}
     plan = make_plan(Contract(groups=(Group.model_validate(group),)), SITE, "s")
-    found = edited(plan, SideOnly(side="left"), SITE, lambda _: "s")
+    found = edited(plan, (SideOnly(side="left"),), SITE, lambda _: "s")
     assert found.plan.verdict.findings == ()
     assert (found.plan.formation.points[:, 0] < 400).all()
 
@@ -162,7 +162,7 @@ def test_a_thing_that_is_its_own_mirror_image_keeps_its_ring() -> None:
     site = Site({"t1": cup}, 1000, 700)
     group = Group(relation="around", targets=("t1",), robots=8)
     plan = make_plan(Contract(groups=(group,)), site, "s")
-    found = edited(plan, Mirror(axis="top-bottom"), site, lambda _: "s")
+    found = edited(plan, (Mirror(axis="top-bottom"),), site, lambda _: "s")
     assert found.plan.verdict.certified
 
 
@@ -173,7 +173,7 @@ def test_edges_are_those_on_the_other_side_of_the_mirror() -> None:
     axis = "top-bottom" if wide > high else "left-right"
     found = edited(
         plan,
-        TypeAdapter(Edit).validate_python({"kind": "mirror", "axis": axis}),
+        (TypeAdapter(Edit).validate_python({"kind": "mirror", "axis": axis}),),
         SITE,
         lambda _: "s",
     )

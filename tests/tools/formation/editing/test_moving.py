@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.editing.edit_kinds import Edit
-from formup.tools.formation.editing.edits import Edited, edited_all
+from formup.tools.formation.editing.edits import Edited, edited
 from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import FloatArray, distances, make_outline
@@ -41,7 +41,7 @@ def standing(name: str, **more: Any) -> Plan:
 
 
 def after(plan: Plan, *edits: dict[str, Any]) -> Edited:
-    return edited_all(plan, [READ.validate_python(e) for e in edits], SITE, lambda _: "s")
+    return edited(plan, [READ.validate_python(e) for e in edits], SITE, lambda _: "s")
 
 
 def points(found: Plan | Edited) -> FloatArray:

@@ -8,7 +8,7 @@ import pytest
 import shapely
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.editing.edit_kinds import Edit
-from formup.tools.formation.editing.edits import Edited, edited_all
+from formup.tools.formation.editing.edits import Edited, edited
 from formup.tools.formation.encounters import encounters_of
 from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import Plan, make_plan
@@ -31,7 +31,7 @@ def standing(relation: str, **more: Any) -> Plan:
 
 
 def after(plan: Plan, site: Site, *edits: dict[str, Any], stay: tuple[int, ...] = ()) -> Edited:
-    return edited_all(plan, [READ.validate_python(e) for e in edits], site, lambda _: "s", stay)
+    return edited(plan, [READ.validate_python(e) for e in edits], site, lambda _: "s", stay)
 
 
 def points(found: Plan | Edited) -> FloatArray:

@@ -107,7 +107,7 @@ def test_a_circle_has_the_radius_named_about_the_centre(name: str) -> None:
 
 def test_a_circle_that_is_moved_out_is_a_larger_circle() -> None:
     site = site_of("bar")
-    found = edited(made(site, radius=100), Offset(kind="out", px=10), site, lambda _: "s").plan
+    found = edited(made(site, radius=100), (Offset(kind="out", px=10),), site, lambda _: "s").plan
     assert found.verdict.certified
     assert found.formation.contract.groups[0].radius == 110
     np.testing.assert_allclose(np.linalg.norm(around_centre(found, site), axis=1), 110, atol=0.01)
