@@ -90,7 +90,6 @@ def was(found: Edited, plan: Plan) -> tuple[int | None, ...]:
 
 
 def added(found: Edited) -> tuple[int, ...]:
-    """Numbers of the robots that were not there before, from 1."""
     return tuple(i for i, name in enumerate(found.robots, 1) if name is None)
 
 
