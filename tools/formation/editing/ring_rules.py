@@ -44,10 +44,13 @@ def _distant(part: Part, edit: Distance) -> Part:
     group = part.group
     if group.stands_beside:
         return beside(part, edit.px + part.radius - part.offset)
+    clearance = exact_clearance(group, edit.px)
+    if group.relation == "centre":  # so far from a thing is round it
+        demands = {"relation": "around", "targets": group.targets, "heading": group.heading}
+        return part.anew(part.demanding(demands | {"robots": group.robots, "clearance": clearance}))
     if group.clearance is None or not group.targets:
         raise ToolError(f"The {group.relation} group keeps no distance from anything.")
     unsolved = without_pitch(group) if group.solves_clearance else {}
-    clearance = exact_clearance(group, edit.px)
     group = part.valid_group(clearance=clearance, radius=None, **unsolved)
     if group.relation not in ON_CURVE or group.pitch is not None:
         return part.anew(group)

@@ -107,3 +107,11 @@ def test_who_stands_between_two_goes_to_one_of_them_or_between_it_and_a_third() 
     assert groups(third) == [("between", ("t1", "t3"), 4)]
     for found in (around, third):
         assert found.plan.verdict.certified
+
+
+def test_so_far_from_what_they_are_gathered_in_is_round_it() -> None:
+    found = after(standing("centre", n=5), {"kind": "distance", "px": 20})
+    assert groups(found) == [("around", ("t1",), 5)]
+    away = distances(BOX.filled, found.plan.formation.points) - RADIUS
+    assert away == pytest.approx(np.full(5, 20.0), abs=1)
+    assert found.plan.verdict.certified
