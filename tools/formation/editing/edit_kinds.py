@@ -66,7 +66,7 @@ class Spacing(_GroupEdit):
 
 
 class Rotate(_GroupEdit):
-    """Turn clockwise as seen in the picture: robots on a ring along it, others rigidly.
+    """Turn clockwise as seen in the picture: robots on a ring along it, others about their middle.
 
     Letters and grids that are turned are free positions from then on.
     """
@@ -78,7 +78,8 @@ class Rotate(_GroupEdit):
 class Mirror(_GroupEdit):
     """Each robot to the mirror image of its place, left and right (or top and bottom) swapped.
 
-    Letters go to the mirrored place and can still be read.
+    Letters go to the mirrored place and can still be read; about a thing that is not its own mirror
+    image robots stand evenly.
     """
 
     kind: Literal["mirror"] = "mirror"
@@ -94,7 +95,7 @@ class Shift(_GroupEdit):
 
 
 class Scale(_GroupEdit):
-    """Larger or smaller about the target's centre."""
+    """Larger or smaller about the thing robots are round or in; a row or form about its middle."""
 
     kind: Literal["scale"] = "scale"
     factor: Annotated[float, Field(gt=0, le=1000)]
@@ -239,10 +240,9 @@ EDIT_SCHEMA: dict[str, Any] = {
         "factor. add: n. remove: n or robots (numbers); others close up. count: robots, a number, "
         "needed (to close the ring) or fit (px apart). swap: a, b. skip: robots; places stay "
         "empty. side: all to it. sides: only or without, lists. opening: towards, px wide or "
-        "factor. close, "
-        "open, escape-proof. arrange: demands, fields of a group. target: to an id; only robots (a "
-        "count or numbers), the rest stay. merge. place: robot to [x, y], by [dx, dy] or target. "
-        "heading: to. keep-out: ids. group: else all."
+        "factor. close, open, escape-proof. arrange: demands, fields of a group. target: to an "
+        "id; only robots (a count or numbers), the rest stay. merge. place: robot to [x, y], by "
+        "[dx, dy] or target. heading: to. keep-out: ids. group: else all."
     ),
     "properties": {"kind": {"type": "string"}, **{name: {} for name in _NAMES}},
     "required": ["kind"],
