@@ -115,15 +115,18 @@ def tell_of(
 ) -> ToolResult:
     """What a tool that made a plan gives back: what to look at first, or the turn's last word."""
     now, message, certified = context.at(world), None, node.plan.verdict.certified
-    looked = tuple(
-        t.model_copy(update={"seen": t.seen or t.id in node.unseen}) for t in world.targets
-    )
+    looked = tuple(_seen(t) if t.id in node.unseen else t for t in world.targets)
     if certified and (advice := _to_see(now, node)):
         data |= {"look_first": advice}
     elif certified and not context.settings.may_deploy:
         message = tell or None
     shown = closer_views(now, context.world, targets, node.plan, node.unseen)
     return ToolResult(data, shown, world=world.having(targets=looked), message=message)
+
+
+def _seen(target: Target) -> Target:
+    """A target whose outline has been shown."""
+    return target if target.seen else target.model_copy(update={"seen": True})
 
 
 def _check_against_words(context: Context, contract: Contract) -> None:
