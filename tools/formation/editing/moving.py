@@ -86,22 +86,25 @@ def _moved(part: Part, edit: Rotate | Mirror | Shift | Scale) -> tuple[Part, tup
     elif part.group.relation not in ROUND and any(f.kind == "on_target" for f in findings):
         there = _beside(there, part) if isinstance(edit, Rotate | Scale) else there
     findings = there.findings if findings else ()
-    kept = _kept(part) if findings else set[str]()
+    kept = _kept(part, edit) if findings else set[str]()
     if not findings or any(f.kind in kept or f.kind not in HELD_TO for f in findings):
         return there, ()
     return _freed(there), findings
 
 
-def _kept(part: Part) -> set[str]:
-    """Kinds of findings that a group is not freed of: those of lengths that were stated."""
+def _kept(part: Part, edit: Rotate | Mirror | Shift | Scale) -> set[str]:
+    """Kinds of findings that a group is not freed of: those of lengths that were stated.
+
+    Gaps are as they were but in another size.
+    """
     group, kept = part.group, set[str]()
     if escape_proof(group):
         return set(HELD_TO)
     if group.clearance is not None and not _usual_range(part):
         kept |= {"too_near", "too_far", "not_inside", "too_deep"}
-    if group.opening:
+    if group.opening and isinstance(edit, Scale):
         kept.add("narrow_opening")
-    if group.max_gap is not None:
+    if group.max_gap is not None and isinstance(edit, Scale):
         kept |= {"opening", "opening_at_border"}
     return kept | ({"off_curve"} if group.radius is not None else set())
 

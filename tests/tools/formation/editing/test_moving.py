@@ -149,6 +149,16 @@ def test_a_cage_that_nothing_gets_out_of_is_not_given_up() -> None:
     assert not found.plan.verdict.certified
 
 
+@pytest.mark.parametrize("edit", [{"kind": "shift", "dx": -14}, {"kind": "shift", "dy": 200}])
+def test_a_gap_moves_along_with_the_robots(edit: dict[str, Any]) -> None:
+    plan = standing("ring", opening=90, opening_towards="top")
+    found = after(plan, edit)
+    assert found.plan.verdict.certified
+    np.testing.assert_allclose(form(found), form(plan), atol=0.01)
+    smaller = after(plan, {"kind": "scale", "factor": 0.8})
+    assert not smaller.plan.verdict.certified
+
+
 def test_a_row_further_out_than_usual_has_no_stated_distance() -> None:
     plan = after(standing("row"), {"kind": "out", "factor": 2}).plan
     found = after(plan, {"kind": "shift", "dx": 150})
