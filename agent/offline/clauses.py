@@ -148,6 +148,8 @@ class Line:
             ):
                 continue
             slots = frame.slots(chunks)
+            if frame.name in ("thanks", "hello") and not all(map(_is_kind, chunks)):
+                continue
             effects = None if slots is None else _built(frame, slots, said)
             changes = any(e["kind"] not in NO_EDITS for e in effects or ())
             if effects and slots is not None and not (changes and slots.unused):
@@ -255,6 +257,11 @@ def _as_team(chunk: Chunk) -> Chunk:
 def is_empty(chunk: Chunk) -> bool:
     """Whether a phrase says nothing by itself."""
     return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= SLIGHT
+
+
+def _is_kind(chunk: Chunk) -> bool:
+    """Whether a phrase is no more than thanks or a greeting, or says nothing beside one."""
+    return bool({"thanks", "hello"} & set(chunk.kinds)) or is_empty(chunk)
 
 
 def _is_pure(chunk: Chunk) -> bool:

@@ -46,6 +46,7 @@ OPPOSITE = {
 }
 DEGREES = {"right": 0, "down": 90, "left": 180, "up": 270}
 RINGS = ("around", "cage")
+ROWS = ("along", "between")
 OTHER = "?the other one"
 """A thing that is to be found: one like the target that is not it."""
 
@@ -218,6 +219,23 @@ def scale(slots: Slots, said: Said) -> Effects:
             "factor": rounded(factor if slots["scale"][0] == "bigger" else 1 / factor),
         }
     ]
+
+
+def resized(slots: Slots, said: Said) -> Effects:
+    """To so many times its size."""
+    slots.has("size", "scale")
+    factor = float(slots["num"][0] if "num" in slots else slots["share"][0])
+    return [{"kind": "scale", "factor": rounded(factor)}] if factor > 0 else None
+
+
+def snug(slots: Slots, said: Said) -> Effects:
+    """Tighter, looser: from robot to robot, in a row or after a word about that."""
+    apart = bool(said.last) and said.last[-1]["kind"] == "spacing"
+    if not apart and said.standing.relation not in ROWS:
+        return None
+    factor = factor_of(slots)
+    wide = slots["snug"][0] == "wide"
+    return [{"kind": "spacing", "factor": rounded(factor if wide else 1 / factor)}]
 
 
 def way(slots: Slots, said: Said) -> tuple[float, float] | None:

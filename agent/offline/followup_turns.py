@@ -131,6 +131,8 @@ def _again(last: Effect, slots: Slots, said: Said) -> Effect | None:
         if length is None and not much and "share" not in slots:
             return last
         return (offset(Slots({**slots, "radial": [kind]}), said) or [None])[0]
+    if kind == "distance":
+        return None if length is None else {"kind": "out", "px": length}
     if kind == "rotate":
         sign = 1 if last["degrees"] > 0 else -1
         turned = slots.get(
@@ -168,6 +170,14 @@ def _further(last: Effect, way: float | None) -> Effect | None:
         return None
     x, y = rounded(dx / length * way), rounded(dy / length * way)
     return last | ({"dx": x, "dy": y} if last["kind"] == "shift" else {"by": [x, y]})
+
+
+def less_by(slots: Slots, said: Said) -> Effects:
+    """So many px less: of the distance, unless the last change was of something else."""
+    distances = ("distance", "out", "in")
+    if said.last and said.last[-1]["kind"] not in distances:
+        return None
+    return [{"kind": "in", "px": float(slots["px"][0])}]
 
 
 def less(slots: Slots, said: Said) -> Effects:
