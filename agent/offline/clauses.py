@@ -100,7 +100,18 @@ class Line:
 
     def read(self) -> list[Clause] | None:
         """Its clauses; None where phrases are left over."""
-        return self._corrected() or self.clauses(self.chunks)
+        return self._after_right() or self._corrected() or self.clauses(self.chunks)
+
+    def _after_right(self) -> list[Clause] | None:
+        """What follows a "right," that only leads into it, unless that is an amount."""
+        if len(self.chunks) < 3 or not {"yes", "dir"} <= set(self.chunks[0].kinds):
+            return None
+        if "sep" not in self.chunks[1].kinds:
+            return None
+        clauses = self.clauses(self.chunks[2:])
+        if not clauses or not all(c.settled for c in clauses):
+            return None
+        return clauses if clauses[0].frame not in ("more", "bare", "less") else None
 
     def clauses(
         self, chunks: Sequence[Chunk], before: tuple[Effect, ...] = ()
@@ -141,7 +152,7 @@ class Line:
         """The clause, where a frame takes it whole and uses all of it."""
         asks, only_asks = self._asks()
         edits = tuple(e for e in before if e["kind"] not in NO_EDITS)
-        said = Said(self.standing, self.words_of(chunks), edits)
+        said = Said(self.standing, self.words_of(chunks), edits, denies=self.denies)
         for frame in frames():
             if (frame.asks and not asks) or (
                 only_asks and not frame.asks and frame.name not in TALK
@@ -198,6 +209,9 @@ class Line:
         robots = bool(after) and all({"robots", "stay"} & set(c.kinds) for c in after)
         if robots and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
+        swapping = self._answering(after)
+        if swapping is not None:
+            return swapping
         amounts = bool(after) and all({"px", "angle"} & set(c.kinds) for c in after)
         if amounts and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
@@ -206,6 +220,14 @@ class Line:
         if robots and not self.denies:
             return self._for_robots(after) or self._of_words(self.standing.words, after)
         return self._instead(self._of_words(self.standing.words, after))
+
+    def _answering(self, after: Sequence[Chunk]) -> list[Clause] | None:
+        """Two numbers alone as robots to swap, where the words before were to swap some."""
+        if len(after) != 2 or not all("num" in c.kinds for c in after):
+            return None
+        before = chunks_of(spelled(self.standing.said), self.standing)
+        clause = self._framed([*[c for c in before if "swap" in c.kinds][:1], *after], ())
+        return [clause] if clause is not None and clause.frame == "swap" else None
 
     def _of_words(self, words: str, after: Sequence[Chunk]) -> list[Clause] | None:
         """What was said before, with phrases of this line put in."""

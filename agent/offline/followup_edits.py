@@ -25,6 +25,8 @@ WAY = {"bit": 0.05, "": 0.1, "big": 0.2}
 TEAM = re.compile(
     r"\b(?:them|they|all|every\w*|robots|ring|circle|row|team|formation|whole)\b", re.IGNORECASE
 )
+ADDED_LENGTH = re.compile(r"[,;:]\s*[\w.]+ ?(?:px|pix|m\b|met|cm)\w*\W*$", re.IGNORECASE)
+"""A length said after the change, "further out, 6 m": so far it is then."""
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
@@ -44,7 +46,7 @@ OPPOSITE = {
     "long": "long",
     "short": "short",
 }
-DEGREES = {"right": 0, "down": 90, "left": 180, "up": 270}
+DEGREES = {"right": 0, "down": 90, "bottom": 90, "left": 180, "up": 270, "top": 270}
 RINGS = ("around", "cage")
 ROWS = ("along", "between")
 OTHER = "?the other one"
@@ -59,11 +61,13 @@ class Said:
         standing: the plan, and what was done last.
         words: of the clause.
         before: effects of the clauses before it in the same line.
+        denies: whether the line begins with "no".
     """
 
     standing: Standing
     words: str = ""
     before: tuple[Mapping[str, Any], ...] = ()
+    denies: bool = False
 
     @property
     def last(self) -> list[Effect]:
@@ -122,7 +126,8 @@ def offset(slots: Slots, said: Said) -> Effects:
         return None
     kind = ways.pop()
     if length is not None:
-        return [{"kind": kind, "px": length}]
+        exact = ADDED_LENGTH.search(said.words)
+        return [{"kind": "distance" if exact else kind, "px": length}]
     if kind == "in" and "share" in slots:
         share = float(slots["share"][0])
         return [{"kind": "in", "factor": rounded(1 / (1 - share))}] if 0 < share < 1 else None
@@ -197,8 +202,10 @@ def _of_kind(edits: list[Effect], *kinds: str) -> Effect | None:
 def mirror(slots: Slots, said: Said) -> Effects:
     """Left for right, unless said otherwise."""
     across = {"left": "left-right", "right": "left-right", "up": "top-bottom", "down": "top-bottom"}
+    across |= {"top": "top-bottom", "bottom": "top-bottom"}
     slots.has("opposite")
-    axis = (slots.get("axis") or [across[d] for d in slots.get("dir", ())] or ["left-right"])[0]
+    ways = [w for w in (*slots.get("dir", ()), *slots.get("side", ())) if w in across]
+    axis = (slots.get("axis") or [across[w] for w in ways] or ["left-right"])[0]
     return [{"kind": "mirror", "axis": axis}]
 
 
@@ -264,6 +271,25 @@ def shift(slots: Slots, said: Said) -> Effects:
     return [{"kind": "shift", "dx": by[0], "dy": by[1]}]
 
 
+def approach(slots: Slots, said: Said) -> Effects:
+    """All of it some way towards a thing."""
+    current = slots.get("current")
+    to = current[-1] if current else where(slots, said, "towards {}")
+    if isinstance(to, list):
+        return to
+    slots.has("all")
+    centres = said.standing.centre or {}
+    now = [centres[t] for t in said.standing.targets if t in centres]
+    if to not in centres or not now:
+        return None
+    x, y = (centres[to][k] - sum(c[k] for c in now) / len(now) for k in (0, 1))
+    far = (x * x + y * y) ** 0.5
+    if not far:
+        return None
+    px = bare_length(slots) or WAY[much_of(slots)] * min(said.standing.size)
+    return [{"kind": "shift", "dx": round(x / far * px, 1), "dy": round(y / far * px, 1)}]
+
+
 def place(slots: Slots, said: Said) -> Effects:
     """One robot elsewhere: to a point, at a thing, or some way on."""
     robots = [r for named in slots["robots"] for r in named]
@@ -282,6 +308,7 @@ def place(slots: Slots, said: Said) -> Effects:
             return to
         alone: Effect = {"kind": "place", "robot": robots[0], "target": to}
         return [{"kind": "target", "to": to, "robots": robots} if len(robots) > 1 else alone]
+    slots.has("away")
     if slots.has("dir") and slots.has("radial"):
         return None
     if "dir" in slots:
@@ -304,8 +331,11 @@ def heading(slots: Slots, said: Said) -> Effects:
     if "there" in slots or "other" in slots or "thing" in slots:
         to = where(slots, said, "face {}")
         return to if isinstance(to, list) else [{"kind": "heading", "to": to}]
-    if "dir" in slots:
-        return [{"kind": "heading", "to": DEGREES[slots["dir"][0]]}]
+    for name in ("dir", "side"):
+        if name in slots and slots[name][0] in DEGREES:
+            return [{"kind": "heading", "to": DEGREES[slots[name][0]]}]
+    if "side" in slots:
+        return None
     if "otherway" in slots:
         now = said.standing.groups[0].get("heading")
         return (

@@ -105,6 +105,26 @@ def reopened(slots: Slots, said: Said) -> Effects:
     return gap(slots, said) if said.standing.groups[0].get("opening") is not None else None
 
 
+def reopened_now(slots: Slots, said: Said) -> Effects:
+    """The gap that the last change was about, towards something else."""
+    about = bool(said.last) and said.last[-1]["kind"] == "opening"
+    return reopened(slots, said) if about else None
+
+
+def sided(slots: Slots, said: Said) -> Effects:
+    """A side alone: the one robots stand on, or the gap is on."""
+    side = str(slots["side"][0])
+    moved = said.denies and not said.standing.edits  # else "left" is a way to go
+    group = said.standing.groups[0]
+    if "too" in said.words.split() or side not in OPPOSITE or not (moved or side in ("top", "bottom")):
+        return None
+    if group.get("opening") is not None:
+        return [{"kind": "opening", "towards": side}]
+    if group.get("side"):
+        return [{"kind": "side", "side": side}]
+    return [{"kind": "sides", "only": [side]}] if group.get("sides") else None
+
+
 def wider(slots: Slots, said: Said) -> Effects:
     """Wider alone: the gap, where there is one."""
     if said.standing.groups[0].get("opening") is not None:

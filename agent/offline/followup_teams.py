@@ -62,7 +62,7 @@ def leave(slots: Slots, said: Said) -> Effects:
     robots = [r for named in slots["robots"] for r in named]
     if len(set(robots)) >= said.count:
         return refuse("All robots would leave: nothing would be left to place.")
-    slots.has("rest", "closeup")  # closing up is what the others do anyway
+    slots.has("rest", "closeup", "leave", "remove")  # closing up is what the others do anyway
     return [{"kind": "skip" if slots.has("empty", "stay") else "remove", "robots": robots}]
 
 
@@ -131,6 +131,9 @@ def swap(slots: Slots, said: Said) -> Effects:
         return refuse(f"There is no robot {strange[0]}; there are {listed(said.standing.robots)}.")
     if len(robots) > 2:
         return None
+    last = said.last[-1] if said.last else {}
+    if len(robots) == 1 and "robot" in last and re.search(r"\b(?:it|that one)\b", said.words):
+        robots = [int(last["robot"]), *robots]
     if len(robots) != 2:
         return ask(f"Which two robots swap? Of {listed(said.standing.robots)} two.")
     if robots[0] == robots[1]:
@@ -167,6 +170,28 @@ def target(slots: Slots, said: Said) -> Effects:
         if relation != "shape"
         else None
     )
+
+
+def not_this(slots: Slots, said: Said) -> Effects:
+    """The same around another thing, not around this one."""
+    this = str((slots.get("current") or slots.get("thing") or [""])[0])
+    if "there" not in slots or (this.startswith("?") and len(said.standing.targets) > 1):
+        return None
+    to = where(Slots({"there": [""]}), said)
+    return to if isinstance(to, list) else [{"kind": "target", "to": to}]
+
+
+def remain(slots: Slots, said: Said) -> Effects:
+    """So many where they are: beside others that go somewhere else."""
+    going = [e for e in said.before if e["kind"] == "target" and isinstance(e.get("robots"), int)]
+    n = whole(slots)
+    slots.has("here", "current", "stay")
+    if len(said.standing.groups) > 1 or n is None or len(going) != 1:
+        return None
+    some = going[0]["robots"]
+    if some + n != said.count:
+        return ask(f"There are {said.count} robots, not {some} and {n}. How many go, and where?")
+    return [{"kind": "talk", "about": "already"}]
 
 
 def split(slots: Slots, said: Said) -> Effects:
@@ -291,6 +316,21 @@ def arrange(slots: Slots, said: Said) -> Effects:
     if "px" in slots:
         edits.append({"kind": "distance", "px": float(slots["px"][0])})
     return edits
+
+
+def arranged(slots: Slots, said: Said) -> Effects:
+    """Another arrangement, of so many robots."""
+    n = whole(slots)
+    if n is None or n > MAX_ROBOTS:
+        return None
+    given = Slots({k: v for k, v in slots.items() if k not in ("num", "lone")})
+    slots.used.update(slots)
+    made = arrange(given, said)
+    if not made or made[0]["kind"] not in ("arrange", "talk"):
+        return made
+    edits = [e for e in made if e["kind"] != "talk"]
+    counted: list[Effect] = [] if n == said.count else [{"kind": "count", "robots": n}]
+    return [*edits, *counted] or made
 
 
 def _group(relation: str, slots: Slots) -> Effect:

@@ -21,7 +21,9 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
     """A phrase with its thing as an id, where it is known; one of the plan's as `current`."""
     kinds = dict(chunk.kinds)
     pointed = bool(standing.pointed) or standing.place is not None
-    if pointed and text[chunk.start : chunk.end].lower() in POINTING:
+    word = text[chunk.start : chunk.end].lower()
+    apart = word == "here" and re.search(r"\bthere\b", text, re.IGNORECASE)
+    if pointed and word in POINTING and not apart:
         kinds["there"] = ""
     if "lone" in kinds and len(standing.robots) == 1:
         kinds["team"] = ""

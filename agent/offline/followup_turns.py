@@ -1,5 +1,6 @@
 """From a frame to what a turn does beside edits, and to edits that follow from the last ones."""
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -49,6 +50,12 @@ def undo(slots: Slots, said: Said) -> Effects:
         )
         return refuse(f"{why}: there is no plan before that. Say what to change instead.")
     return [{"kind": "undo", "steps": steps}]
+
+
+def dont(slots: Slots, said: Said) -> Effects:
+    """ "No, don't: like before"; "don't undo" is another matter."""
+    called_off = re.match(r"\W*(?:don'?t|do not)\W*[,.;:!-]", said.words, re.IGNORECASE)
+    return undo(slots, said) if called_off else None
 
 
 def redo(slots: Slots, said: Said) -> Effects:
@@ -183,7 +190,8 @@ def less_by(slots: Slots, said: Said) -> Effects:
 def less(slots: Slots, said: Said) -> Effects:
     """Half of the last change taken back, however it is said."""
     slots.has("much", "ratio", "back")
-    last = next((e for e in reversed(said.last) if e["kind"] in RELATIVE), None)
+    kinds = (*RELATIVE, "opening")
+    last = next((e for e in reversed(said.last) if e["kind"] in kinds), None)
     halved = None if last is None else _scaled(last, -0.5)
     if halved is None:
         return ask("Less of what?", "a bit closer", "take one robot away")
@@ -193,12 +201,12 @@ def less(slots: Slots, said: Said) -> Effects:
 def _scaled(edit: Effect, share: float) -> Effect | None:
     """An edit that does a share of another; a negative one takes so much of it back."""
     kind = edit["kind"]
-    if kind in ("out", "in", "scale", "spacing"):
+    if kind in ("out", "in", "scale", "spacing", "opening"):
         back = {"out": "in", "in": "out"}.get(kind, kind)
         if "factor" not in edit:
             return (
                 {"kind": back, "px": rounded(edit["px"] * abs(share))}
-                if "px" in edit and kind != "spacing"
+                if "px" in edit and kind in ("out", "in")
                 else None
             )
         factor = edit["factor"]

@@ -154,8 +154,22 @@ class _Reader:
     def _named(self, at: int) -> tuple[dict[str, Any], int] | None:
         match = NAMED.match(self.text, self.words[at].start)
         if match is None:
-            return None
+            return self._in_order(at)
         return {"thing": match[0]}, self._until(at, match.end())
+
+    def _in_order(self, at: int) -> tuple[dict[str, Any], int] | None:
+        """ "the second", "the first thing": of several things known, in their order."""
+        start = at + (self.plain[at] in ARTICLES)
+        if start >= len(self.plain):
+            return None
+        place, things = table_of("ordinals").get(self.plain[start]), self.standing.things
+        named = self.plain[start + 1 : start + 2]
+        end = start + 1 + (named in (["one"], ["thing"], ["object"]))
+        plain = end == start + 1 and (start == at or named[:1] and named[0][0].isalpha())
+        first = self.plain[start] == "first" and named not in (["thing"], ["object"])
+        if place is None or first or plain or not 1 < len(things) >= place:
+            return None
+        return {"thing": things[place - 1 if place > 0 else -1][0]}, end
 
     def _robots(self, at: int) -> tuple[dict[str, Any], int] | None:
         """Robot 3; robots 3, 4 and 5; r7; the third robot."""

@@ -161,7 +161,7 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
         return Followup("ask", text=unsettled["question"], options=unsettled["options"])
     if unsettled is not None:
         return Followup("refuse", text=unsettled["text"])
-    edits = [e for e in effects if e["kind"] not in NO_EDITS]
+    edits = _once([e for e in effects if e["kind"] not in NO_EDITS])
     fresh = all(c.frame != "corrected" for c in kept)
     question = _contradiction(line, edits) if fresh else None
     if question is not None:
@@ -178,6 +178,12 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
     return _settled(line, effects, edits, undo)
 
 
+def _once(edits: list[Effect]) -> list[Effect]:
+    """The edits, where what would undo itself is said twice once: "flip it, mirror it"."""
+    twice = [k for k in range(1, len(edits)) if edits[k] == edits[k - 1]]
+    return [e for k, e in enumerate(edits) if k not in twice or e["kind"] not in ("mirror", "swap")]
+
+
 def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
     """The clauses without what others make moot: "too much, go back", "never mind, closer"."""
     undone = any(c.frame in ("undo", "first") for c in clauses)
@@ -185,7 +191,10 @@ def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
     waving = {"mind", "forget"}
     waved = [c for c in kept if waving & set(line.words_of(c.chunks).lower().split())]
     lessened = [c for c in kept if c.frame in ("less", "toofar")]
-    moot = [*waved, *lessened[1:]]
+    gaps = any(e["kind"] == "opening" for c in kept if c not in lessened for e in c.effects)
+    other = len(kept) > len(lessened)
+    doubtful = [c for c in lessened if gaps or (other and not c.settled)]
+    moot = [*waved, *lessened[1:], *doubtful]
     return [c for c in kept if c not in moot] or kept
 
 

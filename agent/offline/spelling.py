@@ -12,6 +12,13 @@ LEAST_CORRECTED = 4
 """Letters of the shortest word in which a slip is looked for."""
 LEAST_ANY = 6
 """Letters of a word in which one may be any other, not only a key off."""
+SHORT = {
+    slip: word
+    for word in ("the", "and", "you", "all", "out", "one", "two", "six", "ten", "far", "bit", "gap")
+    for slip in (word[0] + word[2] + word[1], word[1] + word[0] + word[2])
+    if slip not in ("net", "owt", "wto")
+}
+"""Words of three letters with two swapped, where that is no other word."""
 UNITS = ("degrees", "pixels", "metres", "meters")
 
 
@@ -23,6 +30,8 @@ def spelled(text: str) -> str:
 @cache
 def _meant(word: str) -> str | None:
     """The one word that says something and that this is a slip away from, if it is none itself."""
+    if word in SHORT:
+        return SHORT[word]
     known = known_words() | fillers() | {*table()["follow"], *UNITS}
     if len(word) < LEAST_CORRECTED or word in known or phrase([word], 0) is not None:
         return None
