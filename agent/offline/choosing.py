@@ -272,7 +272,7 @@ def located(query: dict[str, Any] | None, history: History) -> dict[str, Any] | 
     for call in calls_in(history):
         if call.name == "locate_object" and call.arguments.get("query") == query:
             result = next(m for m in history if isinstance(m, Result) and m.call_id == call.id)
-            return json.loads(result.text)
+            return {"candidates": []} if result.error else json.loads(result.text)
     return None
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User
 from .accounting import read_instruction
+from .amending import amended
 from .answering import arrived, said_of_edit, said_of_query, said_of_undo, talk
 from .choosing import Step, agrees, prompts_of
 from .finding import found_thing, known_thing, measured_at
@@ -53,6 +54,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
 
 def _typed(words: str) -> str:
     """An instruction, with slips of the fingers put right where it is understood then."""
+    words = amended(words)
     corrected = spelled(words)
     if corrected != words and read_instruction(words).unread:
         return words if read_instruction(corrected).unread else corrected

@@ -1,6 +1,7 @@
 """Demands of an instruction to fields of the contract, one rule after another."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from .demands import Demand, Item
@@ -77,6 +78,11 @@ class Fields:
             radius = low / 2 if demand.sets == "diameter" else low
             return relation in ("around", "cage") and low == high and self._set("radius", radius)
         return self._spaced(demand, low, high)
+
+    def _length_alone(self, demand: Demand) -> bool:
+        """A length that ends the words about a ring is its distance from the thing."""
+        rings = self.reading.relation in ("around", "cage", "corners")
+        return rings and self._length(replace(demand, sets="clearance"))
 
     def _spaced(self, demand: Demand, low: float, high: float) -> bool:
         name = demand.sets

@@ -198,6 +198,8 @@ def _how_many(reading: Reading, robots: int | None) -> str | None:
 def _which_things(task: Task, reading: Reading) -> str | None:
     pointed = list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))
     needed = things_needed(reading)
+    if reading.others and len(pointed) == needed + len(reading.others):
+        return None
     if reading.faced and len(pointed) == needed + 1:
         return None
     if len(pointed) == 1 and needed == 2:

@@ -32,12 +32,20 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
         kinds["thing"] = standing.things[0][0]
     if "thing" in kinds:
         name = _id_of(str(kinds["thing"]), bool(kinds.pop("other", False)), standing)
+        if name.startswith("?") and len(standing.pointed) == 1 and _is_shown(chunk, text):
+            name = standing.pointed[0]
         kinds["thing"] = name
         if name in standing.targets:
             kinds["current"] = name
             if len(standing.groups) < 2:
                 del kinds["thing"]
     return replace(chunk, kinds=kinds)
+
+
+def _is_shown(chunk: Chunk, text: str) -> bool:
+    """Whether a phrase means what is pointed at: "this house", "the house over here"."""
+    shown = text[chunk.start : chunk.end].lower().startswith(("this ", "that "))
+    return shown or bool(re.match(r" (?:(?:over|up|down|right) )?here\b", text[chunk.end :]))
 
 
 def _id_of(phrase: str, other: bool, standing: Standing) -> str:

@@ -16,6 +16,20 @@ from .followup_words import Chunk, chunks_of
 from .references import described
 from .standing import Standing
 
+ONE_SHOWN = re.compile(
+    r"\b(?:the|this|that) (?:one|thing) (?:right )?(?:over|up|down|in)? ?here\b", re.IGNORECASE
+)
+SHOWING = re.compile(r"(?<=\w) (?:right )?(?:over|up|down) here\b", re.IGNORECASE)
+"""Words that mean what is pointed at."""
+OFF = re.compile(
+    r"(?:(?:[,;.] ?)?(?:and |but |please |so )*)?\b(?:(?:stay|keep|steer|keeping|staying|stays|kept)"
+    r" (?:\w+ )?(?:off|clear of|away from|out of)|off|avoid(?:ing)?|mind|clear of|"
+    r"(?:but |and )?not (?:on|over|touching)|(?:do not|don'?t|never) (?:touch|stand on|drive over)|"
+    r"(?:no robots?|no one|nobody|none)(?: of them)?(?: (?:may|must|should|is to|can|shall))?"
+    r"(?: (?:be|stand|go))? (?:on|over|near))(?: the)?\s+$",
+    re.IGNORECASE,
+)
+"""What comes before a thing that is to be kept clear of."""
 THE_THING = "the thing"
 """Stands in the instruction for the one that is chosen."""
 
@@ -25,6 +39,8 @@ def narrowed(task: Task, history: History) -> Task | Step:
 
     As it was, where they name none or all of them.
     """
+    if task.pointed:
+        task = replace(task, instruction=SHOWING.sub("", ONE_SHOWN.sub("this one", task.instruction)))
     centres = {str(p["id"]): _centre(p) for p in task.pointed}
     things = tuple((str(p["id"]), str(p.get("label") or UNNAMED[0])) for p in task.pointed)
     contract: dict[str, Any] = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}
@@ -37,8 +53,9 @@ def narrowed(task: Task, history: History) -> Task | Step:
         named = [(named[0][0], str(task.pointed[0]["id"]))]
     if len(task.pointed) < 2 and named[0][1] not in centres:
         return task
-    if len({name for _, name in named}) > 1:
-        return task
+    kept_off = _parted(task, named, centres)
+    if kept_off is not None or len({name for _, name in named}) > 1:
+        return kept_off or task
     chunk, name = named[0]
     if name not in centres:
         things = described([name.removeprefix("?")])
@@ -54,6 +71,33 @@ def narrowed(task: Task, history: History) -> Task | Step:
     words = f"{text[:start]}{THE_THING}{text[chunk.end :]}"
     chosen = tuple(p for p in task.pointed if p["id"] == name)
     return replace(task, instruction=words, pointed=chosen)
+
+
+def _parted(
+    task: Task, named: Sequence[tuple[Chunk, str]], centres: dict[str, tuple[float, float]]
+) -> Task | None:
+    """The task about one thing pointed at, clear of the others; None where it is not said so."""
+    text, off = task.instruction, dict[str, tuple[int, int]]()
+    about: list[tuple[Chunk, str]] = []
+    for chunk, name in named:
+        before = OFF.search(text[: chunk.start])
+        if before is not None:
+            off[name] = (before.start(), chunk.end)
+        else:
+            about.append((chunk, name))
+    left = [name for name in centres if name not in off]
+    if not off or len(left) != 1 or any(name != left[0] for _, name in about):
+        return None
+    if not {*off} <= {*centres}:
+        return None
+    cuts = [(*span, ", stay off the other thing") for span in off.values()]
+    for chunk, _ in about:
+        article = re.search(r"\b(?:the|this|that)\s+$", text[: chunk.start], re.IGNORECASE)
+        cuts.append((article.start() if article else chunk.start, chunk.end, THE_THING))
+    for start, end, words in sorted(cuts, reverse=True):
+        text = f"{text[:start]}{words}{text[end:]}"
+    shown = {str(p["id"]): p for p in task.pointed}
+    return replace(task, instruction=text, pointed=tuple(shown[n] for n in (*left, *off)))
 
 
 def _shows(text: str, chunk: Chunk) -> bool:

@@ -1,0 +1,29 @@
+"""An instruction in which the speaker takes something back, as what is meant in the end."""
+
+import re
+
+from ...tools.formation.number_words import SMALL
+
+NUMBER = rf"(?:[0-9]{{1,5}}|{'|'.join(sorted(SMALL, key=len, reverse=True))})"
+ROBOTS = r"(?:robots?|bots?|drones?|rovers?|units?|machines?|agents?|of them)"
+TAKEN_BACK = (
+    r"(?:oh |um |uh |er )?(?:no,? wait|wait,? no|wait|no,? sorry|sorry,? no|sorry|no,? i mean|i mean|"
+    r"i meant|no,? make (?:that|it)|make that|or rather|rather|correction|oops|scratch that|"
+    r"hang on|actually,? no|no,? actually|actually|no)"
+)
+COUNT = re.compile(rf"\b(?P<count>{NUMBER}) (?:\w+ )?{ROBOTS}\b", re.IGNORECASE)
+RECOUNT = re.compile(
+    rf"[ ,.;:\u2013-]*\b(?:{TAKEN_BACK}[ ,.;:]+)+(?:make (?:that|it) )?"
+    rf"(?:{NUMBER}[ ,.;]+)*?(?P<count>{NUMBER})(?: {ROBOTS})?(?: please)?(?=\W*$|[,.;])",
+    re.IGNORECASE,
+)
+
+
+def amended(words: str) -> str:
+    """The words with the number of robots that is said last: "9 robots, no wait, ten robots"."""
+    again = RECOUNT.search(words)
+    first = COUNT.search(words)
+    if again is None or first is None or again.start() < first.end():
+        return words
+    rest = words[: again.start()] + words[again.end() :]
+    return rest[: first.start()] + again["count"] + rest[first.end("count") :]
