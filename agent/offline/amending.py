@@ -14,7 +14,7 @@ TAKEN_BACK = (
 COUNT = re.compile(rf"\b(?P<count>{NUMBER}) (?:\w+ )?{ROBOTS}\b", re.IGNORECASE)
 RECOUNT = re.compile(
     rf"[ ,.;:\u2013-]*\b(?:{TAKEN_BACK}[ ,.;:]+)+(?:make (?:that|it) )?"
-    rf"(?:{NUMBER}[ ,.;]+)*?(?P<count>{NUMBER})(?: {ROBOTS})?(?: please)?(?=\W*$|[,.;])",
+    rf"(?:{NUMBER}[ ,.;]+)*?(?P<count>{NUMBER})(?: {ROBOTS})?(?: please)?(?=\W*$|[,.;] *(?!{NUMBER}))",
     re.IGNORECASE,
 )
 

@@ -49,7 +49,16 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
         fresh = words != task.instruction
         said = followup.text if standing else words
         return replace(task, instruction=_typed(said)), (turn[0], *messages) if fresh else turn
-    return _Steps(task, standing, followup, messages, before).next()
+    return _told(followup, _Steps(task, standing, followup, messages, before).next())
+
+
+def _told(followup: Followup, reply: Reply) -> Reply:
+    """The reply, which says at the end of a turn what was read as background."""
+    if reply.calls or not followup.background:
+        return reply
+    quoted = ", ".join(f'"{words}"' for words in followup.background)
+    said = f"Read as background, which changes nothing: {quoted}."
+    return reply.model_copy(update={"text": f"{reply.text} {said}"})
 
 
 def _typed(words: str) -> str:

@@ -116,7 +116,11 @@ def sided(slots: Slots, said: Said) -> Effects:
     side = str(slots["side"][0])
     moved = said.denies and not said.standing.edits  # else "left" is a way to go
     group = said.standing.groups[0]
-    if "too" in said.words.split() or side not in OPPOSITE or not (moved or side in ("top", "bottom")):
+    if (
+        "too" in said.words.split()
+        or side not in OPPOSITE
+        or not (moved or side in ("top", "bottom"))
+    ):
         return None
     if group.get("opening") is not None:
         return [{"kind": "opening", "towards": side}]

@@ -55,7 +55,8 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
     words = set(re.findall(r"[a-z]+", phrase)) - {"one", "the", "thing", "object", "of", "two"}
     places = [int(place) - 1 for w, place in table()["ordinals"].items() if w in words]
     rest = words - set(table()["ordinals"])
-    known = all(thing_phrase([word], 0) is not None for word in rest)
+    unnamed = all(label.startswith(UNNAMED) for _, label in standing.things)
+    known = unnamed or all(thing_phrase([word], 0) is not None for word in rest)
     if len(places) == 1 and len(standing.things) > places[0] and known:
         return standing.things[places[0]][0]  # "the first coin": in their order
     if other and known and len(standing.others()) == 1 and standing.targets:
@@ -63,7 +64,7 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
     sides = {w: side for w in words if (side := SIDE_OF.get(str(SIDES.get(w, w))))}
     side, rest = next(iter(sides.values()), ""), words - set(sides)
     named = [t for t, label in standing.things if rest <= {*re.findall(r"[a-z]+", label.lower())}]
-    if not named and all(label.startswith(UNNAMED) for _, label in standing.things):
+    if not named and unnamed:
         named = [t for t, _ in standing.things] if side else []
     placed = {t: at for t, at in (standing.centre or {}).items() if t in named}
     if side and len(placed) > 1:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from .accounting import read_instruction
+from .asides import without_asides
 from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty
 from .drafting import contract_of
 from .drawn_forms import form_in
@@ -66,6 +67,7 @@ class Followup:
         text: a question or a refusal; the words of a whole new instruction.
         options: commands that answer the question.
         rest: what is to be done after that, once it is confirmed.
+        background: what was told beside it and changes nothing.
     """
 
     kind: Kind
@@ -80,6 +82,7 @@ class Followup:
     text: str = ""
     options: tuple[str, ...] = ()
     rest: str = ""
+    background: tuple[str, ...] = ()
 
     @property
     def things(self) -> list[str]:
@@ -90,6 +93,19 @@ class Followup:
 
 def read_followup(words: str, standing: Standing | None) -> Followup:
     """What is meant by words that are said when a plan stands, or talk that fits at any time."""
+    meant = _read(words, standing)
+    if standing is None or meant.kind != "ask":
+        return meant
+    kept, told = without_asides(words, standing)
+    if not told or not kept.strip(" ,.;:!?"):
+        return meant
+    plain = _read(kept, standing)
+    clear = plain.kind not in ("ask", "refuse", "instruction", "talk")
+    return replace(plain, background=told) if clear else meant
+
+
+def _read(words: str, standing: Standing | None) -> Followup:
+    """What is meant by all of the words."""
     sequence = SEQUENCE.match(spelled(words)) if standing else None
     if sequence:
         now = read_followup(sequence["now"], standing)

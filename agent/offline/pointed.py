@@ -40,7 +40,9 @@ def narrowed(task: Task, history: History) -> Task | Step:
     As it was, where they name none or all of them.
     """
     if task.pointed:
-        task = replace(task, instruction=SHOWING.sub("", ONE_SHOWN.sub("this one", task.instruction)))
+        task = replace(
+            task, instruction=SHOWING.sub("", ONE_SHOWN.sub("this one", task.instruction))
+        )
     centres = {str(p["id"]): _centre(p) for p in task.pointed}
     things = tuple((str(p["id"]), str(p.get("label") or UNNAMED[0])) for p in task.pointed)
     contract: dict[str, Any] = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}

@@ -1,0 +1,45 @@
+"""Small talk and reasons around a command: parts of a line that tell something and demand nothing.
+
+They are taken out only where the rest is understood without them, and are quoted to the person.
+"""
+
+import re
+
+from .followup_words import chunks_of
+from .standing import Standing
+
+PART = re.compile(r"[^.,;:!?]+[.,;:!?]*\s*|[.,;:!?]+\s*")
+LEADS = r"(?:(?:actually|well|oh|so|and|but|hm+|now|ah|yes|no|ok|okay|sorry|right|hey|just)\s+)*"
+TELLING = re.compile(
+    rf"^\W*{LEADS}(?:that'?s|that (?:is|was|looks|seems)|it'?s|it (?:is|was|has|looks|seems|will)|"
+    r"this (?:is|looks|seems)|(?:these|those|they|there) (?:are|were|look|seem)|there'?s|there is|"
+    r"i am|i'?m|i (?:feel|fear|see|have|had|hope|think|guess|know|was|like|love|forgot|suppose)|"
+    r"i'?ve|i'?d (?:say|forgotten)|we (?:are|have|had|were)|we'?re|we'?ve|"
+    r"my|because|since|as (?:i|we|it|they|my|the|there)|cause|cos|for (?:my|our) |"
+    r"never ?mind|isn'?t|aren'?t|don'?t worry|no worries|no problem|"
+    r"(?:the|our|his|her) \w+ (?:is|are|was|were|will|has|have|says|said|wants|likes|just))\b",
+    re.IGNORECASE,
+)
+"""How a part begins that tells something."""
+DEMANDING = frozenset(
+    ("robots", "num", "px", "m", "angle", "share", "point", "dir", "side", "flank", "radial")
+    + ("spin", "apart", "scale", "ratio", "relation", "gap", "stay", "swap", "leave", "remove")
+    + ("add", "hold", "never", "neg", "clear", "close", "only", "except", "toofar", "toomany")
+    + ("turn", "mirror", "face", "merge", "split", "escape", "open", "wide", "resize", "current")
+)
+"""Kinds of phrases that demand something, or change what does."""
+
+
+def without_asides(words: str, standing: Standing) -> tuple[str, tuple[str, ...]]:
+    """The words without parts that only tell something, and those parts."""
+    parts = PART.findall(words)
+    told = [k for k, part in enumerate(parts) if _tells(part, standing)]
+    kept = "".join(part for k, part in enumerate(parts) if k not in told)
+    return kept, tuple(parts[k].strip(" ,.;:!?") for k in told)
+
+
+def _tells(part: str, standing: Standing) -> bool:
+    """Whether a part tells something and demands nothing."""
+    if TELLING.search(part) is None or part.rstrip().endswith("?"):
+        return False
+    return not any(DEMANDING & set(c.kinds) for c in chunks_of(part, standing))
