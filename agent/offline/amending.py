@@ -7,8 +7,8 @@ from ...tools.formation.number_words import SMALL
 NUMBER = rf"(?:[0-9]{{1,5}}|{'|'.join(sorted(SMALL, key=len, reverse=True))})"
 ROBOTS = r"(?:robots?|bots?|drones?|rovers?|units?|machines?|agents?|of them)"
 TAKEN_BACK = (
-    r"(?:oh |um |uh |er )?(?:no,? wait|wait,? no|wait|no,? sorry|sorry,? no|sorry|no,? i mean|i mean|"
-    r"i meant|no,? make (?:that|it)|make that|or rather|rather|correction|oops|scratch that|"
+    r"(?:oh |um |uh |er )?"
+    r"(?:no,? wait|wait,? no|wait|no,? sorry|sorry,? no|sorry|no,? i mean|i mean|i meant|no,? make (?:that|it)|make that|or rather|rather|correction|oops|scratch that|"
     r"hang on|actually,? no|no,? actually|actually|no)"
 )
 COUNT = re.compile(rf"\b(?P<count>{NUMBER}) (?:\w+ )?{ROBOTS}\b", re.IGNORECASE)

@@ -253,7 +253,9 @@ class Line:
         last = dict(self.standing.edits[-1]) if len(self.standing.edits) == 1 else {"kind": ""}
         if not robots or any("stay" in c.kinds for c in after):
             return None
-        if last["kind"] == "place" and "to" not in last:
+        before = chunks_of(spelled(self.standing.words), self.standing)
+        outward = any("radial" in c.kinds for c in before)  # each in its own direction
+        if last["kind"] == "place" and "to" not in last and not outward:
             return [Clause((), "again", tuple(last | {"robot": r} for r in robots))]
         if last.get("robots") and last["kind"] in ("remove", "skip", "target"):
             return [Clause((), "again", (last | {"robots": robots},))]

@@ -27,6 +27,8 @@ DEICTIC = re.compile(
 )
 FEW = 3
 """Robots of which it is measured exactly which is the nearest."""
+LEAST_WAY = 0.02
+"""Of the picture's shorter side: the least way that "a bit" is."""
 DECLINED = ("no", "nope", "nothing", "none", "no thanks", "never mind", "leave it")
 
 
@@ -325,6 +327,10 @@ def _by_way(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) 
     x, y = row["place"][0] - centre[0], row["place"][1] - centre[1]
     length = max((x * x + y * y) ** 0.5, 1e-9)
     way = _signed(by) / length
+    if "factor" in by:  # "a bit": a share of its distance
+        least = LEAST_WAY * min(standing.size)
+        share = max((by["factor"] - 1) * row.get("target_px", 0.0), least)
+        way = math.copysign(min(abs(way * length), share), way) / length
     return edit | {"by": [round(x * way, 2), round(y * way, 2)]}
 
 

@@ -319,8 +319,14 @@ def place(slots: Slots, said: Said) -> Effects:
     ways, length = set(slots.get("radial", ())), bare_length(slots)
     if len(ways) != 1 or (length is None and slots.has("num", "px")):
         return None
-    length = round(WAY[much_of(slots)] * min(said.standing.size)) if length is None else length
-    return [{"kind": "place", "robot": r, "by": {next(iter(ways)): length}} for r in robots]
+    by = {next(iter(ways)): length} if length is not None else _some_way(ways.pop(), slots, said)
+    return [{"kind": "place", "robot": r, "by": by} for r in robots]
+
+
+def _some_way(way: str, slots: Slots, said: Said) -> dict[str, float]:
+    """A share of the robot's distance, and the way that is at most."""
+    most = round(WAY[much_of(slots)] * min(said.standing.size))
+    return {way: most, "factor": FACTOR[much_of(slots)]}
 
 
 def heading(slots: Slots, said: Said) -> Effects:

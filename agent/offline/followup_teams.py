@@ -126,6 +126,7 @@ def swap(slots: Slots, said: Said) -> Effects:
     robots = [r for named in slots.get("robots", ()) for r in named] + [
         int(n) for n in slots.get("num", ())
     ]
+    robots = robots[1:] if len(robots) == 3 and robots[0] == 2 else robots  # "two: 3 and 6"
     strange = [r for r in robots if str(r) not in said.standing.robots]
     if strange:
         return refuse(f"There is no robot {strange[0]}; there are {listed(said.standing.robots)}.")

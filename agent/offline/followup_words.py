@@ -165,7 +165,7 @@ class _Reader:
         place, things = table_of("ordinals").get(self.plain[start]), self.standing.things
         named = self.plain[start + 1 : start + 2]
         end = start + 1 + (named in (["one"], ["thing"], ["object"]))
-        plain = end == start + 1 and (start == at or named[:1] and named[0][0].isalpha())
+        plain = end == start + 1 and (start == at or (named[:1] and named[0][0].isalpha()))
         first = self.plain[start] == "first" and named not in (["thing"], ["object"])
         if place is None or first or plain or not 1 < len(things) >= place:
             return None
