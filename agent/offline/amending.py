@@ -8,13 +8,15 @@ NUMBER = rf"(?:[0-9]{{1,5}}|{'|'.join(sorted(SMALL, key=len, reverse=True))})"
 ROBOTS = r"(?:robots?|bots?|drones?|rovers?|units?|machines?|agents?|of them)"
 TAKEN_BACK = (
     r"(?:oh |um |uh |er )?"
-    r"(?:no,? wait|wait,? no|wait|no,? sorry|sorry,? no|sorry|no,? i mean|i mean|i meant|no,? make (?:that|it)|make that|or rather|rather|correction|oops|scratch that|"
-    r"hang on|actually,? no|no,? actually|actually|no)"
+    r"(?:no,? wait|wait,? no|wait|no,? sorry|sorry,? no|sorry|no,? i mean|i mean|i meant|"
+    r"no,? make (?:that|it)|make that|or rather|"
+    r"rather|correction|oops|scratch that|hang on|actually,? no|no,? actually|actually|no)"
 )
 COUNT = re.compile(rf"\b(?P<count>{NUMBER}) (?:\w+ )?{ROBOTS}\b", re.IGNORECASE)
 RECOUNT = re.compile(
     rf"[ ,.;:\u2013-]*\b(?:{TAKEN_BACK}[ ,.;:]+)+(?:make (?:that|it) )?"
-    rf"(?:{NUMBER}[ ,.;]+)*?(?P<count>{NUMBER})(?: {ROBOTS})?(?: please)?(?=\W*$|[,.;] *(?!{NUMBER}))",
+    rf"(?:{NUMBER}[ ,.;]+)*?(?P<count>{NUMBER})(?: {ROBOTS})?(?: please)?"
+    rf"(?=\W*$|[,.;](?! *{NUMBER}))",
     re.IGNORECASE,
 )
 

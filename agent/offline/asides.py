@@ -22,9 +22,49 @@ TELLING = re.compile(
 )
 """How a part begins that tells something."""
 DEMANDING = frozenset(
-    "robots num px m angle share point dir side flank radial spin apart scale ratio relation gap "
-    "stay swap leave remove add hold never neg clear close only except toofar toomany turn mirror "
-    "face merge split escape open wide resize current".split()
+    (
+        "robots",
+        "num",
+        "px",
+        "m",
+        "angle",
+        "share",
+        "point",
+        "dir",
+        "side",
+        "flank",
+        "radial",
+        "spin",
+        "apart",
+        "scale",
+        "ratio",
+        "relation",
+        "gap",
+        "stay",
+        "swap",
+        "leave",
+        "remove",
+        "add",
+        "hold",
+        "never",
+        "neg",
+        "clear",
+        "close",
+        "only",
+        "except",
+        "toofar",
+        "toomany",
+        "turn",
+        "mirror",
+        "face",
+        "merge",
+        "split",
+        "escape",
+        "open",
+        "wide",
+        "resize",
+        "current",
+    )
 )
 """Kinds of phrases that demand something, or change what does."""
 

@@ -23,7 +23,8 @@ SHOWING = re.compile(r"(?<=\w) (?:right )?(?:over|up|down) here\b", re.IGNORECAS
 """Words that mean what is pointed at."""
 OFF = re.compile(
     r"(?:(?:[,;.] ?)?(?:and |but |please |so )*)?\b"
-    r"(?:(?:stay|keep|steer|keeping|staying|stays|kept) (?:\w+ )?(?:off|clear of|away from|out of)|off|avoid(?:ing)?|mind|clear of|"
+    r"(?:(?:stay|keep|steer|keeping|staying|stays|kept) (?:\w+ )?(?:off|clear of|away from|out of)|"
+    r"off|avoid(?:ing)?|mind|clear of|"
     r"(?:but |and )?not (?:on|over|touching)|(?:do not|don'?t|never) (?:touch|stand on|drive over)|"
     r"(?:no robots?|no one|nobody|none)(?: of them)?(?: (?:may|must|should|is to|can|shall))?"
     r"(?: (?:be|stand|go))? (?:on|over|near))(?: the)?\s+$",
