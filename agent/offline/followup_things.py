@@ -44,7 +44,9 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
 
 def _is_shown(chunk: Chunk, text: str) -> bool:
     """Whether a phrase means what is pointed at: "this house", "the house over here"."""
-    shown = text[chunk.start : chunk.end].lower().startswith(("this ", "that "))
+    first, *rest = text[chunk.start : chunk.end].lower().split()
+    known = all(thing_phrase([word], 0) is not None for word in rest)
+    shown = first in ("this", "that") and known
     return shown or bool(re.match(r" (?:(?:over|up|down|right) )?here\b", text[chunk.end :]))
 
 

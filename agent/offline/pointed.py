@@ -56,7 +56,7 @@ def narrowed(task: Task, history: History) -> Task | Step:
         named = [(named[0][0], str(task.pointed[0]["id"]))]
     if len(task.pointed) < 2 and named[0][1] not in centres:
         return task
-    kept_off = _parted(task, named, centres)
+    kept_off = _clear_of(task, named, centres)
     if kept_off is not None or len({name for _, name in named}) > 1:
         return kept_off or task
     chunk, name = named[0]
@@ -76,7 +76,7 @@ def narrowed(task: Task, history: History) -> Task | Step:
     return replace(task, instruction=words, pointed=chosen)
 
 
-def _parted(
+def _clear_of(
     task: Task, named: Sequence[tuple[Chunk, str]], centres: dict[str, tuple[float, float]]
 ) -> Task | None:
     """The task about one thing pointed at, clear of the others; None where it is not said so."""
