@@ -274,7 +274,7 @@ def shift(slots: Slots, said: Said) -> Effects:
 def approach(slots: Slots, said: Said) -> Effects:
     """All of it some way towards a thing."""
     current = slots.get("current")
-    to = current[-1] if current else where(slots, said, "towards {}")
+    to = str(current[-1]) if current else where(slots, said, "towards {}")
     if isinstance(to, list):
         return to
     slots.has("all")
@@ -319,7 +319,8 @@ def place(slots: Slots, said: Said) -> Effects:
     ways, length = set(slots.get("radial", ())), bare_length(slots)
     if len(ways) != 1 or (length is None and slots.has("num", "px")):
         return None
-    by = {next(iter(ways)): length} if length is not None else _some_way(ways.pop(), slots, said)
+    way_on = str(ways.pop())
+    by = _some_way(way_on, slots, said) if length is None else {way_on: length}
     return [{"kind": "place", "robot": r, "by": by} for r in robots]
 
 

@@ -221,7 +221,8 @@ def _scaled(edit: Effect, share: float) -> Effect | None:
     if kind == "place" and "by" in edit:
         by: Any = edit["by"]
         if isinstance(by, dict):
-            ways = {k: v for k, v in by.items() if k in ("out", "in")}
+            given: dict[str, float] = edit["by"]
+            ways = {k: v for k, v in given.items() if k in ("out", "in")}
             back = {"out": "in", "in": "out"}
             return edit | {"by": {back[k]: rounded(v * -share) for k, v in ways.items()}}
         return edit | {"by": [rounded(v * share) for v in by]}

@@ -5,6 +5,7 @@ asks when the words do not settle what to do. It is no language model: it sees m
 """
 
 import json
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -183,7 +184,10 @@ def _said(task: Task, history: History) -> str:
         ):
             if answer.text.strip().isdecimal():
                 continue  # how many robots
-            for quote in read_instruction(text, task.metres_per_pixel).unread:
+            alone = read_instruction(answer.text, task.metres_per_pixel)
+            odd = alone.unscaled or [q for q in alone.unread if re.search("[0-9]", q)]
+            unread = read_instruction(text, task.metres_per_pixel).unread
+            for quote in () if odd else unread:  # an answer counts where it is wholly read
                 text = text.replace(quote, " ", 1)
             text = f"{text} . {answer.text}"
     return text
