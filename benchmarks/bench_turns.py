@@ -5,16 +5,19 @@ and encoding it is printed beside.
 """
 
 import time
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from statistics import median
 
 import numpy as np
 
 from ..agent.agent import Agent
+from ..agent.conversation import Session
 from ..tools.context import Settings
 from ..tools.draw import draw_plan
 from ..tools.perception.image import Picture, picture_from_array
 from ..tools.perception.target_prompt import TargetPrompt
+from .growth import show
 
 SIZE, ROBOTS = (1100, 1840), 30
 BOX = (780, 420, 1060, 680)
@@ -42,16 +45,20 @@ def main() -> None:
         run = session.say(WORDS[turn % len(WORDS)])
         spent.append(1000 * (time.process_time() - began))
         assert run.report.status == "planned", run.report.message
-    print(f"{ROBOTS} robots, {SIZE[1]} x {SIZE[0]} px; CPU of an edit turn, ms")
+    show(_rows(spent, session))
+
+
+def _rows(spent: Sequence[float], session: Session) -> Iterator[str]:
+    yield f"{ROBOTS} robots, {SIZE[1]} x {SIZE[0]} px; CPU of an edit turn, ms"
     for first in ROUNDS:
         cost = median(spent[4 * (first - 1) : 4 * first])
-        print(f"  turn {4 * first - 3:>4} {cost:7.1f}   {cost / median(spent[:4]):.2f} x the first")
+        yield f"  turn {4 * first - 3:>4} {cost:7.1f}   {cost / median(spent[:4]):.2f} x the first"
     run = session.run
     assert run is not None
     began = time.process_time()
     image = draw_plan(run.context.picture, run.world, run.world.plan().plan, "")
     image.save(BytesIO(), "PNG")
-    print(f"  drawing and encoding {1000 * (time.process_time() - began):7.1f}")
+    yield f"  drawing and encoding {1000 * (time.process_time() - began):7.1f}"
 
 
 if __name__ == "__main__":

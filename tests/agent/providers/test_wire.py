@@ -186,7 +186,9 @@ def test_without_a_prompt_the_tools_carry_the_mark() -> None:
     request = Request("", HISTORY, TOOLS)
     sent = from_json(Anthropic("m", UNKNOWN).body(request, stream=False))
     assert "system" not in sent
-    assert ["cache_control" in tool for tool in sent["tools"]] == [False] * (len(TOOLS) - 1) + [True]
+    assert ["cache_control" in tool for tool in sent["tools"]] == [False] * (len(TOOLS) - 1) + [
+        True
+    ]
 
 
 @pytest.mark.parametrize(
