@@ -267,12 +267,23 @@ def _ask_all(question: str, history: History) -> Step:
     return _ask(question, reply["candidates"])
 
 
+NOTHING_FOUND: dict[str, Any] = {
+    "candidates": [],
+    "things": 0,
+    "settled": False,
+    "absent": False,
+    "doubt": "",
+    "lacking": "",
+}
+"""What locate_object answers where nothing can be told."""
+
+
 def located(query: dict[str, Any] | None, history: History) -> dict[str, Any] | None:
     """What locate_object answered to a query, if it was asked."""
     for call in calls_in(history):
         if call.name == "locate_object" and call.arguments.get("query") == query:
             result = next(m for m in history if isinstance(m, Result) and m.call_id == call.id)
-            return {"candidates": []} if result.error else json.loads(result.text)
+            return NOTHING_FOUND | ({} if result.error else json.loads(result.text))
     return None
 
 
