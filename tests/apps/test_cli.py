@@ -159,12 +159,7 @@ def test_terminal_output_names_what_a_person_needs(tmp_path: Path) -> None:
         ("Surround the car with many robots", CAR_BOX, "many robots"),
         ("Surround the car", ("-n", 4), "Which one is"),
         ("Stand between the cars", ("-n", 4, *CAR_BOX), "two things"),
-        pytest.param(
-            "Ring the car and fill it",
-            ("-n", 4, *CAR_BOX),
-            "or",
-            marks=pytest.mark.xfail(strict=True, reason="a known fault of the reading"),
-        ),
+        ("Ring the car and fill it", ("-n", 4, *CAR_BOX), "or"),
     ],
 )
 def test_what_the_words_leave_open_is_asked(

@@ -107,7 +107,8 @@ def test_the_next_turn_goes_on_from_the_first(cli: Cli, picture: Path) -> None:
 def test_limits_of_the_first_turn_hold_for_the_next_anew(cli: Cli) -> None:
     run(cli, "--limit", "requests=4")
     assert report(cli("resume", "out", BLUE, "--json"))["status"] == "deployed"
-    fewer = report(cli("resume", "out", BLUE, "--limit", "requests=1", "--json"), 4)
+    again = "Now surround the red thing with 6 robots"
+    fewer = report(cli("resume", "out", again, "--limit", "requests=1", "--json"), 4)
     assert "1 request " in fewer["message"]
 
 
