@@ -22,7 +22,7 @@ ROBOTS_STAY = "The robots do not move back by themselves; say go for that."
 
 def talk(followup: Followup, standing: Standing | None, before: History) -> str:
     """The answer to what asks for no change."""
-    about = followup.about
+    about = followup.about if followup.kind == "talk" else ""
     if about == "help":
         return HELP
     if about == "thanks":

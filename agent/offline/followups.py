@@ -258,8 +258,14 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
         go="go" in kinds,
         hold="hold" in kinds,
         query=query and {k: v for k, v in query.items() if k != "kind"},
-        about=next((e["about"] for e in effects if e["kind"] == "talk"), ""),
+        about=_about([e["about"] for e in effects if e["kind"] == "talk"]),
     )
+
+
+def _about(talk: Sequence[str]) -> str:
+    """What is talked about above all: thanks and greetings come last."""
+    weighty = (about for about in talk if about not in ("thanks", "hello"))
+    return next(weighty, talk[0] if talk else "")
 
 
 def _not_framed(line: Line) -> Followup:

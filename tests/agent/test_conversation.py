@@ -126,6 +126,18 @@ def test_a_question_is_dropped_for_what_is_no_answer_to_it(session: Session) -> 
     assert told.report.plan_id == asked.report.plan_id
 
 
+def test_thanks_never_stand_for_the_command_beside_them(session: Session) -> None:
+    inside = session.say("thank you, a bit further out please")
+    assert inside.report.status == "planned"
+    again = session.say("lovely. all of them around it")
+    assert "welcome" not in again.report.message
+    session.undo(to="first")
+    session.undo()
+    told = session.say("thank you, go")
+    assert told.report.status == "answered"
+    assert "No plan stands" in told.report.message
+
+
 def test_what_is_pointed_at_answers_which(session: Session) -> None:
     moved = session.say("the same around this one", pointed=[TargetPrompt(box=BLUE)])
     assert moved.report.status == "planned"
