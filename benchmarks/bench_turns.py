@@ -45,10 +45,10 @@ def main() -> None:
         run = session.say(WORDS[turn % len(WORDS)])
         spent.append(1000 * (time.process_time() - began))
         assert run.report.status == "planned", run.report.message
-    show(_rows(spent, session))
+    show(_turn_rows(spent, session))
 
 
-def _rows(spent: Sequence[float], session: Session) -> Iterator[str]:
+def _turn_rows(spent: Sequence[float], session: Session) -> Iterator[str]:
     yield f"{ROBOTS} robots, {SIZE[1]} x {SIZE[0]} px; CPU of an edit turn, ms"
     for first in ROUNDS:
         cost = median(spent[4 * (first - 1) : 4 * first])

@@ -56,7 +56,7 @@ def test_a_later_turn_that_makes_no_plan_leaves_the_files_of_the_one_that_did(
     files = {name: (planned / name).read_bytes() for name in ("plan.json", "plan.png")}
     assert formup("resume", planned, "thanks", "--json") == 0
     assert {name: (planned / name).read_bytes() for name in files} == files
-    assert formup("resume", planned, "surround the coin with 4 robots", "--json") == 3
+    assert formup("resume", planned, "the same around the other coin", "--json") == 3
     assert (planned / "question.png").exists()
     assert {name: (planned / name).read_bytes() for name in files} == files
     (planned / "plan.png").unlink()

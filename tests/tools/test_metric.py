@@ -161,7 +161,7 @@ def test_the_scale_is_part_of_what_is_certified_and_is_kept(
     assert back.world.metres_per_pixel == SCALE
     assert answer(back, "deploy", plan_id=plan)["arrived"]
     other = tool_calls(picture, world=stored.world, metres_per_pixel=0.1)
-    with pytest.raises(ToolError, match="or the scale is another"):
+    with pytest.raises(ToolError, match="or its scale is another"):
         answer(other, "deploy", plan_id=plan)
     assert work.world.having(metres_per_pixel=None).is_void(work.world.plans[plan].plan)
     with pytest.raises(InputError, match="-2 metres per pixel"):

@@ -37,7 +37,7 @@ REFUSED: list[tuple[str, dict[str, Any]]] = [
     ("locate_object", {"query": {"colours": ["reddish"]}}),
     ("locate_object", {"query": {"relations": [{"kind": "above", "things": [{"size": 3}]}]}}),
     ("segment", {"outline": [[1, 2, 3]]}),
-    ("measure", {"a": "t1"}),
+    ("measure", {"b": "t1"}),
     ("propose_formation", {"contract": {"groups": []}}),
     ("propose_formation", {"contract": {"groups": [GROUP | {"relation": "near"}]}}),
     ("propose_formation", {"contract": {"groups": [GROUP | {"robots": 0}]}}),
