@@ -171,13 +171,12 @@ def _closed(
     query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
 ) -> str:
     told: list[str] = []
-    for group, opened in zip(data["groups"], query["opened"], strict=True):
+    for group in data["groups"]:
         if "closed" not in group:
             continue
-        group = group | {"closed": group["closed"] and not opened}
         width = length_text(group["widest_opening_px"], scale)
         widest = f"the widest opening, between robots {listed(group['between'])}, is {width}"
-        needed = "" if group["closed"] or opened else f"; {_enough(group)}"
+        needed = "" if group["closed"] or group["opened"] else f"; {_enough(group)}"
         told.append(f"{'Yes, closed' if group['closed'] else 'No, not closed'}: {widest}{needed}.")
     return " ".join(told) or "They stand in no ring, so nothing is closed."
 

@@ -189,6 +189,9 @@ class Line:
         found = [k for k, g in enumerate(groups, 1) if named and named[-1] in g.get("targets", ())]
         if found and kind in (*OF_TEAMS, *OF_A_TEAM):
             return effect | {"group": found[0]}
+        rings = [k for k, g in enumerate(groups, 1) if g["relation"] != "at"]
+        if len(rings) == 1 and kind in OF_A_TEAM and kind != "count" and "robots" not in effect:
+            return effect | {"group": rings[0]}  # a robot that stands by itself is no team
         if kind == "count" or (kind in OF_A_TEAM and "robots" not in effect):
             options = [f"{words} at {t}" for t in self.standing.targets]
             return ask(f"There are {len(groups)} teams. Which one?", *options)[0]

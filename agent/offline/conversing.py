@@ -168,8 +168,7 @@ class _Steps:
             data = json.loads(measured.text)
             if query["about"] == "nearest" and thing and thing not in standing.targets:
                 return self._nearest_to(thing, data, standing, query)
-            opened = [g.get("opening") is not None or bool(g.get("sides")) for g in standing.groups]
-            return Reply(text=said_of_query(query | {"opened": opened}, data, scale))
+            return Reply(text=said_of_query(query, data, scale))
         two = len(robots) == 2 and "each" not in query
         if (thing or two) and query["about"] != "nearest":
             ends = [*(f"r{r}" for r in robots), *([thing] if thing else [])]

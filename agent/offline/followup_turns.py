@@ -39,9 +39,18 @@ RELATIVE = (
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
+def _times(slots: Slots, said: Said) -> int:
+    """How many steps: as many as are said, or as often as it is said: "undo, undo"."""
+    if "num" in slots or "twice" in slots:
+        return int(slots.get("num", slots.get("twice", [1]))[0])
+    parts = re.split(r"[,;.!]|\band\b|\bthen\b", said.words.lower())
+    words = [re.sub(r"\b(?:again|please)\b", "", part).strip() for part in parts]
+    return max(1, len([w for w in words if w])) if len({*words} - {""}) == 1 else 1
+
+
 def undo(slots: Slots, said: Said) -> Effects:
     """So many steps back."""
-    steps, there = int(slots.get("num", slots.get("twice", [1]))[0]), said.standing.changes
+    steps, there = _times(slots, said), said.standing.changes
     if there < steps:
         why = (
             "Nothing was changed yet"
@@ -60,7 +69,7 @@ def dont(slots: Slots, said: Said) -> Effects:
 
 def redo(slots: Slots, said: Said) -> Effects:
     """So many steps forward again."""
-    steps = int(slots.get("num", slots.get("twice", [1]))[0])
+    steps = _times(slots, said)
     if said.standing.redo < steps:
         return refuse("There is nothing to make again: nothing was taken back. Say what to change.")
     return [{"kind": "undo", "steps": -steps}]

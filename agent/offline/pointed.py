@@ -31,6 +31,10 @@ OFF = re.compile(
     re.IGNORECASE,
 )
 """What comes before a thing that is to be kept clear of."""
+SEVERAL = re.compile(
+    r"\b(?:each|every|both|all)\b(?: of)?(?: the| these| those)?\s*$", re.IGNORECASE
+)
+"""What comes before a thing where more than one is meant."""
 THE_THING = "the thing"
 """Stands in the instruction for the one that is chosen."""
 
@@ -60,6 +64,8 @@ def narrowed(task: Task, history: History) -> Task | Step:
     if kept_off is not None or len({name for _, name in named}) > 1:
         return kept_off or task
     chunk, name = named[0]
+    if SEVERAL.search(task.instruction[: chunk.start]) or SEVERAL.match(_quantity(task, chunk)):
+        return task
     if name not in centres:
         things = described([name.removeprefix("?")])
         looked = one_at(things[0].whole_query, centres, history) if len(things) == 1 else None
@@ -74,6 +80,11 @@ def narrowed(task: Task, history: History) -> Task | Step:
     words = f"{text[:start]}{THE_THING}{text[chunk.end :]}"
     chosen = tuple(p for p in task.pointed if p["id"] == name)
     return replace(task, instruction=words, pointed=chosen)
+
+
+def _quantity(task: Task, chunk: Chunk) -> str:
+    """The first word of a phrase."""
+    return (task.instruction[chunk.start : chunk.end].split() or [""])[0]
 
 
 def _clear_of(

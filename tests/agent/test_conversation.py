@@ -1,6 +1,7 @@
 """Conversations: turns change the plan that stands, go moves robots, stop holds them."""
 
 import asyncio
+from collections.abc import AsyncGenerator
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from formup.agent.store.folder_store import FolderStore
 from formup.agent.wrappers.doubles import FunctionModel
 from formup.tools.context import Settings
 from formup.tools.errors import InputError
-from formup.tools.fleet.protocol import Motion
+from formup.tools.fleet.protocol import Motion, Pose
+from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.perception.image import Picture, picture_from_array
 from formup.tools.perception.target_prompt import TargetPrompt
 
@@ -257,3 +259,64 @@ class TestService:
         assert isinstance(run.outcome, Cancelled)
         assert stopped is not None
         assert stopped.report.status == "stopped"
+
+
+@pytest.mark.usefixtures("real")
+@pytest.mark.parametrize("how", ["/approve", "yes"])
+def test_real_robots_wait_for_the_approval_of_the_plan_that_stands(
+    session: Session, drives: list[Motion], how: str
+) -> None:
+    asked = session.say("go")
+    assert asked.report.status == "needs_approval"
+    assert not drives
+    plan = asked.report.plan_id or ""
+    with pytest.raises(InputError, match="p-other cannot be approved: plan p-"):
+        asyncio.run(session.aapprove("p-other"))
+    done = asyncio.run(session.aapprove(plan)) if how == "/approve" else session.say("yes")
+    assert done.report.status == "deployed"
+    assert drives
+    changed = session.say("a bit further out")
+    assert changed.report.status == "planned"
+    again = session.say("go")
+    assert again.report.status == "needs_approval", "an edited plan needs another approval"
+    assert session.say("no").report.status != "deployed"
+
+
+def test_stop_holds_robots_that_drive_within_one_control_period(
+    picture: Picture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[int] = []
+    drive = SimulatedFleet.drive
+
+    async def slow(self: SimulatedFleet, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
+        async for poses in drive(self, motion):
+            steps.append(1)
+            yield poses
+            await asyncio.sleep(0.02)
+
+    monkeypatch.setattr(SimulatedFleet, "drive", slow)
+
+    async def talk() -> tuple[Run, int, Run]:
+        service = Service(Agent(), FolderStore(tmp_path))
+        name = service.open(picture, settings=Settings(robots=8), pointed=[TargetPrompt(box=RED)])
+        await service.say(name, "Surround it")
+        turn = asyncio.create_task(service.say(name, "go"))
+        while len(steps) < 5:
+            await asyncio.sleep(0.01)
+        stopped = await service.stop(name)
+        assert stopped is not None
+        ended = await turn
+        assert ended.report.status in ("stopped", "failed")
+        driven = len(steps)
+        await asyncio.sleep(0.1)
+        assert len(steps) == driven, "nobody moves on"
+        held = await service.say(name, "a bit further out")
+        assert len(steps) == driven
+        went = await service.say(name, "go")
+        await service.close()
+        return held, driven, went
+
+    held, driven, went = asyncio.run(talk())
+    assert driven <= 5 + 2
+    assert held.report.status == "planned"
+    assert went.report.status == "deployed"

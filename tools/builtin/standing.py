@@ -107,7 +107,8 @@ def _group_facts(world: World, plan: Plan, k: int) -> dict[str, Any]:
     if ring is None:
         return data
     facts = ring.model_dump() | {"between": [names[i] for i in ring.between]}
-    return data | facts | {"closed": ring.closed and not group.opens}
+    opened = group.opens or group.sides is not None
+    return data | facts | {"opened": opened, "closed": ring.closed and not opened}
 
 
 def _arrived(world: World, plan: Plan) -> bool:
