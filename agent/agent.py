@@ -3,14 +3,14 @@
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..prompts import PromptLibrary
 from ..tools.builtin import TOOLS
 from ..tools.builtin.others import with_keep_outs
-from ..tools.context import Context, Settings
+from ..tools.context import Artefacts, Context, Services, Settings
 from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
@@ -37,7 +37,7 @@ from .session import (
     end_facts,
     picture_facts,
 )
-from .session_start import FORMAT
+from .session_start import prompt_facts, start_facts
 from .store.folder import FolderLog
 from .store.folder_store import FolderSession
 from .store.protocol import StoredSession
@@ -94,11 +94,11 @@ class Agent:
         name = (own if planner is None else "planner") if prompt is None else prompt
         self.prompt = None if name is None else prompt_named(self.library, name)
         self.prompts = () if self.prompt is None else (self.prompt,)
-        self._names: tuple[str, str | None] = (self.model.name, None)
+        self.names: tuple[str, str | None] = (self.model.name, None)
         if planner is not None:
             made = staged(self.model, planner, base_url, str(name), self.library)
             self.model, self.prompts = made
-            self._names = made[0].names
+            self.names = made[0].names
         self.system = self.prompt.render() if self.prompt else system
         self.base_url, self.tools, self.limits, self.policy = base_url, tools, limits, policy
         self._tracer = tracer
@@ -125,6 +125,8 @@ class Agent:
         keep_out: Sequence[TargetPrompt] = (),
         settings: Settings | None = None,
         trace: Path | StoredSession | None = None,
+        begun: int = 0,
+        services: Services | None = None,
         show: Show | None = None,
     ) -> Run:
         """Carry out one instruction on one picture: a session of one turn, that can go on.
@@ -139,21 +141,26 @@ class Agent:
             settings: what the person fixed.
             trace: a file, or a new session of a store, to write to as it goes: it can be resumed
                 and replayed from there, by default in another process.
+            begun: how many events a session of a store has already, of which the first has the
+                `facts`.
+            services: what tools use beside the world; made for the picture if left out.
             show: is given every message as it comes.
 
         Raises:
             InputError: something given cannot be used.
         """
-        context = Context.of(picture, settings, World.of(picture, targets=tuple(targets)))
+        world = World.of(picture, targets=tuple(targets))
+        context = Context.of(picture, settings, world, services)
         check_turn(context, instruction, pointed)
         context = context.at(with_keep_outs(context, keep_out))
         context = replace(context, steps=(context.world.step,))
         log, stored = None, FolderSession(trace) if isinstance(trace, Path) else trace
         if stored is not None:
             context.services.artefacts = stored.artefacts
-            log = FolderLog(trace, begin=True) if isinstance(trace, Path) else stored.write(0)
+            log = FolderLog(trace, begin=True) if isinstance(trace, Path) else stored.write(begun)
         with closing(LogRecorder(log, context.services.artefacts, None, show)) as recorder:
-            recorder.event("session", self._facts(picture, context) if log else {})
+            if log is not None and not begun:
+                recorder.event("session", self.facts(picture, context.services.artefacts))
             return await self._turn(context, (), instruction, pointed, recorder, stored)
 
     def start(
@@ -330,7 +337,7 @@ class Agent:
             seconds = round(spent + time.perf_counter() - began, 3)
             context = replace(context, world=outcome.world)
             report = make_report(outcome, context, left.began, self.model.name, seconds)
-            report = report.model_copy(update=self._prompts())
+            report = report.model_copy(update=prompt_facts(self))
             recorder.world(outcome.world)
             recorder.event("end", end_facts(outcome, report))
             if recorder.problem is not None:
@@ -339,25 +346,9 @@ class Agent:
             describe(outcome, report)
         return Run(report, outcome, context, left.began, left.stored, recorder.events)
 
-    def _facts(self, picture: Picture, context: Context) -> dict[str, Any]:
+    def facts(self, picture: Picture, artefacts: Artefacts) -> dict[str, Any]:
         """What a log begins with, enough to go on in another process."""
-        return {
-            "format": FORMAT,
-            "model": self._names[0],
-            "planner": self._names[1],
-            "base_url": self.base_url,
-            "library": self.library.folder and str(self.library.folder.absolute()),
-            **self._prompts(),
-            "limits": asdict(self.limits),
-            "policy": self.policy.rules,
-            "picture": picture_facts(picture, context.services.artefacts),
-        }
-
-    def _prompts(self) -> dict[str, Any]:
-        """The prompt and, where two models share the work, all of theirs."""
-        facts = tuple(p.facts for p in self.prompts)
-        mine = [f for f, p in zip(facts, self.prompts, strict=True) if p == self.prompt]
-        return {"prompt": mine[0] if mine else None, "prompts": facts}
+        return start_facts(self, picture_facts(picture, artefacts))
 
     async def aclose(self) -> None:
         """Close what the model keeps open in the running event loop; it may be used again."""

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, Unpack
 
-from ..tools.context import Settings
+from ..tools.context import Services, Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
@@ -26,6 +26,9 @@ from .wrappers.commands import Commands
 
 NOTHING_SAID = "Say what to do first, such as surround the coin with 6 robots."
 HELD = "The robots are held where they are. Say what to change, or go to drive on."
+MAY_NOT_MOVE = (
+    "You may plan here but not move robots: nothing moves; somebody who may has to say go."
+)
 STOP = frozenset({"stop", "halt", "freeze", "stop now", "stop it", "emergency stop"})
 """Words that hold the robots at once, whoever else would have read them."""
 YES, NO = frozenset({"y", "yes", "approve", "approved"}), frozenset({"n", "no", "nope"})
@@ -71,6 +74,9 @@ class Session:
         stored: where it is written, if it is.
         auto: whether simulated robots move as soon as a plan is certified.
         held: whether they are not to, until the person says go.
+        may_move: whether who speaks may move robots; otherwise only plan.
+        begun: how many events the store had before the first turn.
+        services: what tools use beside the world, in the first turn.
         run: the last turn; None before the first.
     """
 
@@ -82,6 +88,9 @@ class Session:
     stored: StoredSession | None = None
     auto: bool = False
     held: bool = False
+    may_move: bool = True
+    begun: int = 0
+    services: Services | None = None
     run: Run | None = None
 
     async def asay(self, words: str, **options: Unpack[SayOptions]) -> Run:
@@ -109,6 +118,8 @@ class Session:
                 keep_out=self.keep_out,
                 settings=settings,
                 trace=self.stored,
+                begun=self.begun,
+                services=self.services,
                 show=show,
             )
         else:
@@ -166,6 +177,7 @@ class Session:
     async def ago(self, plan_id: str | None = None, show: Show | None = None) -> Run:
         """Drive the robots to a plan, the one that stands by default."""
         run = self._run
+        self._check_move()
         plan_id = plan_id or run.world.current
         if plan_id is None:
             return await self.aact("/go", text="There is no plan to go to yet; nothing moves.")
@@ -176,9 +188,10 @@ class Session:
         """Approve one plan, and drive real robots to it.
 
         Raises:
-            InputError: it is not the plan that waits.
+            InputError: it is not the plan that waits, or who speaks may not move robots.
         """
         run = self._run
+        self._check_move()
         waits = run.outcome.plan_id if isinstance(run.outcome, Paused) else None
         if waits != plan_id:
             what = f"plan {waits} waits" if waits else "no plan waits for approval"
@@ -274,9 +287,19 @@ class Session:
         go = read.go or read.kind == "go"
         self.held = (self.held or read.hold or read.kind == "hold") and not go
         if go:
+            self._check_move()
             await self._release()
-        moves = go or (self.auto and not self.held)
+        moves = go or (self.auto and self.may_move and not self.held)
         return self._fixed(self.run).model_copy(update={"may_deploy": moves})
+
+    def _check_move(self) -> None:
+        """Refuse to move robots for who may only plan.
+
+        Raises:
+            InputError: saying so (`not_allowed`).
+        """
+        if not self.may_move:
+            raise InputError(MAY_NOT_MOVE, "not_allowed")
 
     def _fixed(self, run: Run | None) -> Settings:
         if run is None:

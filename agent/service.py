@@ -1,37 +1,54 @@
 """Every command a front end can give, for many conversations in one process.
 
-One turn at a time per conversation; stop passes always. Front ends show and parse, nothing else.
+One turn at a time per conversation, in whichever process; stop passes always. Front ends show and
+parse, nothing else.
 """
 
 import asyncio
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from contextlib import closing
 from typing import Any, Unpack
 
-from ..tools.context import Settings
-from ..tools.errors import InputError
+from ..tools.context import Services, Settings
+from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from .agent import Agent
+from .approvals import Waiting, check_nonce, waiting
 from .conversation import Session
-from .session import Run, SayOptions, Show, load_run
+from .feed import FedSession, Feed, Poses
+from .fleet_owner import FleetOwner
+from .session import Run, SayOptions, Show, load_run, stored_picture
+from .session_start import Opening
 from .store.copies import fork
 from .store.protocol import Event, Store
+from .turns import PATIENCE, Asked, Turn, check_key, digest_of, is_noted, stop_note
+
+MOST_OPEN = 256
+"""Conversations kept in memory; others are read from the store when they go on."""
+ANYONE = Asked()
 
 
 class Service:
     """Conversations by their ids.
 
     Args:
-        agent: who decides in all of them.
+        agents: who decides in all of them; several by names, of which the first is the usual one.
         store: where they are written.
         auto: whether simulated robots move as soon as a plan is certified.
     """
 
-    def __init__(self, agent: Agent, store: Store, *, auto: bool = False) -> None:
-        self.agent, self.store, self.auto = agent, store, auto
+    def __init__(
+        self, agents: Agent | Mapping[str, Agent], store: Store, *, auto: bool = False
+    ) -> None:
+        self.agents = {"": agents} if isinstance(agents, Agent) else dict(agents)
+        self.store, self.auto = store, auto
+        self._owner = FleetOwner(store)
         self._sessions: dict[str, Session] = {}
-        self._turns: dict[str, asyncio.Task[Run]] = {}
+        self._feeds: dict[str, Feed] = {}
+        self._turns: dict[str, Turn] = {}
+        self._waiting: dict[str, tuple[int | None, Waiting | None]] = {}
+        self._watcher: asyncio.Task[None] | None = None
 
     def open(
         self,
@@ -41,21 +58,34 @@ class Service:
         pointed: Sequence[TargetPrompt] = (),
         keep_out: Sequence[TargetPrompt] = (),
         name: str = "",
+        agent: str | None = None,
+        owner: str = "",
     ) -> str:
         """Begin a conversation about a picture.
 
+        Args:
+            name: what a person calls it.
+            agent: who decides; the usual one by default.
+            owner: whose it is, which its id then begins with.
+
         Returns:
             Its id.
+
+        Raises:
+            InputError: no such agent, or it cannot be written.
         """
-        stored = self.store.create(name)
-        self._sessions[stored.id] = self.agent.start(
-            picture,
-            pointed=pointed,
-            keep_out=keep_out,
-            settings=settings,
-            stored=stored,
-            auto=self.auto,
+        opening = Opening(
+            agent=next(iter(self.agents)) if agent is None else agent,
+            settings=settings or Settings(),
+            pointed=tuple(pointed),
+            keep_out=tuple(keep_out),
         )
+        decides = self.agent_named(opening.agent)
+        stored = self.store.create(name, owner=owner)
+        facts = decides.facts(picture, stored.artefacts)
+        with closing(stored.write(0)) as log:
+            log.append("session", {**facts, "opening": opening.model_dump(mode="json")})
+        self.reopen(stored.id, picture)
         return stored.id
 
     def reopen(self, session: str, picture: Picture | None = None) -> Session:
@@ -68,10 +98,7 @@ class Service:
             InputError: there is none, it is damaged, or the picture is another.
         """
         if session not in self._sessions:
-            stored = self.store.open(session)
-            run = load_run(stored, picture)
-            made = Session(self.agent, run.context.picture, run.context.settings, auto=self.auto)
-            self._sessions[session] = replace(made, run=run, stored=stored)
+            self._open(session, picture)
         return self._sessions[session]
 
     def session(self, session: str) -> Session:
@@ -84,51 +111,123 @@ class Service:
             raise InputError(f"The session {session!r} is not open here.", "missing")
         return self._sessions[session]
 
-    async def say(self, session: str, words: str, **options: Unpack[SayOptions]) -> Run:
+    def agent_named(self, name: str) -> Agent:
+        """Who decides under a name.
+
+        Raises:
+            InputError: nobody does.
+        """
+        if name not in self.agents:
+            there = ", ".join(filter(None, self.agents)) or "one without a name"
+            raise InputError(f"There is no agent {name!r} here; there is {there}.", "missing")
+        return self.agents[name]
+
+    async def fresh(self, session: str) -> Session:
+        """A conversation as the store has it, read again where another process has gone on.
+
+        Raises:
+            InputError: there is none, or it is damaged.
+        """
+        held = self._sessions.get(session)
+        return held if held and session in self._turns else await self._current(session)
+
+    def say(
+        self, session: str, words: str, asked: Asked = ANYONE, **options: Unpack[SayOptions]
+    ) -> Turn:
         """What a person says next; see `Session.asay`.
 
         Raises:
-            InputError: a turn of it is under way (`busy`), or something given cannot be used.
+            InputError: a turn of it is under way (`busy`). When it is awaited: something given
+                cannot be used, or was done before under that key (`key`, `repeated`).
         """
-        return await self._turn(session, self.session(session).asay(words, **options))
+        return self._begin(session, asked, "say", words, **options)
 
-    async def edit(self, session: str, *edits: dict[str, Any]) -> Run:
+    def edit(self, session: str, *edits: dict[str, Any], asked: Asked = ANYONE) -> Turn:
         """Change the plan that stands, by edits as `edit_formation` takes them."""
-        return await self._turn(session, self.session(session).aedit(*edits))
+        return self._begin(session, asked, "edit", *edits)
 
-    async def undo(self, session: str, steps: int = 1, to: str | None = None) -> Run:
+    def undo(
+        self, session: str, steps: int = 1, to: str | None = None, asked: Asked = ANYONE
+    ) -> Turn:
         """Go back to the plan before; `steps` below 0 forward again."""
-        return await self._turn(session, self.session(session).aundo(steps, to))
+        return self._begin(session, asked, "undo", steps, to)
 
-    async def go(self, session: str, plan_id: str | None = None, show: Show | None = None) -> Run:
+    def go(
+        self,
+        session: str,
+        plan_id: str | None = None,
+        show: Show | None = None,
+        asked: Asked = ANYONE,
+    ) -> Turn:
         """Drive the robots to a plan, the one that stands by default."""
-        return await self._turn(session, self.session(session).ago(plan_id, show))
+        return self._begin(session, asked, "go", plan_id, show=show)
 
-    async def image(self, session: str, picture: Picture) -> Run:
+    def image(self, session: str, picture: Picture, asked: Asked = ANYONE) -> Turn:
         """Go on with another picture; see `Session.aimage`."""
-        return await self._turn(session, self.session(session).aimage(picture))
+        return self._begin(session, asked, "image", picture)
 
-    async def approve(self, session: str, plan_id: str, show: Show | None = None) -> Run:
-        """Approve exactly one plan, and drive real robots to it."""
-        return await self._turn(session, self.session(session).aapprove(plan_id, show))
+    def approve(
+        self,
+        session: str,
+        plan_id: str,
+        nonce: str,
+        show: Show | None = None,
+        asked: Asked = ANYONE,
+    ) -> Turn:
+        """Approve exactly one plan, and drive real robots to it.
 
-    async def stop(self, session: str) -> Run | None:
-        """Hold the robots at once, and end the turn that runs.
+        Args:
+            nonce: of what waits, as `waits` said.
+        """
+
+        def check(held: Session) -> None:
+            check_nonce(held.run, plan_id, nonce)
+
+        return self._begin(session, asked, "approve", plan_id, show=show, check=check)
+
+    async def waits(self, session: str) -> Waiting | None:
+        """The call that waits for a person's yes, if one does; the same until it is answered."""
+        run = (await self.fresh(session)).run
+        events = None if run is None else run.events
+        if self._waiting.get(session, (None, None))[0] != events:
+            self._waiting[session] = (events, waiting(run))
+        return self._waiting[session][1] if run is not None else None
+
+    async def stop(self, session: str, asked: Asked = ANYONE) -> Run | None:
+        """Hold the robots at once, and end the turn that runs, in whichever process.
 
         Returns:
             That turn, or one that says that they are held; None before anything was said.
         """
-        held, turn = self.session(session), self._turns.get(session)
-        await held.ahold()
-        if turn is None:
-            return await held.astop() if held.run is not None else None
-        turn.cancel()
-        return await turn
+        turn = self._turns.get(session)
+        if turn is not None:
+            if session in self._sessions:
+                await self._sessions[session].ahold()
+            turn.cancel()
+            return await turn.ended()
+        while True:
+            held = await self.fresh(session)
+            await held.ahold()
+            if held.run is None:
+                return None
+            try:
+                return await self._begin(session, asked, "stop")
+            except StorageError as error:
+                if error.kind not in ("busy", "gone_on"):
+                    raise
+            stored = self._feeds[session].stored
+            begun = [e.number for e in stored.events() if e.kind in ("turn", "resume")]
+            stored.artefacts.put(stop_note(stored.id, begun[-1]))
+            await asyncio.sleep(PATIENCE / 3)
 
     def point(self, session: str, *prompts: TargetPrompt) -> None:
         """What the person points at with their next words."""
         held = self.session(session)
         held.pointed = (*held.pointed, *prompts)
+
+    def turn(self, session: str) -> Turn | None:
+        """The turn that is under way in this process, if one is."""
+        return self._turns.get(session)
 
     def fork(self, session: str, turn: int | None = None) -> str:
         """A conversation of its own that begins as another did.
@@ -147,21 +246,152 @@ class Service:
         """What happened in a conversation, from a number on."""
         return self.store.open(session).events(after)
 
+    async def follow(
+        self, session: str, after: int = 0, heartbeat: float = 15.0
+    ) -> AsyncGenerator[Event | Poses | None]:
+        """What happens in a conversation, as it happens; see `Feed.subscribe`."""
+        await self.fresh(session)
+        async for told in self._feeds[session].subscribe(after, heartbeat):
+            yield told
+
+    async def delete(self, session: str) -> None:
+        """Stop a conversation and delete it."""
+        if session in self._turns:
+            await self.stop(session)
+        self.store.delete(session)
+        held = self._sessions.pop(session, None)
+        self._feeds.pop(session, None)
+        if held is not None and held.run is not None:
+            await held.run.context.services.close_fleets()
+
     async def close(self) -> None:
-        """Let go of fleets, models and the store."""
+        """Stop what runs, hold the robots, and let go of models and the store."""
+        await asyncio.gather(*map(self.stop, self._turns), return_exceptions=True)
+        if self._watcher is not None:
+            self._watcher.cancel()
         for held in self._sessions.values():
             if held.run is not None:
                 await held.run.context.services.close_fleets()
-        await self.agent.aclose()
+        await self._owner.close()
+        for agent in self.agents.values():
+            await agent.aclose()
         self.store.close()
 
-    async def _turn(self, session: str, work: Any) -> Run:
-        """One turn at a time."""
-        if session in self._turns:
-            work.close()
+    async def _current(self, session: str) -> Session:
+        held = self._sessions.pop(session, None)
+        if held is not None:
+            self._sessions[session] = held  # used last
+            last = held.begun if held.run is None else held.run.events
+            stored = self._feeds[session].stored
+            if last is not None and not await asyncio.to_thread(stored.events, last):
+                return held
+        if held is self._sessions.get(session):  # not read meanwhile
+            self._open(session, None)
+        return self._sessions[session]
+
+    def _open(self, session: str, picture: Picture | None) -> None:
+        """Read a conversation, and forget others that were not used for long."""
+        stored = self.store.open(session)
+        events = stored.events()
+        feed = self._feeds.setdefault(session, Feed(stored, ()))
+        for event in events[feed.last :]:
+            feed.publish(event)
+        old = self._sessions.get(session)
+        services = Services(claim=self._owner.claim, watch=feed.moved)
+        if old is not None and old.services is not None:
+            services.stopped |= old.services.stopped
+        made = self._read(FedSession(stored, feed), events, picture, services)
+        self._sessions[session] = made
+        for name in list(self._sessions)[: len(self._sessions) - MOST_OPEN]:
+            self._forget(name)
+
+    def _read(
+        self,
+        stored: FedSession,
+        events: Sequence[Event],
+        picture: Picture | None,
+        services: Services,
+    ) -> Session:
+        """A conversation from its events."""
+        first = events[0].data
+        opening = Opening.model_validate(first.get("opening") or {})
+        agent = self.agents.get(opening.agent) or next(iter(self.agents.values()))
+        run = None
+        if any(event.kind == "message" for event in events):
+            run = load_run(stored, picture, services)
+            picture = run.context.picture
+        else:
+            picture = stored_picture(first["picture"], stored.artefacts, picture)
+        return Session(
+            agent,
+            picture,
+            opening.settings if run is None else run.context.settings,
+            opening.pointed if run is None else (),
+            opening.keep_out if run is None else (),
+            stored,
+            self.auto,
+            begun=len(events),
+            services=services,
+            run=run,
+        )
+
+    def _forget(self, session: str) -> None:
+        """Let go of a conversation that can be read again, unless it holds robots."""
+        held, feed = self._sessions[session], self._feeds[session]
+        services = held.services
+        holds = services is not None and services.is_stopped
+        if session in self._turns or holds or held.stored is None:
+            return
+        del self._sessions[session]
+        self._waiting.pop(session, None)
+        if not feed.followers:
+            del self._feeds[session]
+
+    def _begin(
+        self,
+        session: str,
+        asked: Asked,
+        name: str,
+        *arguments: Any,
+        check: Callable[[Session], None] | None = None,
+        **options: Any,
+    ) -> Turn:
+        """Begin a turn, or go on with the one that was begun under the same key."""
+        turn, now = Turn(asked, digest_of(name, arguments, options)), self._turns.get(session)
+        if now is not None:
+            if asked.key is not None and now.asked.key == asked.key:
+                check_key(turn, {asked.key: (now.digest, now.number)}, again=True)
+                return now
             raise InputError("A turn is under way; wait for it, or stop it.", "busy")
-        task = self._turns[session] = asyncio.ensure_future(work)
-        try:
-            return await task
-        finally:
-            del self._turns[session]
+
+        async def work() -> Run:
+            held = await self._current(session)
+            feed = self._feeds[session]
+            check_key(turn, feed.keys)
+            if check is not None:
+                check(held)
+            feed.turn, held.may_move = turn, asked.may_move
+            return await getattr(held, f"a{name}")(*arguments, **options)
+
+        def over(task: asyncio.Task[Run]) -> None:
+            self._turns.pop(session, None)
+            if not task.cancelled():
+                task.exception()  # told to whoever awaits it, if anybody does
+
+        self._turns[session] = turn
+        turn.task = asyncio.ensure_future(work())
+        turn.task.add_done_callback(over)
+        if self._watcher is None or self._watcher.done():
+            self._watcher = asyncio.ensure_future(self._watch())
+        return turn
+
+    async def _watch(self) -> None:
+        """Stop the turns that other processes want stopped, while there are any."""
+        while self._turns:
+            await asyncio.sleep(PATIENCE)
+            for session, turn in list(self._turns.items()):
+                stored = self._feeds[session].stored if session in self._feeds else None
+                if stored is None or not turn.number:
+                    continue
+                if await asyncio.to_thread(is_noted, stored, turn.number):
+                    await self.stop(session)

@@ -57,6 +57,8 @@ class RunOptions(SayOptions, total=False):
 
     targets: Sequence[Target]
     trace: Path | StoredSession | None
+    begun: int
+    services: Services | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -199,12 +201,17 @@ def _no_collections() -> Generator[None]:
 
 
 @_no_collections()
-def load_run(source: str | Path | StoredSession, picture: Picture | None = None) -> Run:
+def load_run(
+    source: str | Path | StoredSession,
+    picture: Picture | None = None,
+    services: Services | None = None,
+) -> Run:
     """A session from its log, as far as it had come: paused, stopped, or killed in the middle.
 
     Args:
         source: the path of a log or of the folder with a trace.jsonl, or a session in a store.
         picture: what it works on; None for the one stored beside the log, or else where it lay.
+        services: what tools use beside the world; made anew if left out.
 
     Raises:
         InputError: it cannot be read, or the picture is not the same.
@@ -223,8 +230,11 @@ def load_run(source: str | Path | StoredSession, picture: Picture | None = None)
     except (ValidationError, KeyError, TypeError, ValueError, IndexError, AttributeError):
         damaged = f"{stored.label} is damaged; it is no whole session that formup wrote."
         raise InputError(damaged) from None
-    services = Services.of(_picture(state.facts["picture"], artefacts, picture))
-    services.artefacts = artefacts
+    services, seen = (
+        services or Services(),
+        stored_picture(state.facts["picture"], artefacts, picture),
+    )
+    services.pictures[seen.sha256], services.artefacts = seen, artefacts
     context = Context(state.world, services, state.settings, state.words, steps=state.steps).check()
     report = make_report(outcome, context, state.began, model_name(state.facts), state.seconds)
     report = report.model_copy(update={"prompt": prompt, "prompts": prompts})
@@ -254,8 +264,14 @@ def picture_facts(picture: Picture, artefacts: Artefacts) -> dict[str, Any]:
     }
 
 
-def _picture(facts: Mapping[str, Any], artefacts: Artefacts, given: Picture | None) -> Picture:
-    """The picture of a session, with the very content it began with."""
+def stored_picture(
+    facts: Mapping[str, Any], artefacts: Artefacts, given: Picture | None
+) -> Picture:
+    """The picture of a session, with the very content it began with.
+
+    Raises:
+        InputError: it is not there any more, or the one given is another.
+    """
     wanted = facts["facts"]["sha256"]
     if given is None:
         try:

@@ -3,21 +3,27 @@
 Whoever goes on with a session works by it, so that it is checked before anything follows from it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ConfigDict, ValidationError
 from pydantic_core import to_json
 
+from ..tools.context import Settings
 from ..tools.errors import InputError, StorageError
 from ..tools.formation.value import Value
+from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.tool import violations
 from ..tools.world import PictureFacts
 from .limits import Limits
 from .policy import Decision
 from .store.folder import read_events
 from .store.protocol import Event, StoredSession
+
+if TYPE_CHECKING:
+    from .agent import Agent
 
 FORMAT = "formup-session-1"
 
@@ -40,6 +46,22 @@ class _StoredPicture(_Part):
     file: str
 
 
+class Opening(Value):
+    """What a session begins with that its first turn works by.
+
+    Attributes:
+        agent: the name, in a service, of who decides.
+        settings: what the person fixed.
+        pointed: the things meant, where they point.
+        keep_out: what no robot may enter.
+    """
+
+    agent: str = ""
+    settings: Settings = Settings()
+    pointed: tuple[TargetPrompt, ...] = ()
+    keep_out: tuple[TargetPrompt, ...] = ()
+
+
 class _Start(_Part):
     format: Literal["formup-session-1"]
     model: str
@@ -51,6 +73,29 @@ class _Start(_Part):
     limits: Limits
     policy: tuple[tuple[str, Decision], ...]
     picture: _StoredPicture
+    opening: dict[str, Any] | None = None
+
+
+def start_facts(agent: "Agent", picture: Mapping[str, Any]) -> dict[str, Any]:
+    """What the log of a session that an agent begins begins with."""
+    return {
+        "format": FORMAT,
+        "model": agent.names[0],
+        "planner": agent.names[1],
+        "base_url": agent.base_url,
+        "library": agent.library.folder and str(agent.library.folder.absolute()),
+        **prompt_facts(agent),
+        "limits": asdict(agent.limits),
+        "policy": agent.policy.rules,
+        "picture": picture,
+    }
+
+
+def prompt_facts(agent: "Agent") -> dict[str, Any]:
+    """The prompt and, where two models share the work, all of theirs."""
+    facts = tuple(p.facts for p in agent.prompts)
+    mine = [f for f, p in zip(facts, agent.prompts, strict=True) if p == agent.prompt]
+    return {"prompt": mine[0] if mine else None, "prompts": facts}
 
 
 def read_session(source: Path | StoredSession) -> Sequence[Event]:

@@ -146,7 +146,9 @@ def _how_many(name: str, rest: str) -> int:
 
 
 async def _approve(talk: "Talk", rest: str, show: Show | None) -> Done:
-    return await talk.service.approve(talk.session, rest or talk.run.report.plan_id or "", show)
+    waits = await talk.service.waits(talk.session)
+    plan_id = rest or talk.run.report.plan_id or ""
+    return await talk.service.approve(talk.session, plan_id, waits.nonce if waits else "", show)
 
 
 async def _go(talk: "Talk", rest: str, show: Show | None) -> Done:

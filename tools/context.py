@@ -5,12 +5,12 @@ fleet, and caches by content hash. Whatever a tool finds out or decides goes int
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 from .errors import StorageError, ToolError
-from .fleet.protocol import Fleet
+from .fleet.protocol import Fleet, Pose
 from .fleet.registry import FLEETS
 from .formation.units import check_scale
 from .formation.value import Value
@@ -107,6 +107,15 @@ class MemoryArtefacts:
 USUAL = Settings()
 
 
+async def _as_is(fleet: Fleet) -> Fleet:
+    """Nobody else has it."""
+    return fleet
+
+
+def _ignore(*what: object) -> None:
+    """Nobody keeps what a tool observes, or that robots move."""
+
+
 @dataclass
 class Services:
     """What tools use beside the world; nothing in here decides what happens.
@@ -118,6 +127,9 @@ class Services:
         found: what detectors found in pictures, by detector and picture; shared by all services
             that are not given their own.
         stopped: fleets that were stopped when they were let go of.
+        claim: what is given a fleet that was opened, and returns the one to use; raises where it
+            is another's.
+        watch: is given the poses of robots that drive, to be shown.
     """
 
     pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
@@ -126,6 +138,13 @@ class Services:
     found: dict[tuple[str, str], tuple[Candidate, ...]] = field(default_factory=lambda: _FOUND)
 
     stopped: set[str] = field(default_factory=set[str])
+    claim: Callable[[Fleet], Awaitable[Fleet]] = _as_is
+    watch: Callable[[tuple[Pose, ...]], None] = _ignore
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether a stop is in force."""
+        return bool(self.stopped) or any(fleet.stopped for fleet in self.fleets.values())
 
     async def close_fleets(self) -> None:
         """Let go of all fleets; a stop stays in force when they are opened again."""
@@ -139,10 +158,6 @@ class Services:
     def of(cls, picture: Picture) -> "Services":
         """Services for a conversation about one picture."""
         return cls({picture.sha256: picture})
-
-
-def _ignore(*what: object) -> None:
-    """Nobody keeps what a tool observes, or that robots move."""
 
 
 @dataclass(frozen=True)
@@ -171,14 +186,20 @@ class Context:
 
     @classmethod
     def of(
-        cls, picture: Picture, settings: Settings | None = None, world: World | None = None
+        cls,
+        picture: Picture,
+        settings: Settings | None = None,
+        world: World | None = None,
+        services: "Services | None" = None,
     ) -> "Context":
         """The context of a conversation about one picture.
 
         Raises:
             InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
         """
-        made = cls(world or World.of(picture), Services.of(picture), settings or USUAL)
+        services = services or Services()
+        services.pictures[picture.sha256] = picture
+        made = cls(world or World.of(picture), services, settings or USUAL)
         return made.check()
 
     def check(self) -> "Context":

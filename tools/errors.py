@@ -33,6 +33,10 @@ Kind = Literal[
     "missing",
     "busy",
     "gone_on",
+    "key",
+    "repeated",
+    "approval",
+    "not_allowed",
 ]
 """capacity: more robots than fit (`robots_that_fit`); cage: none that is escape-proof
 (`robots_that_fit`, `robots_needed`); crowded: two groups in each other's way (`groups`, from 1);
@@ -43,7 +47,9 @@ no such id; void_plan: the world has changed since; too_many_robots: more than c
 doubt: a contract that does not seem to be what the words say (`doubts`, each a clause); edit: the
 plan after a change is not certified (`findings`, each a sentence); nothing_to_undo: there is no
 step back, or none that was taken back; missing, busy, gone_on: a session that is not in its store,
-is written by another process, or was written since it was opened."""
+is written by another process, or was written since it was opened; key, repeated: a turn was asked
+for under a key before, with other arguments or the same (`turn`, its number); approval: a yes to
+nothing that waits; not_allowed: whoever asks may not do that."""
 
 
 class FormupError(Exception):

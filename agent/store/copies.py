@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ...tools.errors import InputError
-from .protocol import Event, Store, StoredSession, files_named
+from .protocol import Event, Store, StoredSession, files_named, owner_of
 
 
 def fork(
@@ -22,7 +22,7 @@ def fork(
     """
     events = source.events()
     events = events if turn is None else up_to_turn(events, turn)
-    return store.create(name, events, files_named(events, source.artefacts))
+    return store.create(name, events, files_named(events, source.artefacts), owner_of(source.id))
 
 
 def up_to_turn(events: Sequence[Event], turn: int) -> tuple[Event, ...]:

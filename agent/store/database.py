@@ -6,21 +6,20 @@ back when the process ends.
 """
 
 import hashlib
-import secrets
 import sqlite3
 import time
 from collections.abc import Generator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from pydantic_core import from_json, to_json
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import Connection, delete, func, insert, select, text, update
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
-from ...prompts.files import try_lock
 from ...tools.errors import StorageError
 from .folder import KINDS
+from .locks import lock_file, read_holder
 from .protocol import (
     Event,
     EventKind,
@@ -32,6 +31,7 @@ from .protocol import (
     gone_on,
     matches,
     missing,
+    new_id,
     now,
 )
 from .schema import EVENTS, FILES, SESSIONS, TURNS, engine_of, prepare
@@ -59,10 +59,14 @@ class DatabaseStore:
             raise
 
     def create(
-        self, name: str = "", events: Sequence[Event] = (), files: Sequence[bytes] = ()
+        self,
+        name: str = "",
+        events: Sequence[Event] = (),
+        files: Sequence[bytes] = (),
+        owner: str = "",
     ) -> StoredSession:
         """See `Store.create`."""
-        session = secrets.token_hex(5)
+        session = new_id(owner)
         facts = {"id": session, "name": checked_name(name), "created": now(), "last": len(events)}
         with self.writing() as connection:
             connection.execute(insert(SESSIONS).values(facts))
@@ -106,7 +110,7 @@ class DatabaseStore:
         stored = self.open(session)
         lock = self.lock(session)
         if lock is None:
-            raise busy(stored.label)
+            raise busy(stored.label, holder=self.holder(session))
         with lock, self.writing() as connection:
             connection.execute(delete(SESSIONS).where(SESSIONS.c.id == session))
 
@@ -114,21 +118,15 @@ class DatabaseStore:
         """See `Store.close`."""
         self._engine.dispose()
 
-    def lock(self, session: str) -> ExitStack | None:
-        """The lock of a session's only writer, until it is closed; None while another has it."""
+    def lock(self, name: str) -> ExitStack | None:
+        """See `Store.lock`; each session's only writer has the one of its id."""
         stack = ExitStack()
         with self._as_storage_errors():
             if self._engine.dialect.name == "sqlite":
-                path = Path(f"{self._engine.url.database}-locks") / session
-                path.parent.mkdir(exist_ok=True)
-                file = try_lock(path)
-                if file is None:
-                    return None
-                stack.callback(file.close)
-                stack.callback(_unlink, path)
-                return stack
+                self._lock_file(name).parent.mkdir(exist_ok=True)
+                return lock_file(self._lock_file(name))
             connection = stack.enter_context(self._engine.connect())
-            number = _lock_number(session)
+            number = _lock_number(name)
             taken = connection.scalar(select(func.pg_try_advisory_lock(number)))
             connection.commit()  # the lock is the connection's, and gone when that is
             if not taken:
@@ -136,6 +134,17 @@ class DatabaseStore:
                 return None
             stack.callback(_unlock, connection, number)
             return stack
+
+    def holder(self, name: str) -> str:
+        """See `Store.holder`."""
+        if self._engine.dialect.name == "sqlite":
+            return read_holder(self._lock_file(name))
+        with self.reading() as connection:
+            # as PostgreSQL shows the two halves of an advisory lock's number
+            return str(connection.scalar(text(_HOLDER), {"number": _lock_number(name)}) or "")
+
+    def _lock_file(self, name: str) -> Path:
+        return Path(f"{self._engine.url.database}-locks") / name
 
     @contextmanager
     def reading(self) -> Generator[Connection]:
@@ -190,7 +199,7 @@ class DatabaseSession:
         """See `StoredSession.write`."""
         lock = self._store.lock(self.id)
         if lock is None:
-            raise busy(self.label, self._since(after))
+            raise busy(self.label, self._since(after), self._store.holder(self.id))
         try:
             if self.last() != after:
                 raise gone_on(self.label, self._since(after))
@@ -333,9 +342,16 @@ def _storable(words: object) -> str:
     return str(words or "").replace("\0", "\N{REPLACEMENT CHARACTER}")
 
 
-def _lock_number(session: str) -> int:
-    """A session's number among the advisory locks of PostgreSQL."""
-    return int.from_bytes(hashlib.sha256(session.encode()).digest()[:8], "big", signed=True)
+def _lock_number(name: str) -> int:
+    """A lock's number among the advisory locks of PostgreSQL."""
+    return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big", signed=True)
+
+
+_HOLDER = """
+    SELECT application_name FROM pg_locks JOIN pg_stat_activity USING (pid)
+    WHERE locktype = 'advisory' AND granted AND objsubid = 1
+    AND ((classid::bigint << 32) | objid::bigint) = :number
+"""
 
 
 def _unlock(connection: Connection, number: int) -> None:
@@ -343,8 +359,3 @@ def _unlock(connection: Connection, number: int) -> None:
         connection.scalar(select(func.pg_advisory_unlock(number)))
     except SQLAlchemyError:
         connection.invalidate()  # nobody shall be given it with the lock
-
-
-def _unlink(path: Path) -> None:
-    with suppress(OSError):  # Windows deletes no open file; it may lie there
-        path.unlink()

@@ -1,9 +1,8 @@
 """Sessions as folders, one each: the form that `formup run` writes and `formup trace` reads."""
 
-import secrets
 import shutil
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from pydantic_core import from_json, to_json
 from ...tools.errors import StorageError
 from ...tools.store import write_whole
 from .folder import NAME, PICTURES, FolderArtefacts, FolderLog, event_line, log_path, read_events
+from .locks import lock_file, read_holder
 from .protocol import (
     Event,
     EventLog,
@@ -22,6 +22,7 @@ from .protocol import (
     gone_on,
     matches,
     missing,
+    new_id,
     now,
 )
 
@@ -66,10 +67,14 @@ class FolderStore:
         self.root = root
 
     def create(
-        self, name: str = "", events: Sequence[Event] = (), files: Sequence[bytes] = ()
+        self,
+        name: str = "",
+        events: Sequence[Event] = (),
+        files: Sequence[bytes] = (),
+        owner: str = "",
     ) -> StoredSession:
         """See `Store.create`."""
-        session = secrets.token_hex(5)
+        session = new_id(owner)
         with _as_storage_errors(self.root):
             self.root.mkdir(parents=True, exist_ok=True)
             begun = self.root / f".{session}"
@@ -107,8 +112,21 @@ class FolderStore:
         with _as_storage_errors(path):
             shutil.rmtree(path.parent)
 
+    def lock(self, name: str) -> ExitStack | None:
+        """See `Store.lock`."""
+        with _as_storage_errors(self.root):
+            self._lock_file(name).parent.mkdir(parents=True, exist_ok=True)
+            return lock_file(self._lock_file(name))
+
+    def holder(self, name: str) -> str:
+        """See `Store.holder`."""
+        return read_holder(self._lock_file(name))
+
     def close(self) -> None:
         """See `Store.close`."""
+
+    def _lock_file(self, name: str) -> Path:
+        return self.root / ".locks" / name
 
     def _log(self, session: str) -> Path:
         path = self.root / session / NAME

@@ -4,8 +4,12 @@ State is folded from the events, so that undo, crashes and replays follow from t
 that events name by their hash lie beside it, as `Artefacts`.
 """
 
+import os
 import re
+import secrets
+import socket
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal, Protocol
@@ -136,7 +140,11 @@ class Store(Protocol):
     """Many sessions; safe for several processes at once."""
 
     def create(
-        self, name: str = "", events: Sequence[Event] = (), files: Sequence[bytes] = ()
+        self,
+        name: str = "",
+        events: Sequence[Event] = (),
+        files: Sequence[bytes] = (),
+        owner: str = "",
     ) -> StoredSession:
         """A new session, whole or not at all.
 
@@ -144,6 +152,7 @@ class Store(Protocol):
             name: what a person calls it.
             events: that it begins with, such as those of another.
             files: that these name.
+            owner: whose it is: small letters, digits and underscores, with which its id begins.
 
         Raises:
             StorageError: it cannot be written.
@@ -178,6 +187,21 @@ class Store(Protocol):
         """
         ...
 
+    def lock(self, name: str) -> ExitStack | None:
+        """A lock among all processes that use the store, which ends with its process.
+
+        Returns:
+            What lets go of it; None while another has it.
+
+        Raises:
+            StorageError: it cannot be had.
+        """
+        ...
+
+    def holder(self, name: str) -> str:
+        """Which process has a lock, as HOST:PID; empty where that is not known."""
+        ...
+
     def close(self) -> None:
         """Let go of what is open."""
         ...
@@ -186,6 +210,20 @@ class Store(Protocol):
 MAX_NAME = 200
 """Characters of a session's name."""
 _HASH = re.compile(rb'"([0-9a-f]{64})"')
+
+
+PROCESS = f"{socket.gethostname()}:{os.getpid()}"
+"""This process, as others are told of it."""
+
+
+def new_id(owner: str = "") -> str:
+    """The id of a new session, which says whose it is."""
+    return f"{owner}-{secrets.token_hex(5)}" if owner else secrets.token_hex(5)
+
+
+def owner_of(session: str) -> str:
+    """Whose a session is."""
+    return session.rpartition("-")[0]
 
 
 def now() -> str:
@@ -231,11 +269,12 @@ def missing(label: str) -> StorageError:
     )
 
 
-def busy(label: str, meanwhile: Sequence[Event] = ()) -> StorageError:
+def busy(label: str, meanwhile: Sequence[Event] = (), holder: str = "") -> StorageError:
     """The error where another process writes a session; with what it has written by now."""
     happened = f" Meanwhile {_told(meanwhile)}." if meanwhile else ""
+    who = f"another process ({holder})" if holder else "another process"
     return StorageError(
-        f"{label} is being written by another process; wait for it to end, or stop it.{happened}",
+        f"{label} is being written by {who}; wait for it to end, or stop it.{happened}",
         "busy",
     )
 

@@ -32,6 +32,7 @@ from sqlalchemy import (
 from sqlalchemy.exc import ArgumentError, NoSuchModuleError
 
 from ...tools.errors import InputError, StorageError
+from .protocol import PROCESS
 
 VERSION = 1
 PATIENCE = 10
@@ -134,6 +135,7 @@ def _sqlite(address: URL) -> Engine:
 
 def _postgresql(address: URL) -> Engine:
     waits = {"connect_timeout": PATIENCE, "options": f"-c lock_timeout={PATIENCE}s"}
+    waits["application_name"] = PROCESS
     return create_engine(
         address,
         hide_parameters=True,

@@ -247,7 +247,7 @@ class TestService:
         async def talk() -> tuple[Run, Run | None]:
             service = Service(Agent(Slow()), FolderStore(tmp_path))
             name = service.open(picture)
-            turn = asyncio.create_task(service.say(name, "Surround it"))
+            turn = service.say(name, "Surround it")
             await asyncio.sleep(0.2)
             with pytest.raises(InputError, match="under way") as busy:
                 await service.say(name, "and now?")
@@ -300,7 +300,7 @@ def test_stop_holds_robots_that_drive_within_one_control_period(
         service = Service(Agent(), FolderStore(tmp_path))
         name = service.open(picture, settings=Settings(robots=8), pointed=[TargetPrompt(box=RED)])
         await service.say(name, "Surround it")
-        turn = asyncio.create_task(service.say(name, "go"))
+        turn = service.say(name, "go")
         while len(steps) < 5:
             await asyncio.sleep(0.01)
         stopped = await service.stop(name)

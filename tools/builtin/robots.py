@@ -157,6 +157,7 @@ async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
     def watch(poses: tuple[Pose, ...]) -> None:
         nonlocal last
         last = poses
+        context.services.watch(poses)
 
     site = context.world.site(plan.formation.contract)
     robots = plan.formation.robot_of_place
@@ -191,6 +192,7 @@ async def _team(context: Context, contract: Contract, taking: Sequence[str | Non
         seed=settings.seed,
     )
     fleet = _opened(settings.fleet, request, site.others if starts is None else ())
+    fleet = await context.services.claim(fleet)
     await context.services.close_fleets()
     if settings.fleet in context.services.stopped:
         context.services.stopped.remove(settings.fleet)

@@ -1,0 +1,168 @@
+"""What happens in a session, told to any number of subscribers while it is written.
+
+Events come in order and without gaps, from whatever number a subscriber has seen; poses are the
+latest alone, so that a slow subscriber holds up nobody, least of all robots.
+"""
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import AsyncGenerator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..tools.fleet.protocol import Pose
+from .store.protocol import Event, EventKind, EventLog, StoredSession
+from .turns import Turn
+
+MOST_KEPT = 256
+"""Events kept in memory for subscribers that follow closely; the others are read from the store."""
+POLL = 1.0
+"""Seconds after which a feed looks whether another process has gone on with the session."""
+STAMPED = ("turn", "resume")
+"""Events that say who asked for them."""
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Where all robots of the fleet were seen last.
+
+    Attributes:
+        number: of the observation, from 1; those between were skipped.
+    """
+
+    number: int
+    poses: tuple[Pose, ...]
+
+
+class Feed:
+    """What happens in one session.
+
+    Args:
+        stored: where it is written.
+        events: those that there are.
+
+    Attributes:
+        last: the number of the last event.
+        turn: the turn that is under way in this process, or was last.
+        followers: how many subscribe.
+        keys: digest and number of each turn that was asked for, by the key it was asked under.
+    """
+
+    def __init__(self, stored: StoredSession, events: Sequence[Event]) -> None:
+        self.stored, self.last = stored, 0
+        self.turn: Turn | None = None
+        self.followers = 0
+        self.keys: dict[str, tuple[str, int]] = {}
+        self._kept: deque[Event] = deque(maxlen=MOST_KEPT)
+        self._poses = Poses(0, ())
+        self._changed = asyncio.Event()
+        self._looked = time.monotonic()
+        for event in events:
+            self.publish(event)
+
+    def publish(self, event: Event) -> None:
+        """Tell an event that was written."""
+        if event.number == self.last + 1:
+            self.last = event.number
+            self._kept.append(event)
+            if key := event.data.get("key") if event.kind in STAMPED else None:
+                self.keys[key] = (event.data["digest"], event.number)
+            if self.turn is not None:
+                self.turn.heard(event)
+            self._wake()
+
+    def moved(self, poses: tuple[Pose, ...]) -> None:
+        """Tell where robots are."""
+        self._poses = Poses(self._poses.number + 1, poses)
+        self._wake()
+
+    async def subscribe(
+        self, after: int = 0, heartbeat: float = 15.0
+    ) -> AsyncGenerator[Event | Poses | None]:
+        """What happens, from an event's number on.
+
+        Args:
+            after: the number of the last event that the subscriber has seen.
+            heartbeat: seconds of silence after which None is told.
+
+        Raises:
+            StorageError: the session cannot be read.
+        """
+        self.followers += 1
+        try:
+            async for what in self._told(after, heartbeat):
+                yield what
+        finally:
+            self.followers -= 1
+
+    async def _told(self, after: int, heartbeat: float) -> AsyncGenerator[Event | Poses | None]:
+        seen, told = 0, time.monotonic()
+        while True:
+            changed, poses = self._changed, self._poses
+            for event in await self._since(after):
+                yield event
+                after, told = event.number, time.monotonic()
+            if poses.number != seen:
+                yield poses
+                seen, told = poses.number, time.monotonic()
+            if time.monotonic() - told >= heartbeat:
+                yield None
+                told = time.monotonic()
+            try:
+                async with asyncio.timeout(min(POLL, heartbeat)):
+                    await changed.wait()
+            except TimeoutError:
+                await self._look()
+
+    async def _since(self, after: int) -> tuple[Event, ...]:
+        """The events with greater numbers."""
+        if after >= self.last:
+            return ()
+        if self._kept and self._kept[0].number <= after + 1:
+            return tuple(event for event in self._kept if event.number > after)
+        return await asyncio.to_thread(self.stored.events, after)
+
+    async def _look(self) -> None:
+        """Find what another process has written; one subscriber looks for all."""
+        if time.monotonic() - self._looked >= POLL:
+            self._looked = time.monotonic()
+            for event in await asyncio.to_thread(self.stored.events, self.last):
+                self.publish(event)
+
+    def _wake(self) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+
+class FedSession:
+    """A stored session whose feed tells what is written."""
+
+    def __init__(self, stored: StoredSession, feed: Feed) -> None:
+        self._stored, self._feed = stored, feed
+        self.id, self.label, self.artefacts = stored.id, stored.label, stored.artefacts
+
+    def events(self, after: int = 0) -> tuple[Event, ...]:
+        """See `StoredSession.events`."""
+        return self._stored.events(after)
+
+    def write(self, after: int) -> EventLog:
+        """See `StoredSession.write`."""
+        return _FedLog(self._stored.write(after), self._feed)
+
+
+class _FedLog:
+    def __init__(self, log: EventLog, feed: Feed) -> None:
+        self._log, self._feed = log, feed
+        self.events, self.close = log.events, log.close
+
+    @property
+    def last(self) -> int:
+        return self._log.last
+
+    def append(self, kind: EventKind, data: Mapping[str, Any]) -> int:
+        turn = self._feed.turn
+        data = {**data, **turn.stamp} if turn is not None and kind in STAMPED else data
+        number = self._log.append(kind, data)
+        self._feed.publish(Event(number, kind, 0.0, data))
+        return number

@@ -1,0 +1,145 @@
+"""A turn that somebody asked for, on its way, and where it has been before under the same key."""
+
+import asyncio
+import hashlib
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic_core import to_json
+
+from ..tools.errors import InputError
+from ..tools.perception.image import Picture
+from .session import Run
+from .store.protocol import Event, StoredSession
+
+PATIENCE = 0.3
+"""Seconds between looks at whether a turn was stopped from another process."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Who asks for a turn.
+
+    Attributes:
+        by: their name; empty where there is only one who could.
+        key: of theirs, for this turn: asked again under it, it is not done again.
+        may_move: whether robots may be moved for them.
+    """
+
+    by: str = ""
+    key: str | None = None
+    may_move: bool = True
+
+
+@dataclass(eq=False)
+class Turn:
+    """A turn on its way; awaiting it gives its run.
+
+    Attributes:
+        digest: of what was asked, to tell whether the same key means the same.
+        number: of the event that began it; 0 before that is written.
+        moving: set once robots are about to move.
+    """
+
+    asked: Asked
+    digest: str
+    task: "asyncio.Task[Run]" = field(init=False)
+    number: int = 0
+    began: asyncio.Event = field(default_factory=asyncio.Event)
+    moving: asyncio.Event = field(default_factory=asyncio.Event)
+    _cancelled: bool = False
+
+    def __await__(self) -> Generator[Any, None, Run]:
+        """Its run, at its end."""
+        return self.task.__await__()
+
+    async def wait(self, seconds: float) -> Run | None:
+        """Its run; None where it goes on after so many seconds, or drives robots by then.
+
+        Raises:
+            InputError: it could not begin.
+        """
+        moving = asyncio.ensure_future(self.moving.wait())
+        try:
+            await asyncio.wait(
+                {self.task, moving}, timeout=seconds, return_when=asyncio.FIRST_COMPLETED
+            )
+        finally:
+            moving.cancel()
+        return self.task.result() if self.task.done() else None
+
+    async def ended(self) -> Run | None:
+        """Its run after it was stopped; None where it had not begun."""
+        try:
+            return await self.task
+        except asyncio.CancelledError:
+            return None
+
+    def cancel(self) -> None:
+        """End it where it is; once, so that it can write how it ended."""
+        if not self._cancelled:
+            self._cancelled = True
+            self.task.cancel()
+
+    def heard(self, event: Event) -> None:
+        """Be told what was written."""
+        if event.kind in ("turn", "resume"):
+            self.number = event.number
+            self.began.set()
+        elif event.kind == "moving":
+            self.moving.set()
+
+    @property
+    def stamp(self) -> dict[str, Any]:
+        """What its event says of who asked for it."""
+        said = {"by": self.asked.by, "key": self.asked.key}
+        return {k: v for k, v in said.items() if v} | (
+            {"digest": self.digest} if self.asked.key else {}
+        )
+
+
+def check_key(turn: Turn, before: Mapping[str, tuple[str, int]], *, again: bool = False) -> None:
+    """Refuse a turn that was asked for before under the same key.
+
+    Args:
+        before: the digest and the number of each turn that was asked for, by its key.
+        again: whether the same may be asked for, because it is under way.
+
+    Raises:
+        InputError: with other arguments (`key`), or with these (`repeated`: `turn` is its number).
+    """
+    key = turn.asked.key
+    if key is None or key not in before:
+        return
+    digest, number = before[key]
+    if digest != turn.digest:
+        raise InputError(
+            f"The key {key!r} was used for something else in this session; use a new one for "
+            "each thing you ask for.",
+            "key",
+        )
+    if not again:
+        raise InputError(f"That was done before, as turn {number}.", "repeated", turn=number)
+
+
+def digest_of(name: str, arguments: Sequence[Any], options: Mapping[str, Any]) -> str:
+    """A hash of what is asked for; what is only shown does not count."""
+    named = [(k, _said(v)) for k, v in sorted(options.items()) if k != "show"]
+    return hashlib.sha256(to_json([name, *map(_said, arguments), named])).hexdigest()[:32]
+
+
+def _said(value: Any) -> Any:
+    """An argument as JSON; a picture as its hash."""
+    return value.sha256 if isinstance(value, Picture) else value
+
+
+def stop_note(session: str, turn: int) -> bytes:
+    """What a process leaves beside a session so that the one which writes it stops that turn."""
+    return to_json(["stop", session, turn])
+
+
+def is_noted(stored: StoredSession, turn: int) -> bool:
+    """Whether another process wants a turn stopped."""
+    note = stop_note(stored.id, turn)
+    return hashlib.sha256(note).hexdigest() in stored.artefacts

@@ -1,0 +1,286 @@
+import asyncio
+from collections.abc import AsyncGenerator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formup.agent.agent import Agent
+from formup.agent.feed import Poses
+from formup.agent.service import Service
+from formup.agent.session import Run
+from formup.agent.store.folder_store import FolderStore
+from formup.agent.store.places import store_at
+from formup.agent.store.protocol import Event, Store
+from formup.agent.turns import Asked
+from formup.tools.context import Settings
+from formup.tools.errors import InputError
+from formup.tools.fleet.protocol import Motion, Pose
+from formup.tools.fleet.simulated import SimulatedFleet
+from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.target_prompt import TargetPrompt
+
+RED = (150.0, 130.0, 220.0, 190.0)
+
+
+@pytest.fixture(scope="module")
+def picture() -> Picture:
+    pixels = np.full((340, 560, 3), 60, np.uint8)
+    pixels[135:185, 155:215] = (200, 40, 40)
+    return picture_from_array(pixels)
+
+
+@pytest.fixture(params=["folder", "sqlite"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
+    folder = tmp_path / "store"
+    return store_at(folder if request.param == "folder" else f"sqlite:///{folder}/s.db")
+
+
+@pytest.fixture
+def drives(monkeypatch: pytest.MonkeyPatch) -> list[Motion]:
+    """The motions that were driven; slowly, so that something can happen meanwhile."""
+    begun: list[Motion] = []
+    drive = SimulatedFleet.drive
+
+    async def slow(self: SimulatedFleet, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
+        begun.append(motion)
+        async for poses in drive(self, motion):
+            yield poses
+            await asyncio.sleep(0.02)
+
+    monkeypatch.setattr(SimulatedFleet, "drive", slow)
+    return begun
+
+
+def opened(service: Service, picture: Picture) -> str:
+    return service.open(picture, settings=Settings(robots=6), pointed=[TargetPrompt(box=RED)])
+
+
+def other(store: Store) -> Service:
+    """What another process has; locks of files are not shared within a process either."""
+    return Service(Agent(), store)
+
+
+def test_a_key_asked_twice_is_one_turn(
+    store: Store, picture: Picture, drives: list[Motion]
+) -> None:
+    async def talk() -> None:
+        service = Service(Agent(), store)
+        name = opened(service, picture)
+        await service.say(name, "Surround it")
+        asked = Asked(by="ann", key="k1")
+        first, again = service.go(name, asked=asked), service.go(name, asked=asked)
+        assert again is first, "while it is under way it is that turn"
+        with pytest.raises(InputError) as busy:
+            service.go(name, "p-1", asked=Asked(key="k2"))
+        assert busy.value.kind == "busy"
+        await first
+        for one in (service, other(store)):
+            with pytest.raises(InputError) as repeated:
+                await one.go(name, asked=asked)
+            assert (repeated.value.kind, repeated.value.facts["turn"]) == ("repeated", first.number)
+            with pytest.raises(InputError) as key:
+                await one.go(name, "p-1", asked=asked)
+            assert key.value.kind == "key"
+        assert len({id(m) for m in drives}) == len(drives)
+        moved = [e for e in service.events(name) if e.kind == "moving"]
+        assert len(moved) == 1
+        assert service.events(name)[first.number - 1].data["by"] == "ann"
+
+    asyncio.run(talk())
+
+
+def test_another_process_takes_the_next_turn(store: Store, picture: Picture) -> None:
+    async def talk() -> None:
+        here, there = Service(Agent(), store), other(store)
+        name = opened(here, picture)
+        planned = await there.say(name, "Surround it")
+        assert planned.report.status == "planned", "what was pointed at is stored too"
+        assert planned.report.positions is not None
+        assert len(planned.report.positions) == 6
+        changed = await here.say(name, "a bit further out")
+        assert changed.report.parent == planned.report.plan_id
+        undone = await there.undo(name)
+        assert undone.report.plan_id == planned.report.plan_id
+
+    asyncio.run(talk())
+
+
+def test_a_turn_elsewhere_is_refused_here_and_stopped_from_here(
+    store: Store, picture: Picture, drives: list[Motion]
+) -> None:
+    async def talk() -> Run | None:
+        here, there = Service(Agent(), store), other(store)
+        name = opened(here, picture)
+        await here.say(name, "Surround it")
+        turn = here.go(name)
+        await turn.moving.wait()
+        with pytest.raises(InputError, match=r"written by another process( \(.+:\d+\))?;") as busy:
+            await there.say(name, "and now?")
+        assert busy.value.kind == "busy"
+        stopped = await there.stop(name)
+        ended = await turn
+        assert ended.report.status in ("stopped", "failed")
+        assert stopped is not None
+        assert stopped.report.message.startswith("The robots are held")
+        went = await here.go(name)
+        assert went.report.status == "deployed"
+        return stopped
+
+    asyncio.run(talk())
+
+
+def test_a_subscriber_misses_nothing_wherever_it_begins(store: Store, picture: Picture) -> None:
+    async def talk() -> None:
+        service = Service(Agent(), store)
+        name = opened(service, picture)
+
+        async def read(after: int, upto: int) -> list[Event]:
+            found: list[Event] = []
+            async for told in service.follow(name, after):
+                if isinstance(told, Event):
+                    found.append(told)
+                if found and found[-1].number == upto:
+                    break
+            return found
+
+        early = asyncio.ensure_future(read(0, 12))
+        for words in ("Surround it", "further out", "undo", "go"):
+            await service.say(name, words)
+        numbers = [event.number for event in await early]
+        assert numbers == list(range(1, 13))
+        last = service.events(name)[-1].number
+        for after in range(last):
+            found = await read(after, last)
+            assert [event.number for event in found] == list(range(after + 1, last + 1))
+
+        elsewhere = asyncio.ensure_future(read(last, last + 3))
+        await asyncio.sleep(0)
+        await other(store).say(name, "a bit closer")
+        assert len(await elsewhere) == 3, "written by another process"
+
+    asyncio.run(talk())
+
+
+def test_poses_are_the_latest_for_whoever_is_slow(
+    store: Store, picture: Picture, drives: list[Motion]
+) -> None:
+    async def talk() -> list[Poses]:
+        service = Service(Agent(), store)
+        name = opened(service, picture)
+        await service.say(name, "Surround it")
+        seen: list[Poses] = []
+
+        async def slowly() -> None:
+            async for told in service.follow(name):
+                if isinstance(told, Poses):
+                    seen.append(told)
+                    await asyncio.sleep(0.1)
+
+        reader = asyncio.ensure_future(slowly())
+        await service.go(name)
+        await asyncio.sleep(0.3)
+        reader.cancel()
+        return seen
+
+    seen = asyncio.run(talk())
+    numbers = [poses.number for poses in seen]
+    assert numbers == sorted(set(numbers))
+    assert numbers[-1] > 2 * len(numbers), "those between were skipped"
+
+
+@pytest.fixture
+def real(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(SimulatedFleet, "real", True)
+
+
+@pytest.mark.usefixtures("real")
+def test_an_approval_is_for_one_plan_once(
+    store: Store, picture: Picture, drives: list[Motion]
+) -> None:
+    async def talk() -> None:
+        service, second = Service(Agent(), store), other(store)
+        name = opened(service, picture)
+        await service.say(name, "Surround it")
+        asked = await service.go(name)
+        assert asked.report.status == "needs_approval"
+        plan = str(asked.report.plan_id)
+        waits = await service.waits(name)
+        assert waits is not None
+        assert waits == await service.waits(name)
+        for wrong, nonce in ((plan, ""), (plan, "guess"), ("p-other", waits.nonce)):
+            with pytest.raises(InputError) as refused:
+                await service.approve(name, wrong, nonce)
+            assert refused.value.kind == "approval"
+        await service.close()
+        done = await second.approve(name, plan, waits.nonce)
+        assert done.report.status == "deployed", "any process can check it"
+        with pytest.raises(InputError, match="no plan waits"):
+            await second.approve(name, plan, waits.nonce)
+        await second.say(name, "further out")
+        await second.go(name)
+        with pytest.raises(InputError):
+            await second.approve(name, plan, waits.nonce)
+        assert len([e for e in second.events(name) if e.kind == "moving"]) == 1
+        await second.close()
+
+    asyncio.run(talk())
+
+
+@pytest.mark.usefixtures("real")
+def test_one_process_has_a_real_fleet(store: Store, picture: Picture) -> None:
+    async def talk() -> None:
+        here, there = Service(Agent(), store), other(store)
+        first, second = opened(here, picture), opened(here, picture)
+        third = opened(there, picture)
+        for name in (first, second):
+            assert (await here.say(name, "Surround it")).report.status == "planned"
+        fleets = [here.session(n).services.fleets["simulated"] for n in (first, second)]  # type: ignore[union-attr]
+        assert fleets[0] is fleets[1], "one fleet for all conversations"
+        refused = await there.say(third, "Surround it")
+        assert refused.report.status == "failed"
+        assert "is used by" in refused.report.message
+        await here.close()
+        assert (await there.say(third, "Surround it")).report.status == "planned"
+        await there.close()
+
+    asyncio.run(talk())
+
+
+def test_who_may_only_plan_moves_nothing(
+    store: Store, picture: Picture, drives: list[Motion]
+) -> None:
+    async def talk() -> None:
+        service, asked = Service(Agent(), store, auto=True), Asked(by="eve", may_move=False)
+        name = opened(service, picture)
+        planned = await service.say(name, "Surround it", asked)
+        assert planned.report.status == "planned"
+        for words in ("go", None):
+            with pytest.raises(InputError) as refused:
+                await (service.say(name, words, asked) if words else service.go(name, asked=asked))
+            assert refused.value.kind == "not_allowed"
+
+    asyncio.run(talk())
+    assert not drives
+
+
+def test_forgotten_conversations_are_read_again(
+    store: Store, picture: Picture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("formup.agent.service.MOST_OPEN", 2)
+
+    async def talk() -> None:
+        service = Service(Agent(), store)
+        names = [opened(service, picture) for _ in range(4)]
+        plans = [(await service.say(name, "Surround it")).report.plan_id for name in names]
+        for name, plan in zip(names, plans, strict=True):
+            changed = await service.say(name, "further out")
+            assert changed.report.parent == plan
+
+    asyncio.run(talk())
+
+
+def test_ids_say_whose_a_conversation_is(tmp_path: Path, picture: Picture) -> None:
+    service = Service(Agent(), FolderStore(tmp_path))
+    name = service.open(picture, owner="ann")
+    assert name.startswith("ann-")
+    assert asyncio.run(service.fresh(name)).run is None
