@@ -240,7 +240,8 @@ def test_one_process_has_a_real_fleet(store: Store, picture: Picture) -> None:
         assert refused.report.status == "failed"
         assert "is used by" in refused.report.message
         await here.close()
-        assert (await there.say(third, "Surround it")).report.status == "planned"
+        again = opened(there, picture)
+        assert (await there.say(again, "Surround it")).report.status == "planned"
         await there.close()
 
     asyncio.run(talk())
