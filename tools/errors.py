@@ -37,6 +37,8 @@ Kind = Literal[
     "repeated",
     "approval",
     "not_allowed",
+    "too_large",
+    "too_many",
 ]
 """capacity: more robots than fit (`robots_that_fit`); cage: none that is escape-proof
 (`robots_that_fit`, `robots_needed`); crowded: two groups in each other's way (`groups`, from 1);
@@ -49,7 +51,7 @@ plan after a change is not certified (`findings`, each a sentence); nothing_to_u
 step back, or none that was taken back; missing, busy, gone_on: a session that is not in its store,
 is written by another process, or was written since it was opened; key, repeated: a turn was asked
 for under a key before, with other arguments or the same (`turn`, its number); approval: a yes to
-nothing that waits; not_allowed: whoever asks may not do that."""
+nothing that waits; not_allowed: whoever asks may not do that; too_large, too_many: more than a server takes."""
 
 
 class FormupError(Exception):

@@ -1,0 +1,1 @@
+"""`formup serve`: the service over HTTP, for pages, chatbots, programs and MCP clients."""

@@ -1,0 +1,57 @@
+"""What a server is told by its environment: FORMUP_ and the name of a field, in capitals."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ...tools.errors import InputError
+
+PREFIX = "FORMUP_"
+
+
+class ServerSettings(BaseModel):
+    """Settings of `formup serve`; the command line wins over the environment."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    host: str = Field("127.0.0.1", description="address to listen on; others than loopback want tokens")
+    port: int = Field(8734, ge=0, le=65535, description="port to listen on; 0 takes a free one")
+    store: str | None = Field(
+        None, description="where sessions are kept: a folder, sqlite:///FILE or postgresql://..."
+    )
+    tokens_file: Path | None = Field(
+        None, description="file with hashed tokens, as `formup tokens` writes it"
+    )
+    origins: str = Field(
+        "", description="other origins whose pages may call it, as https://HOST, split by commas"
+    )
+    hosts: str = Field("", description="names it may be called by beside its address, split by commas")
+    upload_bytes: int = Field(32_000_000, ge=1_000, description="most bytes of a request")
+    pixels: int = Field(40_000_000, ge=100, description="most pixels of a picture")
+    sessions: int = Field(1_000, ge=1, description="most sessions of one token")
+    requests: int = Field(256, ge=1, description="most requests of one token at the same time")
+    requests_per_minute: int = Field(1_200, ge=1, description="most requests of one token in a minute")
+    streams: int = Field(1_200, ge=1, description="most event streams open at the same time")
+    body_seconds: float = Field(30, gt=0, description="longest that a request may take to arrive")
+    shutdown_seconds: float = Field(3, gt=0, description="longest that open requests have at the end")
+
+    @classmethod
+    def of(cls, environment: Mapping[str, str] = os.environ, **given: object) -> Self:
+        """The settings of an environment; what is given, and not None, wins.
+
+        Raises:
+            InputError: one of them is not as it has to be.
+        """
+        named = {n: environment.get(PREFIX + n.upper()) for n in cls.model_fields}
+        values = {n: v for n, v in named.items() if v} | {
+            n: v for n, v in given.items() if v is not None
+        }
+        try:
+            return cls.model_validate(values)
+        except ValidationError as error:
+            first = error.errors()[0]
+            name = PREFIX + str(first["loc"][0]).upper()
+            raise InputError(f"{name} is {first['input']!r}: {first['msg'].lower()}.") from None

@@ -1,0 +1,140 @@
+"""Tokens: who may do what at a server. Their file holds names, scopes and hashes, no token."""
+
+import hashlib
+import re
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import from_json, to_json
+
+from ...tools.errors import InputError, StorageError
+from ...tools.store import read_text, write_whole
+
+Scope = Literal["read", "plan", "move"]
+SCOPES: tuple[Scope, ...] = get_args(Scope)
+"""From the least to the most; each includes those before it. Any of them may stop robots."""
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
+
+
+@dataclass(frozen=True)
+class Person:
+    """Who asks.
+
+    Attributes:
+        name: of their token, which the ids of their sessions begin with; empty where none is
+            needed.
+    """
+
+    name: str = ""
+    scope: Scope = "move"
+
+    def may(self, scope: Scope) -> bool:
+        """Whether they may do what a scope stands for."""
+        return SCOPES.index(self.scope) >= SCOPES.index(scope)
+
+
+class Entry(BaseModel):
+    """A token as its file has it."""
+
+    name: str
+    scope: Scope
+    sha256: str
+    created: str
+
+
+class Tokens:
+    """The tokens of a server.
+
+    Args:
+        path: of their file; None for none. It is read again when it has changed.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path, self._read, self._entries = path, None, tuple[Entry, ...]()
+
+    @property
+    def needed(self) -> bool:
+        """Whether nobody gets in without one."""
+        return self._path is not None
+
+    def person(self, token: str) -> Person | None:
+        """Who has a token, if anybody does.
+
+        Raises:
+            StorageError: their file cannot be read.
+        """
+        digest = _hash(token)
+        found = None
+        for entry in self.entries():
+            if secrets.compare_digest(entry.sha256, digest):
+                found = Person(entry.name, entry.scope)
+        return found
+
+    def entries(self) -> tuple[Entry, ...]:
+        """All there are.
+
+        Raises:
+            StorageError: their file cannot be read.
+        """
+        if self._path is None or not self._path.exists():
+            return ()
+        changed = self._path.stat().st_mtime_ns
+        if changed != self._read:
+            self._entries, self._read = _read(self._path), changed
+        return self._entries
+
+    def add(self, name: str, scope: str) -> str:
+        """Make a token, which is shown this once.
+
+        Raises:
+            InputError: the name is taken or none, or there is no such scope.
+        """
+        if not _NAME.fullmatch(name):
+            raise InputError(
+                f"A token's name is up to 20 small letters, digits and underscores and begins with "
+                f"a letter; {name!r} is not."
+            )
+        if scope not in SCOPES:
+            raise InputError(f"A token's scope is one of {', '.join(SCOPES)}, not {scope!r}.")
+        if any(entry.name == name for entry in self.entries()):
+            raise InputError(f"There is a token {name!r} already; remove it first, or name another.")
+        token = f"fu_{secrets.token_urlsafe(32)}"
+        made = datetime.now(UTC).isoformat(timespec="seconds")
+        entry = Entry(name=name, scope=scope, sha256=_hash(token), created=made)
+        self._write((*self.entries(), entry))
+        return token
+
+    def remove(self, name: str) -> None:
+        """Take a token away; its sessions stay.
+
+        Raises:
+            InputError: there is none of that name.
+        """
+        kept = tuple(entry for entry in self.entries() if entry.name != name)
+        if len(kept) == len(self.entries()):
+            there = ", ".join(entry.name for entry in kept) or "none"
+            raise InputError(f"There is no token {name!r}; there is {there}.")
+        self._write(kept)
+
+    def _write(self, entries: Sequence[Entry]) -> None:
+        assert self._path is not None
+        data = to_json([entry.model_dump() for entry in entries], indent=2)
+        write_whole(self._path, data)
+        self._path.chmod(0o600)
+
+
+def _read(path: Path) -> tuple[Entry, ...]:
+    try:
+        return tuple(Entry.model_validate(entry) for entry in from_json(read_text(path)))
+    except (ValidationError, ValueError, TypeError):
+        raise StorageError(f"{path} is no file of tokens as formup tokens writes it.") from None
+
+
+def _hash(token: str) -> str:
+    """Tokens are 256 random bits, so that a plain hash is enough."""
+    return hashlib.sha256(token.encode()).hexdigest()
