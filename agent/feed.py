@@ -96,14 +96,12 @@ class Feed:
         """
         self.followers += 1
         try:
-            async for what in self._happening(after, heartbeat):
+            async for what in self._follow(after, heartbeat):
                 yield what
         finally:
             self.followers -= 1
 
-    async def _happening(
-        self, after: int, heartbeat: float
-    ) -> AsyncGenerator[Event | Poses | None]:
+    async def _follow(self, after: int, heartbeat: float) -> AsyncGenerator[Event | Poses | None]:
         seen, told = 0, time.monotonic()
         while True:
             changed, poses = self._changed, self._poses
