@@ -22,7 +22,7 @@ from .limits import DEFAULT_LIMITS, Limits
 from .loop import ANYTHING, Approval
 from .loop import run as run_loop
 from .messages import History, closed
-from .model import Model
+from .model import Model, ShowText
 from .outcomes import Cancelled, Paused
 from .policy import Policy
 from .providers.registry import model_named
@@ -67,6 +67,7 @@ class Agent:
         limits: bounds of each run.
         policy: which calls go ahead, wait for a person, or are refused.
         tracer: of OpenTelemetry; it is given spans of runs, replies and tools, and no texts.
+        show_text: for models given by name; see `model_named`.
 
     Raises:
         InputError: an unknown model or prompt, or a model that cannot be asked.
@@ -85,10 +86,11 @@ class Agent:
         limits: Limits = DEFAULT_LIMITS,
         policy: Policy = ANYTHING,
         tracer: "Tracer | None" = None,
+        show_text: ShowText | None = None,
     ) -> None:
         if base_url is not None and not isinstance(model, str):
             raise InputError("A base URL goes with a model's name; this model is an object.")
-        self.model = model_named(model, base_url) if isinstance(model, str) else model
+        self.model = model_named(model, base_url, show_text) if isinstance(model, str) else model
         own = None if system else getattr(self.model, "prompt", None)
         self.library = library or PromptLibrary()
         name = (own if planner is None else "planner") if prompt is None else prompt
@@ -96,9 +98,10 @@ class Agent:
         self.prompts = () if self.prompt is None else (self.prompt,)
         self._names: tuple[str, str | None] = (self.model.name, None)
         if planner is not None:
-            made = staged(self.model, planner, base_url, str(name), self.library)
-            self.model, self.prompts = made
-            self._names = made[0].names
+            if isinstance(planner, str):
+                planner = model_named(planner, base_url, show_text)
+            self.model, self.prompts = staged(self.model, planner, str(name), self.library)
+            self._names = self.model.names
         self.system = self.prompt.render() if self.prompt else system
         self.base_url, self.tools, self.limits, self.policy = base_url, tools, limits, policy
         self._tracer = tracer
