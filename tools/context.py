@@ -5,7 +5,7 @@ fleet, and caches by content hash. Whatever a tool finds out or decides goes int
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
@@ -141,8 +141,12 @@ class Services:
         return cls({picture.sha256: picture})
 
 
-def _ignore(*what: object) -> None:
-    """Nobody keeps what a tool observes, or that robots move."""
+def _ignore(world: "World") -> None:
+    """Nobody keeps what a tool observes."""
+
+
+async def _unrecorded(plan_id: str) -> None:
+    """Nobody keeps that robots move."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +160,7 @@ class Context:
         steps: those of the turns that changed the plan, after the one that undo ends at.
         observed: puts a world in place at once, because what it says was observed and holds even
             if the call fails or is cut off: measured things, poses of robots.
-        moving: is called with a plan's id before the first motion; raising prevents it.
+        moving: is awaited with a plan's id before the first motion; raising prevents it.
     """
 
     world: World
@@ -167,7 +171,7 @@ class Context:
     proposed: str | None = None
     steps: tuple[Step, ...] = ()
     observed: Callable[[World], None] = _ignore
-    moving: Callable[[str], None] = _ignore
+    moving: Callable[[str], Awaitable[None]] = _unrecorded
 
     @classmethod
     def of(
