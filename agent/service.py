@@ -122,7 +122,8 @@ class Service:
         await held.ahold()
         if turn is None:
             return await held.astop() if held.run is not None else None
-        turn.cancel()
+        if not turn.cancelling():  # said twice, it would cut off what is written in the end
+            turn.cancel()
         return await turn
 
     def point(self, session: str, *prompts: TargetPrompt) -> None:
