@@ -95,7 +95,7 @@ def _storage() -> Looks:
             try:
                 store.rename("none", "")  # a database first asks who may write
             except StorageError as error:
-                can = can if error.kind == "missing" else str(error)
+                can = can if error.kind == "missing" else str(error).rstrip(".")
             return f"{can}; {len(store.sessions())} sessions"
 
     yield "storage", "data folder", lambda: _writable(data_folder())

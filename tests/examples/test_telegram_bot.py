@@ -51,18 +51,21 @@ class Telegram(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         token, _, name = unquote(self.path).removeprefix("/file/bot").partition("/")
         assert token == TOKEN
+        cast("TelegramServer", self.server).held.wait(PATIENCE)
         self._send((PHOTOS / name).read_bytes())
 
     def do_POST(self) -> None:
         body = self.rfile.read(int(self.headers.get("content-length", 0)))
         fields = form(self.headers.get("content-type", ""), body)
-        token, _, method = self.path.removeprefix("/bot").partition("/")
-        assert token == TOKEN
+        token, _, method = unquote(self.path).removeprefix("/bot").partition("/")
+        if token != TOKEN:
+            self._send(b'{"ok": false, "error_code": 401, "description": "Unauthorized"}', 401)
+            return
         result = cast("TelegramServer", self.server).called(method, fields)
         self._send(json.dumps({"ok": True, "result": result}).encode())
 
-    def _send(self, body: bytes) -> None:
-        self.send_response(200)
+    def _send(self, body: bytes, status: int = 200) -> None:
+        self.send_response(status)
         self.send_header("content-length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)
@@ -93,7 +96,8 @@ class TelegramServer(ThreadingHTTPServer):
         self.sent: dict[int, list[dict[str, Any]]] = {}
         self.answers: dict[str, str] = {}
         self.number = 0
-        self.polled = threading.Event()
+        self.polled, self.held = threading.Event(), threading.Event()
+        self.held.set()
 
     def called(self, method: str, fields: dict[str, Any]) -> Any:
         """What a method returns."""
@@ -148,7 +152,8 @@ class Chat:
 
     def say(self, words: str = "", photo: str | None = None, user: int = ME) -> None:
         """Send a message."""
-        message: dict[str, Any] = {"message_id": 1, "date": 0, "from": person(user)}
+        number = self.server.number + 1
+        message: dict[str, Any] = {"message_id": number, "date": 0, "from": person(user)}
         message["chat"] = {"id": self.number, "type": "group", "title": "G"}
         size = {"file_unique_id": "u", "width": 90, "height": 90}
         if photo is not None:
@@ -343,3 +348,45 @@ def test_without_a_token_or_users_it_says_what_to_set(
         _, said = bot.communicate(timeout=PATIENCE)
     assert bot.returncode == 1
     assert re.fullmatch("Set TELEGRAM_TOKEN, .*\n", said)
+
+
+def test_what_it_cannot_begin_with_is_one_sentence(home: Path) -> None:
+    with TelegramServer() as server:
+        bot = started(home, server, FORMUP_MODEL="nobody:x")
+        _, said = bot.communicate(timeout=PATIENCE)
+    assert (bot.returncode, said.count("\n")) == (1, 1)
+    assert said.startswith("Unknown model 'nobody:x'")
+
+
+def test_a_token_that_is_refused_ends_it(home: Path, server: TelegramServer) -> None:
+    bot = started(home, server, TELEGRAM_TOKEN="2:of-another")
+    _, said = bot.communicate(timeout=PATIENCE)
+    assert bot.returncode == 1
+    assert said.splitlines()[-1].endswith("was rejected by the server.")
+
+
+def test_stop_counts_for_a_photo_that_is_still_on_its_way(chat: Chat) -> None:
+    chat.server.held.clear()
+    chat.say(f"{COINS} and go", "images/us_coins.jpg")
+    assert "held where they are" in chat.told("stop")
+    chat.server.held.set()
+    assert chat.text() == "Now say what to do.", "its words are void"
+    assert "2 robots" in chat.told(COINS)
+
+
+def test_of_two_whose_photos_come_together_the_chat_is_ones(chat: Chat) -> None:
+    chat.server.held.clear()
+    chat.say(COINS, "images/us_coins.jpg")
+    chat.say(COINS, "images/us_coins.jpg", user=OTHER)
+    chat.server.held.set()
+    refused, planned = sorted((chat.text(), chat.text()), key=lambda told: "You are" not in told)
+    owner = OTHER if f"You are {ME}" in refused else ME
+    assert "2 robots" in planned
+    assert "2 robots" in chat.told("a bit further out", user=owner)
+
+
+def test_a_later_photo_is_gone_on_with_once_something_was_said(chat: Chat) -> None:
+    assert "say what to do" in chat.told("", "images/us_coins.jpg")
+    assert "Say what to do first" in chat.told("", "images/cars_two.jpg")
+    assert "2 robots" in chat.told(COINS)
+    assert "photo from now on" in chat.told("", "images/cars_two.jpg")
