@@ -17,10 +17,19 @@ TELLING = re.compile(
     r"i'?ve|i'?d (?:say|forgotten)|we (?:are|have|had|were)|we'?re|we'?ve|"
     r"my|because|since|as (?:i|we|it|they|my|the|there)|cause|cos|for (?:my|our) |"
     r"never ?mind|isn'?t|aren'?t|don'?t worry|no worries|no problem|"
-    r"(?:the|our|his|her) \w+ (?:is|are|was|were|will|has|have|says|said|wants|likes|just))\b",
+    r"(?:the|our|his|her) \w+ (?:is|are|was|were|will|has|have|had|says|said|wants?|"
+    r"likes?|needs?|gets?|got|comes?|goes|can'?t|cannot|might|must|may|just))\b",
     re.IGNORECASE,
 )
 """How a part begins that tells something."""
+COMPLAINT = re.compile(
+    r"\b(?:(?:that|it|this|they|these|those)(?:'?s| is| are|'?re| looks?| seems?)) (?:\w+ )?"
+    r"(?:a bit|a little|too|rather|quite|very|so|pretty|awfully|way too) "
+    r"(?:close|near|far|tight|wide|big|small|large|crowded|cramped|dense|sparse|loose|many|few)\b"
+    r"(?! and\b)",
+    re.IGNORECASE,
+)
+"""What is wrong; how it should be is said beside it."""
 DEMANDING = frozenset(
     (
         "robots",
@@ -81,4 +90,6 @@ def _tells(part: str, standing: Standing) -> bool:
     """Whether a part tells something and demands nothing."""
     if TELLING.search(part) is None or part.rstrip().endswith("?"):
         return False
+    if COMPLAINT.search(part):
+        return True
     return not any(DEMANDING & set(c.kinds) for c in chunks_of(part, standing))

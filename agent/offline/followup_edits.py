@@ -27,6 +27,8 @@ TEAM = re.compile(
 )
 ADDED_LENGTH = re.compile(r"[,;:]\s*[\w.]+ ?(?:px|pix|m\b|met|cm)\w*\W*$", re.IGNORECASE)
 """A length said after the change, "further out, 6 m": so far it is then."""
+STEP = re.compile(r"\b(?:position|place|spot|slot|step|seat)s?\b", re.IGNORECASE)
+"""Of a ring: from one robot to the next."""
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
@@ -180,13 +182,15 @@ def rotate(slots: Slots, said: Said) -> Effects:
     if len(directions) > 1 or directions - {"cw", "ccw"}:
         return None
     degrees = TURN[much_of(slots)]
-    for name in ("angle", "num", "turned"):
+    for name in ("angle", "num"):
         if name in slots:
             degrees = float(slots[name][0])
+    if "num" in slots and STEP.search(said.words):
+        degrees *= 360 / said.count  # "one place clockwise"
     sign = -1 if "ccw" in directions else 1
     last = _of_kind(said.last, "rotate")
     if "otherway" in slots or "back" in slots:
-        if not any(name in slots for name in ("angle", "num", "turned", "much")) and last:
+        if not any(name in slots for name in ("angle", "num", "much")) and last:
             twice = 2 if "otherway" in slots else 1  # what was turned back, and as far again
             return [{**last, "degrees": -twice * last["degrees"]}]
         sign = -1 if last is None or last["degrees"] > 0 else 1

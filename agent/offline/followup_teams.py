@@ -22,6 +22,7 @@ PLACING = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 """Robots, a number of them, a thing and such a word make a new instruction."""
+EACH_CORNER = re.compile(r"\b(?:each|every)\b.*\bcorner", re.IGNORECASE)
 SHARES = {"half": 2, "third": 3, "quarter": 4}
 LIKE_A_RING = ("around", "cage", "corners", "shape")
 """Arrangements about a thing, which "around" the next one keeps."""
@@ -94,12 +95,13 @@ def count(slots: Slots, said: Said) -> Effects:
 
 def needed(slots: Slots, said: Said) -> Effects:
     """As many as close the ring."""
+    slots.has("add", "close", "closeq")
     return [{"kind": "count", "robots": "needed"}]
 
 
 def fit(slots: Slots, said: Said) -> Effects:
     """As many as there is room for."""
-    slots.has("apart", "spacing")
+    slots.has("apart", "spacing", "add")
     spaced: list[Effect] = (
         [{"kind": "spacing", "px": float(slots["px"][0])}] if "px" in slots else []
     )
@@ -322,6 +324,8 @@ def arrange(slots: Slots, said: Said) -> Effects:
 def arranged(slots: Slots, said: Said) -> Effects:
     """Another arrangement, of so many robots."""
     n = whole(slots)
+    if n is not None and EACH_CORNER.search(said.words):
+        n *= 4
     if n is None or n > MAX_ROBOTS:
         return None
     given = Slots({k: v for k, v in slots.items() if k not in ("num", "lone")})
@@ -335,7 +339,9 @@ def arranged(slots: Slots, said: Said) -> Effects:
 
 
 def _group(relation: str, slots: Slots) -> Effect:
-    """The fields of the group of an arrangement."""
+    """The fields of the group of an arrangement; a circle, about a thing of any shape, is drawn."""
+    if relation == "circle":
+        return {"relation": "shape", "shape": {"kind": "circle", "where": "around"}}
     group: Effect = {"relation": relation}
     if relation == "along":
         slots.has("onword", "only")

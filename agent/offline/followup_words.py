@@ -23,7 +23,7 @@ from .standing import Standing
 
 WORD = re.compile(r"[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[0-9]+(?:[.,][0-9]+)*|[^\w\s]")
 POINT = re.compile(
-    r"\(?\b(-?[0-9]+(?:\.[0-9]+)?) ?[,/] ?(-?[0-9]+(?:\.[0-9]+)?)\)?(?![0-9.%]| ?px)"
+    r"\(?\b(-?[0-9]+(?:\.[0-9]+)?) ?[,/] ?(-?[0-9]+(?:\.[0-9]+)?)\)?(?![0-9%]|\.[0-9]| ?px)"
 )
 NAMED = re.compile(r"\b[tc][0-9]{1,4}\b")
 NUMBERED = re.compile(
@@ -45,8 +45,11 @@ BEFORE_THINGS = frozenset(
         "along",
         "by",
         "near",
+        "each",
+        "every",
     )
 )
+PLACING = BEFORE_THINGS - {"to", "of", "about", "each", "every"}
 PRONOUNS = frozenset(("them", "it", "they", "us", "you"))
 SIDE_WORDS = ("left", "right", "top", "bottom", "upper", "lower", "leftmost", "rightmost", "middle")
 
@@ -165,18 +168,24 @@ class _Reader:
         place, things = table_of("ordinals").get(self.plain[start]), self.standing.things
         named = self.plain[start + 1 : start + 2]
         end = start + 1 + (named in (["one"], ["thing"], ["object"]))
-        plain = end == start + 1 and (start == at or (named[:1] and named[0][0].isalpha()))
+        led = at > 0 and self.plain[at - 1] in PLACING  # "at the first"
+        after = {*lexicon().get(tuple(named), ())}
+        idle = not named or not named[0][0].isalpha() or {"filler", "sep"} & after
+        plain = end == start + 1 and (start == at or not idle)
         first = self.plain[start] == "first" and named not in (["thing"], ["object"])
+        first = first and not led and bool(self.standing.plan)  # else there is no first plan
         if place is None or first or plain or not 1 < len(things) >= place:
             return None
         return {"thing": things[place - 1 if place > 0 else -1][0]}, end
 
     def _robots(self, at: int) -> tuple[dict[str, Any], int] | None:
         """Robot 3; robots 3, 4 and 5; r7; the third robot."""
-        place = table_of("ordinals").get(self.plain[at])
         after = self.plain[at + 1] if at + 1 < len(self.plain) else ""
+        place = table_of("ordinals").get(self.plain[at])
         if place is not None and after in word_set("robots"):
             return {"robots": (place if place > 0 else len(self.standing.robots),)}, at + 2
+        if self.plain[at] == "the" and after in table_of("ordinals"):
+            return self._robots(at + 1)
         if self.plain[at] not in word_set("robots"):
             return None
         numbers: list[int] = []
