@@ -5,7 +5,7 @@ They are taken out only where the rest is understood without them, and are quote
 
 import re
 
-from .followup_words import chunks_of
+from .followup_words import chunks_of, word_set
 from .standing import Standing
 
 PART = re.compile(r"[^.,;:!?]+[.,;:!?]*\s*|[.,;:!?]+\s*")
@@ -30,51 +30,7 @@ COMPLAINT = re.compile(
     re.IGNORECASE,
 )
 """What is wrong; how it should be is said beside it."""
-DEMANDING = frozenset(
-    (
-        "robots",
-        "num",
-        "px",
-        "m",
-        "angle",
-        "share",
-        "point",
-        "dir",
-        "side",
-        "flank",
-        "radial",
-        "spin",
-        "apart",
-        "scale",
-        "ratio",
-        "relation",
-        "gap",
-        "stay",
-        "swap",
-        "leave",
-        "remove",
-        "add",
-        "hold",
-        "never",
-        "neg",
-        "clear",
-        "close",
-        "only",
-        "except",
-        "toofar",
-        "toomany",
-        "turn",
-        "mirror",
-        "face",
-        "merge",
-        "split",
-        "escape",
-        "open",
-        "wide",
-        "resize",
-        "current",
-    )
-)
+DEMANDING = word_set("demanding")
 """Kinds of phrases that demand something, or change what does."""
 
 

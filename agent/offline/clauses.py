@@ -36,14 +36,10 @@ LEADING = frozenset(
     ("no", "neg", "correction", "yes", "filler", "sep", "thanks", "hello", "instead", "certq")
 )
 PURE = frozenset(("filler", "sep", "yes", "thanks", "hello", "correction"))
-SLIGHT = (
-    PURE
-    | {"move", "make", "it", "team", "leavegap", "about", "towards", "side_of"}
-    | {
-        "instead",
-        "robotword",
-    }
-)
+SLIGHT = PURE | {
+    *("move", "make", "it", "team", "leavegap", "about", "towards", "side_of"),
+    *("instead", "robotword"),
+}
 """Kinds of phrases that say nothing by themselves."""
 OPENERS = r"^(?:(?:so|and|ok|okay|hm+|but|now|well|please|hey|hi|no|yes|then)\b[ ,.]*)+"
 
@@ -78,7 +74,7 @@ class Line:
         self.excepted: tuple[int, ...] = ()
         chunks = _commanding(chunks_of(self.words, standing))
         found = [resolved(c, self.words, standing) for c in chunks]
-        while len(found) > 1 and ("correction" in found[-1].kinds or is_empty(found[-1])):
+        while len(found) > 1 and (_is_pure(found[-1]) or is_empty(found[-1])):
             found.pop()  # "the lower one, i mean"
         if any({"stay", "except"} & set(c.kinds) for c in found) and not self._leaving(found):
             found = [_as_team(c) if "rest" in c.kinds else c for c in found]
@@ -224,9 +220,6 @@ class Line:
         robots = bool(after) and all({"robots", "stay"} & set(c.kinds) for c in after)
         if robots and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
-        swapping = self._answering(after)
-        if swapping is not None:
-            return swapping
         amounts = bool(after) and all({"px", "angle"} & set(c.kinds) for c in after)
         if amounts and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
@@ -235,14 +228,6 @@ class Line:
         if robots and not self.denies:
             return self._for_robots(after) or self._of_words(self.standing.words, after)
         return None if self.adds else self._instead(self._of_words(self.standing.words, after))
-
-    def _answering(self, after: Sequence[Chunk]) -> list[Clause] | None:
-        """Two numbers alone as robots to swap, where the words before were to swap some."""
-        if len(after) != 2 or not all("num" in c.kinds for c in after):
-            return None
-        before = chunks_of(spelled(self.standing.said), self.standing)
-        clause = self._framed([*[c for c in before if "swap" in c.kinds][:1], *after], ())
-        return [clause] if clause is not None and clause.frame == "swap" else None
 
     def _of_words(self, words: str, after: Sequence[Chunk]) -> list[Clause] | None:
         """What was said before, with phrases of this line put in."""
@@ -316,7 +301,7 @@ def _is_kind(chunk: Chunk) -> bool:
 
 
 def _is_pure(chunk: Chunk) -> bool:
-    return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= PURE
+    return bool({"filler", "sep", "correction"} & set(chunk.kinds)) and set(chunk.kinds) <= PURE
 
 
 def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:

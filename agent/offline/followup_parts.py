@@ -1,21 +1,20 @@
 """From a frame to edits of how much, of a quantity that is named, and of how many go where."""
 
-import re
-
-from .followup_edits import Effect, Effects, Said, ask, factor_of, rounded, where
+from .followup_edits import EXACT, Effect, Effects, Said, ask, factor_of, rounded, where
 from .followup_frames import Slots
 from .followup_teams import how_many_fewer, how_many_more, whole
 
-VAGUE = ("here", "there", "other")
+HERE = ("here", "stay")
+VAGUE = (*HERE, "there", "other")
 """Kinds of phrases for a thing that is told from the others that are named."""
-EXACT = re.compile(r"\bto\b(?!.*\bby\b)", re.IGNORECASE)
-"""A length or number that is the whole of it, not a change: "increase it to 60 px"."""
 
 
 def changed(slots: Slots, said: Said) -> Effects:
     """More or less of a quantity: by so much, to so much, or by a factor."""
     way, of = str(slots["grow"][0]), str(slots["quantity"][0])
-    exact = EXACT.search(said.words) is not None
+    exact = way == "set" or EXACT.search(said.words) is not None
+    if way == "set" and not {"px", "num"} & {*slots}:
+        return None
     px = float(slots["px"][0]) if "px" in slots else None
     slots.has("bound", "exactly", "spacing", "again", "more")
     of = "spacing" if "spacing" in slots else of
@@ -45,7 +44,7 @@ def _teamed(slots: Slots, said: Said, way: str, factor: float, *, exact: bool) -
         return [{"kind": "count", "robots": max(round(said.count * factor), 1)}]
     if "num" not in slots:
         return how_many_more(slots, said) if way == "up" else how_many_fewer(slots, said)
-    if n is None or (exact and (n > said.count) != (way == "up")):
+    if n is None or (exact and way != "set" and (n > said.count) != (way == "up")):
         return None
     if exact:
         return [{"kind": "count", "robots": n}]
@@ -56,7 +55,7 @@ def _teamed(slots: Slots, said: Said, way: str, factor: float, *, exact: bool) -
 def parted(slots: Slots, said: Said) -> Effects:
     """So many about one thing, so many about another: all of them are named."""
     numbers = [int(n) for n in slots["num"]]
-    slots.has("relation", "stay", "make", "portion", "split")
+    slots.has("relation", "make", "portion", "split")
     if not said.standing.targets:
         return None
     told = [(k, str(v)) for k in slots if k in (*VAGUE, "thing", "current") for v in slots[k]]
@@ -64,7 +63,7 @@ def parted(slots: Slots, said: Said) -> Effects:
     for at, (kind, _) in enumerate(told):
         if kind in VAGUE:
             known = said.standing.targets
-            if kind != "here" and not any(name.startswith("?") for name in names):
+            if kind not in HERE and not any(name.startswith("?") for name in names):
                 known = [*said.standing.others(), *known]
             left = [t for t in known if t not in names]
             found = left[0] if left else where(Slots({kind: [""]}), said)

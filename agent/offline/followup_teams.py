@@ -16,6 +16,7 @@ from .followup_edits import (
     where,
 )
 from .followup_frames import Slots
+from .followup_words import chunks_of
 
 PLACING = re.compile(
     r"(?=.*\b(?:robot|bot|drone|rover)s?\b).*\b(?:put|place|surround|position|station|arrange)\b",
@@ -184,19 +185,6 @@ def not_this(slots: Slots, said: Said) -> Effects:
     return to if isinstance(to, list) else [{"kind": "target", "to": to}]
 
 
-def remain(slots: Slots, said: Said) -> Effects:
-    """So many where they are: beside others that go somewhere else."""
-    going = [e for e in said.before if e["kind"] == "target" and isinstance(e.get("robots"), int)]
-    n = whole(slots)
-    slots.has("here", "current", "stay")
-    if len(said.standing.groups) > 1 or n is None or len(going) != 1:
-        return None
-    some = going[0]["robots"]
-    if some + n != said.count:
-        return ask(f"There are {said.count} robots, not {some} and {n}. How many go, and where?")
-    return [{"kind": "talk", "about": "already"}]
-
-
 def split(slots: Slots, said: Said) -> Effects:
     """Some there, the rest here."""
     named = [r for robots in slots.get("robots", ()) for r in robots]
@@ -280,9 +268,10 @@ def few_away(slots: Slots, said: Said) -> Effects:
 
 
 def swap_again(slots: Slots, said: Said) -> Effects:
-    """Two more robots, after others were swapped."""
+    """Two more robots, after others were swapped, or where it was asked which are to."""
+    asked = [k for c in chunks_of(said.standing.said, said.standing) for k in c.kinds]
     swapped = said.last and said.last[-1]["kind"] == "swap"
-    return swap(slots, said) if swapped else None
+    return swap(slots, said) if swapped or "swap" in asked else None
 
 
 def add_one(slots: Slots, said: Said) -> Effects:

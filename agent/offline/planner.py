@@ -9,11 +9,11 @@ import re
 from dataclasses import replace
 from typing import Any
 
-from ...tools.formation.units import length_text
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
+from .answering import arrived
 from .choosing import Found, Step, agrees, calls_in, find, located_reasons, prompts_of
 from .conversing import conversed
 from .descriptions import Reference
@@ -216,15 +216,14 @@ def _said(task: Task, history: History) -> str:
         if answer.isdecimal():
             continue  # how many robots
         alone = read_instruction(answer, task.metres_per_pixel)
-        if alone.unread and k < len(said) - 1:
-            continue  # it was asked about, and said in another way since
-        if alone.robots and alone.sure and not alone.unread:
-            text = ""  # said anew
+        read = alone.robots or alone.group or alone.things or alone.sure
+        if alone.unread and not read and k < len(said) - 1:
+            continue  # nothing of it was understood, and it was said in another way since
         odd = alone.unscaled or [q for q in alone.unread if re.search("[0-9]", q)]
-        unread = read_instruction(text, task.metres_per_pixel).unread if text else ()
+        unread = read_instruction(text, task.metres_per_pixel).unread
         for quote in () if odd else unread:  # an answer counts where it is wholly read
             text = text.replace(quote, " ", 1)
-        text = f"{text} . {answer}" if text else answer
+        text = f"{text} . {answer}"
     return text
 
 
@@ -294,14 +293,7 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
     planned = _planned(task, json.loads(proposal.text), history)
     if result.error:
         return f"{planned} {result.text}"
-    arrival = json.loads(result.text)
-    worst = length_text(arrival["worst_residual_px"], task.metres_per_pixel)
-    off = f"{worst} from its place"
-    wording = f"All arrived; the furthest is {off}."
-    if not arrival["arrived"]:
-        corrected = f"after {arrival['corrections']} corrections"
-        wording = f"Robot {arrival['worst_robot']} stopped {off} {corrected}."
-    return f"{planned} {wording}"
+    return f"{planned} {arrived(json.loads(result.text), task.metres_per_pixel)}"
 
 
 def _planned(task: Task, plan: dict[str, Any], history: History) -> str:
