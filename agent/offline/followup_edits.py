@@ -37,22 +37,10 @@ EXACT = re.compile(
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
-SIDE_OF = {
-    "left": "left",
-    "right": "right",
-    "up": "top",
-    "down": "bottom",
-    "top": "top",
-    "bottom": "bottom",
-}
-OPPOSITE = {
-    "left": "right",
-    "right": "left",
-    "top": "bottom",
-    "bottom": "top",
-    "long": "long",
-    "short": "short",
-}
+SIDE_OF = {side: side for side in ("left", "right", "top", "bottom")}
+SIDE_OF |= {"up": "top", "down": "bottom"}
+OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
+OPPOSITE |= {"long": "long", "short": "short"}
 DEGREES = {"right": 0, "down": 90, "bottom": 90, "left": 180, "up": 270, "top": 270}
 RINGS = ("around", "cage")
 ROWS = ("along", "between")
