@@ -1,8 +1,8 @@
 """Two models as one: the first sees and says what is meant, the second plans without a picture.
 
 That is the paper's way: a vision model gives the object of interest O and the pattern instruction
-PI, another model makes the formation of the edges and PI. Which of them is asked next follows from
-the history alone, so that a run can be resumed and replayed like any other.
+PI, another model makes the formation. That one also changes the plan that stands, unseen as long as
+it can. Whose turn it is follows from the history alone, which can be resumed and replayed.
 """
 
 import json
@@ -11,6 +11,7 @@ from ...prompts import Prompt, PromptError, PromptLibrary
 from ...tools.builtin import TOOLS
 from ...tools.errors import InputError
 from ...tools.tool import Tool
+from ..first_message import read_task
 from ..messages import History, Reply, Result, User, turn_of
 from ..model import Model, Request
 
@@ -35,17 +36,25 @@ class TwoStages:
         look: the looker's prompt.
         plan: the planner's prompt.
         repair: the planner's prompt where what it proposed last is not certified.
+        revise: the planner's prompt where a plan stands.
     """
 
     sees = True
 
     def __init__(
-        self, looker: Model, planner: Model, *, look: Prompt, plan: Prompt, repair: Prompt
+        self,
+        looker: Model,
+        planner: Model,
+        *,
+        look: Prompt,
+        plan: Prompt,
+        repair: Prompt,
+        revise: Prompt,
     ) -> None:
         self.names = (looker.name, planner.name)
         self.name = "+".join(self.names)
         self._looker, self._planner = looker, planner
-        self._look, self._plan, self._repair = look, plan, repair
+        self._look, self._plan, self._repair, self._revise = look, plan, repair, revise
 
     async def reply(self, request: Request) -> Reply:
         """The reply of whose turn it is.
@@ -54,11 +63,12 @@ class TwoStages:
             ModelError: it cannot.
         """
         tools, turn = request.tools, tuple(turn_of(request.messages))
-        found = measuring(turn)
-        if found is None:
+        found, stands = measuring(turn), _plan_stands(turn)
+        if found is None and (not stands or _is_to_look(turn)):
             seen = Request(self._look.render(), request.messages, offered(tools, self._look))
             return await self._looker.reply(seen)
-        prompt = self._repair if _uncertified(turn) else self._plan
+        usual = self._revise if stands else self._plan
+        prompt = self._repair if _uncertified(turn) else usual
         told = Request(prompt.render(), _handed_over(turn, found), offered(tools, prompt))
         return await self._planner.reply(told)
 
@@ -98,8 +108,9 @@ def staged(
             f"{blind[0]} reads no prompt and cannot share the work: "
             "--model and --planner both take a language model, such as openai:NAME."
         )
-    look, made, repair = (prompt_named(library, name) for name in ("context", plan, "repair"))
-    return TwoStages(looker, planner, look=look, plan=made, repair=repair), (look, made, repair)
+    names = {"look": "context", "plan": plan, "repair": "repair", "revise": "revise"}
+    prompts = {use: prompt_named(library, name) for use, name in names.items()}
+    return TwoStages(looker, planner, **prompts), tuple(prompts.values())
 
 
 def measuring(messages: History) -> int | None:
@@ -116,17 +127,29 @@ def measuring(messages: History) -> int | None:
     return None
 
 
+def _plan_stands(turn: History) -> bool:
+    """Whether the person speaks of a plan that there is."""
+    return read_task(turn[0].text).standing is not None
+
+
+def _is_to_look(turn: History) -> bool:
+    """Whether the planner has asked for what it cannot see."""
+    return any(isinstance(m, Result) and m.name == "look" for m in turn)
+
+
 def _uncertified(messages: History) -> bool:
     proposals = [m for m in messages if isinstance(m, Result) and m.name == "propose_formation"]
     last = proposals[-1] if proposals else None
     return last is not None and (last.error is not None or not json.loads(last.text)["certified"])
 
 
-def _handed_over(messages: History, found: int) -> History:
+def _handed_over(messages: History, found: int | None) -> History:
     """In place of what the looker said and did, what came of it, as one message of the person's.
 
     A planner that read the pattern as its own words might go on as if it had seen the picture.
     """
+    if found is None:
+        return tuple(map(_without_pictures, messages))
     looked = messages[found]
     assert isinstance(looked, Reply)
     calls = {call.id for call in looked.calls}

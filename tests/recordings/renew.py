@@ -20,13 +20,15 @@ from formup.agent.model import Request
 from formup.agent.store.folder import read_events
 from formup.agent.store.protocol import Event
 from formup.agent.wrappers.replay import ReplayModel
+from formup.evals.experiments.dialogue_work import hold
+from formup.evals.experiments.pointing import pointing
 from formup.evals.tasks.suites import load_suite
 from formup.tools.context import Settings
 from formup.tools.errors import ModelError
 from formup.tools.perception.image import load_picture
 
 DRAWN = Path(__file__).parent / "injected" / "images"
-TASKS = {t.id: t for name in ("photos", "many") for t in load_suite(name).tasks}
+TASKS = {t.id: t for name in ("photos", "many", "dialogues") for t in load_suite(name).tasks}
 
 
 PLAN = re.compile(r"p-[0-9a-f]{10}")
@@ -66,14 +68,17 @@ def renewed(path: Path, written: Path) -> tuple[Event, ...]:
     image = None if task is None else task.picture
     picture = load_picture(image if isinstance(image, Path) else DRAWN / f"{path.stem}.png")
     settings = Settings.model_validate(turn["settings"])
-    Agent(Spoken(path)).run(picture, turn["words"], settings=settings, trace=written)
+    if task is not None and task.dialogue is not None:
+        hold(Agent(Spoken(path)), picture, task, settings, pointing(task, "words", 0), written)
+    else:
+        Agent(Spoken(path)).run(picture, turn["words"], settings=settings, trace=written)
     return read_events(written)
 
 
-def ended(events: Sequence[Event]) -> tuple[str, str]:
-    """How a recording ends: status and message."""
-    end = events[-1].data
-    return end["status"], PLAN.sub("p-...", end["message"])
+def ended(events: Sequence[Event]) -> list[tuple[str, str]]:
+    """How the turns of a recording end: status and message."""
+    ends = [event.data for event in events if event.kind == "end"]
+    return [(end["status"], PLAN.sub("p-...", end["message"])) for end in ends]
 
 
 def recording(before: Sequence[Event], now: Sequence[Event]) -> str:

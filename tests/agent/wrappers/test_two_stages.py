@@ -14,6 +14,7 @@ from formup.agent.session import load_run
 from formup.agent.store.folder import read_events
 from formup.agent.wrappers.doubles import ScriptedModel
 from formup.prompts import load_prompt
+from formup.tools.context import Settings
 from formup.tools.errors import InputError
 from formup.tools.perception.image import Picture, load_picture, picture_from_array
 from PIL import Image
@@ -75,7 +76,7 @@ def test_the_looker_sees_and_the_planner_is_told(picture: Picture) -> None:
     assert 'Measured: [{"id":"t1","label":"the box"' in told.text
     assert {t.name for t in looked.tools} == set(load_prompt("context").tools)
     assert {t.name for t in planned.tools} == set(load_prompt("planner").tools)
-    assert [p["id"] for p in report.prompts] == ["context", "planner", "repair"]
+    assert [p["id"] for p in report.prompts] == ["context", "planner", "repair", "revise"]
     assert report.prompt == report.prompts[1]
 
 
@@ -114,7 +115,7 @@ def test_a_question_of_the_looker_is_answered_in_another_process(
     assert isinstance(asked.outcome, Paused)
     left = load_run(tmp_path)
     assert left.report.model == "scripted+scripted"
-    assert [p["id"] for p in left.report.prompts] == ["context", "planner", "repair"]
+    assert [p["id"] for p in left.report.prompts] == ["context", "planner", "repair", "revise"]
     agent = Agent(Seer([SEGMENT]), planner=Seer([PLACE]))
     assert agent.resume(left, answer="the red one").report.status == "deployed"
     start = read_events(tmp_path)[0].data
@@ -130,6 +131,85 @@ def test_a_run_of_two_is_replayed_by_one(picture: Picture, tmp_path: Path) -> No
     assert again.outcome.messages == done.outcome.messages
     assert again.report.model == "a+b"
     assert again.report.positions == done.report.positions
+
+
+OUT = call("edit_formation", "e", edits=[{"kind": "out", "factor": 1.25}], tell="Further out.")
+STAY = Settings(may_deploy=False)
+BLUE = [135, 85, 190, 130]
+
+
+@pytest.fixture
+def two(tmp_path: Path) -> Picture:
+    """A red box and a blue one."""
+    pixels = np.full((140, 200, 3), 90, np.uint8)
+    pixels[40:80, 30:80] = (200, 40, 40)
+    pixels[92:122, 142:182] = (40, 60, 210)
+    Image.fromarray(pixels).save(tmp_path / "two.png")
+    return load_picture(tmp_path / "two.png")
+
+
+def test_the_planner_changes_what_stands_and_goes_back_without_the_looker(
+    picture: Picture, tmp_path: Path
+) -> None:
+    looker = Seer([SEGMENT])
+    planner = Seer([PLACE, Reply(calls=(OUT,)), Reply(calls=(call("undo", "u", tell="Back."),))])
+    agent = Agent(looker, planner=planner)
+    first = agent.run(picture, "Six around it", trace=tmp_path / "trace.jsonl")
+    out = agent.say(first, "a bit further out", settings=STAY)
+    back = agent.say(out, "undo that", settings=STAY)
+    looker.assert_complete()
+    planner.assert_complete()
+    assert [r.report.status for r in (first, out, back)] == ["deployed", "planned", "planned"]
+    assert out.report.parent == back.report.plan_id == first.report.plan_id
+    assert out.report.message.startswith("Further out.")
+    asked = planner.requests[1]
+    assert asked.system == load_prompt("revise").text
+    assert {t.name for t in asked.tools} == set(load_prompt("revise").tools)
+    (told,) = asked.messages
+    assert f'Standing: {{"plan": "{first.report.plan_id}"' in told.text
+    left = load_run(tmp_path)
+    assert left.outcome == back.outcome
+    replayed = Agent(f"replay:{tmp_path / 'trace.jsonl'}")
+    again = replayed.run(picture, "Six around it")
+    for words in ("a bit further out", "undo that"):
+        again = replayed.say(again, words, settings=STAY)
+    assert again.outcome.messages == back.outcome.messages
+
+
+def test_the_planner_has_the_looker_measure_what_is_new(two: Picture) -> None:
+    red = Reply(text=PI, calls=(call("segment", "s", id="t1", box=[25, 35, 85, 85]),))
+    blue = Reply(text="Half of them move to t2.", calls=(call("segment", "b", id="t2", box=BLUE),))
+    edit = {"kind": "target", "to": "t2", "robots": 3}
+    moved = Reply(calls=(call("edit_formation", "e", edits=[edit], tell="Three and three."),))
+    look = Reply(text="I cannot see it.", calls=(call("look", "l"),))
+    looker, planner = Seer([red, blue]), Seer([PLACE, look, moved])
+    agent = Agent(looker, planner=planner)
+    first = agent.run(two, "Six around the red one")
+    done = agent.say(first, "half of them around the blue one", settings=STAY)
+    looker.assert_complete()
+    planner.assert_complete()
+    assert (done.report.status, done.report.parent) == ("planned", first.report.plan_id)
+    assert done.report.contract is not None
+    groups = [(g.targets, g.robots) for g in done.report.contract.groups]
+    assert groups == [(("t1",), 3), (("t2",), 3)]
+    assert looker.requests[1].system == load_prompt("context").text
+    assert pictures(looker.requests[1]) == 2
+    (told,) = planner.requests[2].messages
+    assert isinstance(told, User)
+    assert 'Pattern: "Half of them move to t2."' in told.text
+    assert "Standing: {" in told.text and 'Measured: [{"id":"t2"' in told.text
+    assert "I cannot see it." not in texts(planner.requests[2])
+    assert [pictures(r) for r in planner.requests] == [0, 0, 0]
+    assert planner.requests[2].system == load_prompt("revise").text
+
+
+def test_where_no_plan_stands_the_looker_begins(picture: Picture) -> None:
+    looker = Seer([Reply(text="I see a red box."), SEGMENT])
+    planner = Seer([PLACE])
+    agent = Agent(looker, planner=planner)
+    first = agent.run(picture, "What do you see?")
+    assert agent.say(first, "Six around it").report.status == "deployed"
+    assert planner.requests[0].system == load_prompt("planner").text
 
 
 def test_rules_cannot_share_the_work(picture: Picture) -> None:

@@ -23,7 +23,7 @@ trying = import_module("trying")
 tried: Callable[..., list[TrialRow]] = trying.tried
 
 RECORDED = Path(__file__).parents[2] / "recordings"
-TASKS = {t.id: t for name in ("photos", "many") for t in load_suite(name).tasks}
+TASKS = {t.id: t for name in ("photos", "many", "dialogues") for t in load_suite(name).tasks}
 
 
 def recordings(*folders: str) -> list[Path]:
@@ -55,6 +55,26 @@ def test_ends_as_recorded(path: Path) -> None:
     end = last.data
     assert (row.outcome, attempt["message"]) == (end["status"], end["message"])
     assert row.requests == end["usage"]["requests"]
+
+
+@pytest.mark.parametrize("path", recordings("dialogues"), ids=lambda path: path.stem)
+def test_each_turn_of_a_dialogue_ends_as_recorded_and_right(path: Path) -> None:
+    row, attempt = replay(path)
+    ends = [event.data for event in read_events(path) if event.kind == "end"]
+    made = [(turn["status"], turn["message"]) for turn in attempt["turns"]]
+    assert made == [(end["status"], end["message"]) for end in ends]
+    assert row.turns is not None
+    assert row.turns.right == row.turns.total == len(ends) == 4
+    assert row.requests == sum(end["usage"]["requests"] for end in ends)
+
+
+def test_recorded_dialogues_are_counted_as_no_models_and_no_prompts() -> None:
+    found = rows("dialogues")
+    assert len(found) == 3
+    arm = found[0].arm
+    assert all(row.arm == arm for row in found)
+    assert (arm.model or "").startswith("replay:dialogues#")
+    assert (arm.prompt, arm.sha256) == (None, None)
 
 
 def test_the_attempts_of_a_run_are_recordings_too(tmp_path: Path) -> None:

@@ -49,7 +49,8 @@ def test_tools_are_part_of_every_request() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "most"), [("former", 2000), ("context", 2000), ("planner", 2000), ("converse", 2600)]
+    ("name", "most"),
+    [("former", 2000), ("context", 2000), ("planner", 2000), ("converse", 2600), ("revise", 2600)],
 )
 def test_what_every_request_begins_with_is_short(name: str, most: int) -> None:
     prompt = load_prompt(name)
