@@ -1,0 +1,81 @@
+"""`formup mcp`: stdio by default, where nothing but the protocol may be written to stdout."""
+
+import asyncio
+import os
+import signal
+from collections.abc import Coroutine
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...agent.service import Service
+from ...agent.store.places import store_at
+from ...tools.errors import InputError
+from .. import options as o
+from ..agents import agent_of
+from ..main import INTERRUPTED
+
+if TYPE_CHECKING:
+    from ..server.hub import Hub
+
+NEEDED = "formup mcp needs an extra that is not installed: pip install 'formup[mcp]'."
+Http = Annotated[bool, typer.Option("--http", help="Over HTTP instead: formup serve, under /mcp.")]
+Pictures = Annotated[
+    list[Path] | None,
+    typer.Option(metavar="DIR", help="Whose pictures may be opened; by default this folder's."),
+]
+
+
+def mcp(
+    pictures: Pictures = None,
+    store: o.StoreUrl = None,
+    model: o.ModelName = "offline",
+    base_url: o.BaseUrl = None,
+    planner: o.PlannerName = None,
+    prompt: o.PromptName = None,
+    prompts: o.PromptsFolder = None,
+    limit: o.LimitList = None,
+    policy: o.PolicyList = None,
+    fleet: Annotated[str | None, typer.Option(help="The robots of new sessions.")] = None,
+) -> None:
+    """The team for a client of the Model Context Protocol, over stdio."""
+    try:
+        from ..server.hub import Hub
+        from ..server.metrics import Metrics
+        from ..server.settings import ServerSettings
+        from ..server.tokens import Tokens
+        from .server import make_server
+    except ImportError:
+        raise InputError(NEEDED) from None
+    settings = ServerSettings.of(store=store, fleet=fleet)
+    folders = pictures or [Path()]
+    for folder in folders:
+        if not folder.is_dir():
+            raise InputError(f"--pictures {folder} is no folder.")
+    with agent_of(model, planner, base_url, prompt, prompts, limit, policy, talks=True) as agent:
+        hub = Hub(Service(agent, store_at(settings.store)), settings, Tokens(None), Metrics())
+        server = make_server(hub, [folder.resolve() for folder in folders])
+        raise typer.Exit(asyncio.run(_serve(hub, server.run_stdio_async())))
+
+
+async def _serve(hub: "Hub", work: Coroutine[Any, Any, None]) -> int:
+    """Until stdin is closed or a signal comes; what to exit with. Robots are held at the end."""
+    loop, serving = asyncio.get_running_loop(), asyncio.ensure_future(work)
+    ended: asyncio.Future[int] = loop.create_future()
+
+    def end(code: int) -> None:
+        if not ended.done():
+            ended.set_result(code)
+
+    serving.add_done_callback(lambda _: end(0))
+    with suppress(NotImplementedError):  # on Windows
+        loop.add_signal_handler(signal.SIGTERM, end, 0)
+        loop.add_signal_handler(signal.SIGINT, end, INTERRUPTED)
+    code = await ended
+    await hub.service.close()
+    if not serving.done():
+        os._exit(code)  # nothing wakes the thread that waits for stdin
+    await serving
+    return code
