@@ -52,7 +52,7 @@ class Feed:
     def __init__(self, stored: StoredSession, events: Sequence[Event]) -> None:
         self.stored, self.last = stored, 0
         self.turn: Turn | None = None
-        self.followers = 0
+        self.followers, self._ended = 0, False
         self.keys: dict[str, tuple[str, int]] = {}
         self._kept: deque[Event] = deque(maxlen=MOST_KEPT)
         self._poses = Poses(0, ())
@@ -77,6 +77,11 @@ class Feed:
         self._poses = Poses(self._poses.number + 1, poses)
         self._wake()
 
+    def end(self) -> None:
+        """End all subscriptions, after what has happened is told."""
+        self._ended = True
+        self._wake()
+
     async def subscribe(
         self, after: int = 0, heartbeat: float = 15.0
     ) -> AsyncGenerator[Event | Poses | None]:
@@ -91,12 +96,12 @@ class Feed:
         """
         self.followers += 1
         try:
-            async for what in self._told(after, heartbeat):
+            async for what in self._follow(after, heartbeat):
                 yield what
         finally:
             self.followers -= 1
 
-    async def _told(self, after: int, heartbeat: float) -> AsyncGenerator[Event | Poses | None]:
+    async def _follow(self, after: int, heartbeat: float) -> AsyncGenerator[Event | Poses | None]:
         seen, told = 0, time.monotonic()
         while True:
             changed, poses = self._changed, self._poses
@@ -106,6 +111,8 @@ class Feed:
             if poses.number != seen:
                 yield poses
                 seen, told = poses.number, time.monotonic()
+            if self._ended:
+                return
             if time.monotonic() - told >= heartbeat:
                 yield None
                 told = time.monotonic()

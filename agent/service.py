@@ -18,7 +18,8 @@ from .approvals import Waiting, check_nonce, waiting
 from .conversation import Session
 from .feed import FedSession, Feed, Poses
 from .fleet_owner import FleetOwner
-from .session import Run, SayOptions, Show, load_run, stored_picture
+from .reading import read_conversation
+from .session import Run, SayOptions, Show
 from .session_start import Opening
 from .store.copies import fork
 from .store.protocol import Event, Store
@@ -36,6 +37,9 @@ class Service:
         agents: who decides in all of them; several by names, of which the first is the usual one.
         store: where they are written.
         auto: whether simulated robots move as soon as a plan is certified.
+
+    Attributes:
+        ended: is given every turn at its end, to be counted.
     """
 
     def __init__(
@@ -43,6 +47,7 @@ class Service:
     ) -> None:
         self.agents = {"": agents} if isinstance(agents, Agent) else dict(agents)
         self.store, self.auto = store, auto
+        self.ended: Callable[[Turn], None] = lambda turn: None
         self._owner = FleetOwner(store)
         self._sessions: dict[str, Session] = {}
         self._feeds: dict[str, Feed] = {}
@@ -229,6 +234,22 @@ class Service:
         """The turn that is under way in this process, if one is."""
         return self._turns.get(session)
 
+    def last_turn(self, session: str) -> int:
+        """The number of the event that began the last turn in this process; 0 where none did."""
+        feed = self._feeds.get(session)
+        return feed.turn.number if feed and feed.turn else 0
+
+    def is_written(self, session: str) -> bool:
+        """Whether a turn of it is under way, here or in another process."""
+        if session in self._turns:
+            return True
+        stored = self.store.open(session)
+        try:
+            stored.write(len(stored.events())).close()
+        except StorageError as error:
+            return error.kind in ("busy", "gone_on")
+        return False
+
     def fork(self, session: str, turn: int | None = None) -> str:
         """A conversation of its own that begins as another did.
 
@@ -264,9 +285,15 @@ class Service:
         if held is not None and held.run is not None:
             await held.run.context.services.close_fleets()
 
-    async def close(self) -> None:
-        """Stop what runs, hold the robots, and let go of models and the store."""
+    async def leave(self) -> None:
+        """Stop what runs, hold the robots, and end what is followed."""
         await asyncio.gather(*map(self.stop, self._turns), return_exceptions=True)
+        for feed in self._feeds.values():
+            feed.end()
+
+    async def close(self) -> None:
+        """Leave, and let go of models, fleets and the store."""
+        await self.leave()
         if self._watcher is not None:
             self._watcher.cancel()
         for held in self._sessions.values():
@@ -300,40 +327,12 @@ class Service:
         services = Services(claim=self._owner.claim, watch=feed.moved)
         if old is not None and old.services is not None:
             services.stopped |= old.services.stopped
-        made = self._read(FedSession(stored, feed), events, picture, services)
+        fed = FedSession(stored, feed)
+        made = read_conversation(fed, events, self.agents, picture, services)
+        made.auto = self.auto
         self._sessions[session] = made
         for name in list(self._sessions)[: len(self._sessions) - MOST_OPEN]:
             self._forget(name)
-
-    def _read(
-        self,
-        stored: FedSession,
-        events: Sequence[Event],
-        picture: Picture | None,
-        services: Services,
-    ) -> Session:
-        """A conversation from its events."""
-        first = events[0].data
-        opening = Opening.model_validate(first.get("opening") or {})
-        agent = self.agents.get(opening.agent) or next(iter(self.agents.values()))
-        run = None
-        if any(event.kind == "message" for event in events):
-            run = load_run(stored, picture, services)
-            picture = run.context.picture
-        else:
-            picture = stored_picture(first["picture"], stored.artefacts, picture)
-        return Session(
-            agent,
-            picture,
-            opening.settings if run is None else run.context.settings,
-            opening.pointed if run is None else (),
-            opening.keep_out if run is None else (),
-            stored,
-            self.auto,
-            begun=len(events),
-            services=services,
-            run=run,
-        )
 
     def _forget(self, session: str) -> None:
         """Let go of a conversation that can be read again, unless it holds robots."""
@@ -375,6 +374,7 @@ class Service:
 
         def over(task: asyncio.Task[Run]) -> None:
             self._turns.pop(session, None)
+            self.ended(turn)
             if not task.cancelled():
                 task.exception()  # told to whoever awaits it, if anybody does
 

@@ -2,7 +2,8 @@
 
 import asyncio
 import hashlib
-from collections.abc import Generator, Mapping, Sequence
+import time
+from collections.abc import Coroutine, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,6 +40,7 @@ class Turn:
     Attributes:
         digest: of what was asked, to tell whether the same key means the same.
         number: of the event that began it; 0 before that is written.
+        since: when it was asked for, by the monotonic clock.
         moving: set once robots are about to move.
     """
 
@@ -46,6 +48,7 @@ class Turn:
     digest: str
     task: "asyncio.Task[Run]" = field(init=False)
     number: int = 0
+    since: float = field(default_factory=time.monotonic)
     began: asyncio.Event = field(default_factory=asyncio.Event)
     moving: asyncio.Event = field(default_factory=asyncio.Event)
     _cancelled: bool = False
@@ -54,20 +57,37 @@ class Turn:
         """Its run, at its end."""
         return self.task.__await__()
 
-    async def wait(self, seconds: float) -> Run | None:
-        """Its run; None where it goes on after so many seconds, or drives robots by then.
+    async def begin(self) -> None:
+        """Wait until its beginning is written, or it has ended.
 
         Raises:
             InputError: it could not begin.
         """
-        moving = asyncio.ensure_future(self.moving.wait())
+        await self._first(self.began.wait(), None)
+        if self.task.done():
+            await self.task
+
+    async def wait(self, seconds: float, *, moving: bool = True) -> Run | None:
+        """Its run; None where it goes on after so many seconds.
+
+        Args:
+            moving: whether it is not waited for either once it drives robots.
+
+        Raises:
+            InputError: it could not begin.
+        """
+        waits = self.moving.wait() if moving else asyncio.sleep(seconds)
+        await self._first(waits, seconds)
+        return await self.task if self.task.done() else None
+
+    async def _first(self, waits: Coroutine[Any, Any, object], seconds: float | None) -> None:
+        """Wait for the first of its end and something else."""
+        other = asyncio.ensure_future(waits)
         try:
-            await asyncio.wait(
-                {self.task, moving}, timeout=seconds, return_when=asyncio.FIRST_COMPLETED
-            )
+            first = asyncio.FIRST_COMPLETED
+            await asyncio.wait({self.task, other}, timeout=seconds, return_when=first)
         finally:
-            moving.cancel()
-        return self.task.result() if self.task.done() else None
+            other.cancel()
 
     async def ended(self) -> Run | None:
         """Its run after it was stopped; None where it had not begun."""
@@ -125,11 +145,11 @@ def check_key(turn: Turn, before: Mapping[str, tuple[str, int]], *, again: bool 
 
 def digest_of(name: str, arguments: Sequence[Any], options: Mapping[str, Any]) -> str:
     """A hash of what is asked for; what is only shown does not count."""
-    named = [(k, _said(v)) for k, v in sorted(options.items()) if k != "show"]
-    return hashlib.sha256(to_json([name, *map(_said, arguments), named])).hexdigest()[:32]
+    named = [(k, _as_json(v)) for k, v in sorted(options.items()) if k != "show"]
+    return hashlib.sha256(to_json([name, *map(_as_json, arguments), named])).hexdigest()[:32]
 
 
-def _said(value: Any) -> Any:
+def _as_json(value: Any) -> Any:
     """An argument as JSON; a picture as its hash."""
     return value.sha256 if isinstance(value, Picture) else value
 

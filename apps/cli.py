@@ -15,7 +15,7 @@ from ..prompts import PromptLibrary
 from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
-from . import arguments, chat, deploy, evaluate, prompts, sessions, tools, trace
+from . import arguments, chat, deploy, evaluate, prompts, serve, sessions, tools, trace
 from . import options as o
 from .agents import agent_of, tracer_of_environment
 from .run_files import Folder, write_files
@@ -150,6 +150,8 @@ def resume(
 
 
 app.command(name="chat", cls=chat.InOrder)(chat.chat)
+app.command(name="serve")(serve.serve)
+app.add_typer(serve.tokens, name="tokens")
 app.command(name="deploy")(deploy.deploy)
 app.command(name="trace")(trace.show_trace)
 

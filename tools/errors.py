@@ -51,7 +51,8 @@ plan after a change is not certified (`findings`, each a sentence); nothing_to_u
 step back, or none that was taken back; missing, busy, gone_on: a session that is not in its store,
 is written by another process, or was written since it was opened; key, repeated: a turn was asked
 for under a key before, with other arguments or the same (`turn`, its number); approval: a yes to
-nothing that waits; not_allowed: whoever asks may not do that; too_large, too_many: more than a server takes."""
+nothing that waits; not_allowed: whoever asks may not do that; too_large, too_many: more than a
+server takes."""
 
 
 class FormupError(Exception):

@@ -174,7 +174,7 @@ class DatabaseSession:
 
     def __init__(self, store: DatabaseStore, session: str) -> None:
         self._store, self.id = store, session
-        self.label = f"The session {session!r} in {store.label}"
+        self.label = f"The session {session!r}"
         self.artefacts = DatabaseFiles(store, session)
 
     def events(self, after: int = 0) -> tuple[Event, ...]:

@@ -1,5 +1,7 @@
 """What all routes of a server share: the service, who asks, and how errors are told."""
 
+import logging
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
@@ -11,9 +13,11 @@ from ...agent.service import Service
 from ...agent.store.protocol import owner_of
 from ...agent.turns import Asked
 from ...tools.errors import FormupError, InputError, Kind, StorageError
+from .metrics import Metrics
 from .settings import ServerSettings
 from .tokens import Person, Scope, Tokens
 
+LOG = logging.getLogger("formup.server")
 STATUS: Mapping[Kind | None, int] = {
     "missing": 404,
     "busy": 409,
@@ -33,15 +37,18 @@ class Hub:
     """What a server works with.
 
     Attributes:
+        running: how many requests of a person are under way.
+        streams: how many event streams are open.
         leaving: whether it is about to end; it is not ready for more then.
     """
 
     service: Service
     settings: ServerSettings
     tokens: Tokens
+    metrics: Metrics
     leaving: bool = False
     streams: int = 0
-    open: dict[str, int] = field(default_factory=dict[str, int])
+    running: Counter[str] = field(default_factory=Counter[str])
 
 
 def hub_of(request: Request) -> Hub:
@@ -101,5 +108,11 @@ def error_response(status: int, message: str, code: str | None = None) -> JSONRe
 def told(error: FormupError) -> JSONResponse:
     """An error that formup raised on purpose, as a response."""
     by_kind = STATUS.get(error.kind)
-    usual = 500 if isinstance(error, StorageError) else 422 if isinstance(error, InputError) else 502
-    return error_response(by_kind or usual, str(error), error.kind)
+    usual = (
+        500 if isinstance(error, StorageError) else 422 if isinstance(error, InputError) else 502
+    )
+    status = by_kind or usual
+    if status >= 500:  # names addresses of the store, of models' and robots' hosts
+        LOG.error("failed", extra={"facts": {"error": str(error)}})
+        return error_response(status, "The server cannot do that now; its log says why.")
+    return error_response(status, str(error), error.kind)

@@ -85,7 +85,7 @@ class Tokens:
             return ()
         changed = self._path.stat().st_mtime_ns
         if changed != self._read:
-            self._entries, self._read = _read(self._path), changed
+            self._entries, self._read = _parsed(self._path), changed
         return self._entries
 
     def add(self, name: str, scope: str) -> str:
@@ -102,7 +102,7 @@ class Tokens:
         if scope not in SCOPES:
             raise InputError(f"A token's scope is one of {', '.join(SCOPES)}, not {scope!r}.")
         if any(entry.name == name for entry in self.entries()):
-            raise InputError(f"There is a token {name!r} already; remove it first, or name another.")
+            raise InputError(f"There is a token {name!r} already; remove it, or name another.")
         token = f"fu_{secrets.token_urlsafe(32)}"
         made = datetime.now(UTC).isoformat(timespec="seconds")
         entry = Entry(name=name, scope=scope, sha256=_hash(token), created=made)
@@ -128,7 +128,7 @@ class Tokens:
         self._path.chmod(0o600)
 
 
-def _read(path: Path) -> tuple[Entry, ...]:
+def _parsed(path: Path) -> tuple[Entry, ...]:
     try:
         return tuple(Entry.model_validate(entry) for entry in from_json(read_text(path)))
     except (ValidationError, ValueError, TypeError):

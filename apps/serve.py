@@ -1,0 +1,123 @@
+"""`formup serve` and `formup tokens`: the team over HTTP, and who may reach it."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..agent.agent import Agent
+from ..agent.service import Service
+from ..agent.store.places import data_folder, store_at
+from ..tools.errors import InputError
+from . import options as o
+from .agents import agent_of
+from .terminal import say
+
+if TYPE_CHECKING:
+    from .server.settings import ServerSettings
+    from .server.tokens import Tokens
+
+NEEDED = "formup serve needs an extra that is not installed: pip install 'formup[serve]'."
+TOKENS = "tokens.json"
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+tokens = typer.Typer(help="Who may reach a server: names, scopes and hashes in a file.")
+Host = Annotated[str | None, typer.Option(help="Address to listen on; loopback by default.")]
+Port = Annotated[int | None, typer.Option(help="Port to listen on; 8734 by default.")]
+TokensFile = Annotated[Path | None, typer.Option("--tokens", help="File with hashed tokens.")]
+Models = Annotated[
+    list[str] | None,
+    typer.Option("--model", help="Who decides; several times for several, the first is usual."),
+]
+
+
+def serve(
+    host: Host = None,
+    port: Port = None,
+    tokens_file: TokensFile = None,
+    store: o.StoreUrl = None,
+    model: Models = None,
+    base_url: o.BaseUrl = None,
+    planner: o.PlannerName = None,
+    prompt: o.PromptName = None,
+    prompts: o.PromptsFolder = None,
+    limit: o.LimitList = None,
+    policy: o.PolicyList = None,
+    fleet: Annotated[str | None, typer.Option(help="The robots of new sessions.")] = None,
+) -> None:
+    """The team over HTTP: an API of its own, OpenAI's, and MCP, for chatbots and programs."""
+    try:
+        from .server.run import run
+        from .server.settings import ServerSettings
+    except ModuleNotFoundError as error:
+        if error.name not in ("fastapi", "uvicorn", "prometheus_client"):
+            raise
+        raise InputError(NEEDED) from None
+    settings = ServerSettings.of(
+        host=host,
+        port=port,
+        store=store,
+        tokens_file=tokens_file,
+        fleet=fleet,
+        model=model and ",".join(model),
+    )
+    usual = data_folder() / TOKENS
+    if settings.tokens_file is None and usual.exists():
+        settings = settings.model_copy(update={"tokens_file": usual})
+    check_reach(settings)
+    with ExitStack() as stack:
+        agents: dict[str, Agent] = {}
+        for name in settings.model.split(","):
+            rest = (planner, base_url, prompt, prompts, limit, policy)
+            agents[name.strip()] = stack.enter_context(agent_of(name.strip(), *rest, talks=True))
+        service = Service(agents, store_at(settings.store))
+        raise typer.Exit(run(service, settings))
+
+
+def check_reach(settings: "ServerSettings") -> None:
+    """Refuse to listen to others without tokens.
+
+    Raises:
+        InputError: saying so.
+    """
+    if settings.host not in LOOPBACK and settings.tokens_file is None:
+        raise InputError(
+            f"On {settings.host} others can reach this server, and robots with it: make a token "
+            "with formup tokens add NAME, or listen on 127.0.0.1."
+        )
+
+
+@tokens.command("add")
+def add(
+    name: Annotated[str, typer.Argument(help="Whose it is: small letters, digits, underscores.")],
+    scope: Annotated[str, typer.Option(help="read, plan or move.")] = "plan",
+    file: TokensFile = None,
+) -> None:
+    """Make a token and show it, this once."""
+    say(_tokens(file).add(name, scope))
+
+
+@tokens.command("list")
+def listed(file: TokensFile = None) -> None:
+    """The names and scopes there are."""
+    for entry in _tokens(file).entries():
+        say(f"{entry.name}  {entry.scope}  since {entry.created}")
+
+
+@tokens.command("remove")
+def remove(
+    name: Annotated[str, typer.Argument(help="Whose it is.")], file: TokensFile = None
+) -> None:
+    """Take a token away, at once; sessions made with it stay."""
+    _tokens(file).remove(name)
+    say(f"The token {name} is no longer taken.")
+
+
+def _tokens(file: Path | None) -> "Tokens":
+    """The tokens of a file, or of the one in the user's data folder."""
+    from .server.settings import ServerSettings
+    from .server.tokens import Tokens
+
+    path = file or ServerSettings.of().tokens_file or data_folder() / TOKENS
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return Tokens(path)

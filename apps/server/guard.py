@@ -1,0 +1,154 @@
+"""What stands before every route: who asks, from where, how much, how often, how slowly."""
+
+import asyncio
+import time
+from collections import defaultdict, deque
+from collections.abc import Generator
+from contextlib import contextmanager
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from ...tools.errors import FormupError, InputError
+from .hub import Hub, error_response, told
+from .tokens import Person
+
+OPEN = ("/health/", "/v1/pictures/")
+"""Paths that want no token: what they show is no secret, or has one of its own in its address."""
+LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
+STALLED = 60.0
+"""Seconds after which a client that takes nothing of a response is cut off."""
+
+
+class Guard:
+    """An ASGI middleware.
+
+    Args:
+        hub: of the server; its tokens, settings and counts are used.
+    """
+
+    def __init__(self, app: ASGIApp, hub: Hub) -> None:
+        self._app, self._hub = app, hub
+        self._recent: dict[str, deque[float]] = defaultdict(deque)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        begun = False
+
+        async def watched(message: Message) -> None:
+            nonlocal begun
+            begun = True
+            self._hub.metrics.answered(message.get("status", 0))
+            async with asyncio.timeout(STALLED):
+                await send(message)
+
+        try:
+            self._check_place(scope["method"], headers)
+            person = self._person(scope["path"], headers)
+            scope.setdefault("state", {})["person"] = person
+            with self._counted(person):
+                await self._app(scope, self._bounded(receive, headers), watched)
+        except FormupError as error:
+            if begun:
+                raise
+            await told(error)(scope, receive, watched)
+        except _RefusedError as refused:
+            response = error_response(refused.status, str(refused))
+            if refused.status == 401:
+                response.headers["WWW-Authenticate"] = "Bearer"
+            await response(scope, receive, watched)
+
+    def _check_place(self, method: str, headers: Headers) -> None:
+        """Refuse names of this server that others gave it, and pages of other origins."""
+        host, settings = headers.get("host", ""), self._hub.settings
+        name = urlsplit(f"//{host}").hostname or ""
+        mine = LOOPBACK | {settings.host} | set(_parts(settings.hosts))
+        if name not in mine and (settings.hosts or not self._hub.tokens.needed):
+            raise _RefusedError(
+                421, f"This server is not called {name!r}; FORMUP_HOSTS lists its other names."
+            )
+        origin = headers.get("origin")
+        if origin is None and headers.get("sec-fetch-site") in (None, "same-origin", "none"):
+            return
+        same = origin is not None and urlsplit(origin).netloc == host
+        if not same and origin not in _parts(settings.origins) and method not in SAFE:
+            raise _RefusedError(
+                403, f"Pages of {origin or 'another site'} may not call this; see FORMUP_ORIGINS."
+            )
+
+    def _person(self, path: str, headers: Headers) -> Person:
+        if path.startswith(OPEN) or not self._hub.tokens.needed:
+            return Person()
+        kind, _, token = headers.get("authorization", "").partition(" ")
+        person = self._hub.tokens.person(token.strip()) if kind.lower() == "bearer" else None
+        if person is None:
+            raise _RefusedError(401, "A token is needed: send Authorization: Bearer TOKEN.")
+        return person
+
+    @contextmanager
+    def _counted(self, person: Person) -> Generator[None]:
+        """Refuse more requests than one may make at a time, or in a minute."""
+        settings, name, now = self._hub.settings, person.name, time.monotonic()
+        recent, running = self._recent[name], self._hub.running
+        while recent and recent[0] < now - 60:
+            recent.popleft()
+        if len(recent) >= settings.requests_per_minute or running[name] >= settings.requests:
+            raise InputError(
+                f"That is too much at once: {settings.requests} requests at a time and "
+                f"{settings.requests_per_minute} in a minute are allowed; wait a moment.",
+                "too_many",
+            )
+        recent.append(now)
+        running[name] += 1
+        try:
+            yield
+        finally:
+            running[name] -= 1
+
+    def _bounded(self, receive: Receive, headers: Headers) -> Receive:
+        """What a request sends, up to a size and within a time."""
+        most, seconds = self._hub.settings.upload_bytes, self._hub.settings.body_seconds
+        large = InputError(
+            f"The request is larger than the {most:,} bytes that are allowed.", "too_large"
+        )
+        declared = headers.get("content-length", "0")
+        if not declared.isdecimal() or int(declared) > most:
+            raise large
+        until, size, whole = time.monotonic() + seconds, 0, False
+
+        async def bounded() -> Message:
+            nonlocal size, whole
+            if whole:
+                return await receive()
+            try:
+                async with asyncio.timeout(until - time.monotonic()):
+                    message = await receive()
+            except TimeoutError:
+                raise _RefusedError(
+                    408, f"The request did not arrive within {seconds:g} s."
+                ) from None
+            size += len(message.get("body", b""))
+            whole = not message.get("more_body", False)
+            if size > most:
+                raise large
+            return message
+
+        return bounded
+
+
+class _RefusedError(Exception):
+    """A request that is refused before any route sees it."""
+
+    def __init__(self, status: int, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+def _parts(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())

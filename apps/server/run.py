@@ -1,0 +1,90 @@
+"""Runs a server until it is told to end: robots are held first, then turns and streams end."""
+
+import json
+import logging
+import sys
+import time
+from typing import Any
+
+import uvicorn
+
+from ...agent.service import Service
+from ..terminal import say
+from .app import make_app
+from .hub import Hub
+from .settings import ServerSettings
+from .tokens import Tokens
+
+BACKLOG = 512
+"""Connections beside event streams that may be open at a time."""
+
+
+class Server(uvicorn.Server):
+    """A server that holds robots before it waits for anything."""
+
+    def __init__(self, config: uvicorn.Config, hub: Hub) -> None:
+        super().__init__(config)
+        self._hub = hub
+
+    async def startup(self, sockets: Any = None) -> None:
+        """Listen, and say where."""
+        await super().startup(sockets)
+        if self.should_exit:
+            return
+        host, port = self.servers[0].sockets[0].getsockname()[:2]
+        shown = f"[{host}]" if ":" in host else host
+        say(f"formup: serving on http://{shown}:{port}; Ctrl-C ends it.", error=True)
+
+    async def shutdown(self, sockets: Any = None) -> None:
+        """Hold robots, end turns and streams, then let requests come to their ends."""
+        self._hub.leaving = True
+        await self._hub.service.leave()
+        await super().shutdown(sockets)
+
+
+def run(service: Service, settings: ServerSettings) -> int:
+    """Serve until SIGTERM or Ctrl-C; what to exit with."""
+    log()
+    app = make_app(service, settings, Tokens(settings.tokens_file))
+    config = uvicorn.Config(
+        app,
+        host=settings.host,
+        port=settings.port,
+        ws="none",
+        lifespan="on",
+        log_config=None,
+        server_header=False,
+        timeout_graceful_shutdown=round(settings.shutdown_seconds),
+        limit_concurrency=settings.streams + BACKLOG,
+    )
+    server = Server(config, app.state.hub)
+    server.run()
+    return 0 if server.started else 4
+
+
+class JsonLines(logging.Formatter):
+    """Log records as JSON, a line each; of a request no query and no headers."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """One line."""
+        made = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(record.created))
+        facts: dict[str, Any] = {"time": f"{made}Z", "level": record.levelname.lower()}
+        if record.name == "uvicorn.access" and isinstance(record.args, tuple):
+            _, method, path, _, status = record.args
+            path = str(path).partition("?")[0]
+            facts |= {"event": "request", "method": method, "path": path, "status": status}
+        else:
+            facts |= {"event": record.getMessage(), **getattr(record, "facts", {})}
+        if record.exc_info:
+            facts["error"] = self.formatException(record.exc_info)
+        return json.dumps(facts)
+
+
+def log() -> None:
+    """Log to standard error."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(JsonLines())
+    for name in ("uvicorn", "formup"):
+        logger = logging.getLogger(name)
+        logger.handlers, logger.propagate = [handler], False
+        logger.setLevel(logging.INFO)

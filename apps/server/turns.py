@@ -1,0 +1,212 @@
+"""Turns over HTTP: what is said, edits, undo, approvals, deployments; stop passes always.
+
+A turn is never lost with its request: it goes on to its end, and its number finds it again.
+"""
+
+import asyncio
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Query, Request, Response
+
+from ...agent.store.protocol import Event
+from ...agent.turns import Turn
+from ...tools.errors import InputError
+from .forms import Approval, Deployment, Edits, Key, Message, TurnState, Undo
+from .hub import AHub, APerson, Hub, asked_by, check_owner, need
+from .sessions import ERRORS, PICTURE, picture_sent
+
+router = APIRouter(prefix="/api/sessions/{session}", tags=["turns"], responses=ERRORS)
+AKey = Annotated[Key | None, Header(alias="Idempotency-Key")]
+Wait = Annotated[float, Query(ge=0, le=60, description="most seconds to wait for its end")]
+RUNNING: dict[int | str, dict[str, Any]] = {
+    202: {"model": TurnState, "description": "It goes on; ask for its number again"}
+}
+
+
+@router.post("/messages", responses=RUNNING)
+async def say(
+    session: str,
+    said: Message,
+    hub: AHub,
+    person: APerson,
+    response: Response,
+    key: AKey = None,
+    wait: Wait = 30,
+) -> TurnState:
+    """Say something: an instruction, a change, a question, an answer, go or stop."""
+    need(person, "plan")
+    asked = asked_by(person, key)
+    turn = hub.service.say(
+        check_owner(session, person),
+        said.words,
+        asked,
+        pointed=said.pointed,
+        keep_out=said.keep_out,
+    )
+    return await _answer(hub, session, turn, wait, response)
+
+
+@router.post("/edits", responses=RUNNING)
+async def edit(
+    session: str,
+    wanted: Edits,
+    hub: AHub,
+    person: APerson,
+    response: Response,
+    key: AKey = None,
+    wait: Wait = 30,
+) -> TurnState:
+    """Change the plan that stands, by edits as `edit_formation` takes them."""
+    need(person, "plan")
+    asked = asked_by(person, key)
+    turn = hub.service.edit(check_owner(session, person), *wanted.edits, asked=asked)
+    return await _answer(hub, session, turn, wait, response)
+
+
+@router.post("/undo", responses=RUNNING)
+async def undo(
+    session: str,
+    back: Undo,
+    hub: AHub,
+    person: APerson,
+    response: Response,
+    key: AKey = None,
+    wait: Wait = 30,
+) -> TurnState:
+    """Go back to the plan before; robots stay where they are."""
+    need(person, "plan")
+    asked = asked_by(person, key)
+    turn = hub.service.undo(check_owner(session, person), back.steps, back.to, asked)
+    return await _answer(hub, session, turn, wait, response)
+
+
+@router.put("/picture", responses=RUNNING, openapi_extra=PICTURE)
+async def image(
+    session: str,
+    request: Request,
+    hub: AHub,
+    person: APerson,
+    response: Response,
+    name: Annotated[str, Query(max_length=200)] = "picture",
+    key: AKey = None,
+    wait: Wait = 30,
+) -> TurnState:
+    """Go on with another picture, the body; plans made before are void."""
+    need(person, "plan")
+    picture = await picture_sent(request, hub, name)
+    turn = hub.service.image(check_owner(session, person), picture, asked_by(person, key))
+    return await _answer(hub, session, turn, wait, response)
+
+
+@router.post("/deployments", status_code=202)
+async def deploy(
+    session: str,
+    wanted: Deployment,
+    hub: AHub,
+    person: APerson,
+    response: Response,
+    key: Annotated[Key, Header(alias="Idempotency-Key")],
+) -> TurnState:
+    """Drive the robots to a plan: a job, done once for a key. Real ones wait for an approval."""
+    need(person, "move")
+    asked = asked_by(person, key)
+    turn = hub.service.go(check_owner(session, person), wanted.plan_id, asked=asked)
+    state = await _answer(hub, session, turn, 0, response)
+    response.status_code = 202
+    return state
+
+
+@router.post("/approvals", status_code=202)
+async def approve(
+    session: str, given: Approval, hub: AHub, person: APerson, response: Response
+) -> TurnState:
+    """Say yes to exactly the plan that waits; real robots then drive to it."""
+    need(person, "move")
+    asked = asked_by(person)
+    name = check_owner(session, person)
+    turn = hub.service.approve(name, given.plan_id, given.nonce, asked=asked)
+    state = await _answer(hub, session, turn, 0, response)
+    response.status_code = 202
+    return state
+
+
+@router.post("/stop")
+async def stop(session: str, hub: AHub, person: APerson) -> TurnState:
+    """Hold all robots at once, and end the turn that runs."""
+    run = await hub.service.stop(check_owner(session, person), asked_by(person))
+    if run is None:
+        return TurnState(turn=0, status="answered", message="Nothing has moved yet.")
+    return TurnState.of(run, hub.service.last_turn(session), person.name)
+
+
+@router.get("/turns/{number}", responses=RUNNING)
+async def turn(
+    session: str, number: int, hub: AHub, person: APerson, response: Response, wait: Wait = 0
+) -> TurnState:
+    """A turn by the number of the event that began it."""
+    now = hub.service.turn(check_owner(session, person))
+    if now is not None and now.number == number:
+        return await _answer(hub, session, now, wait, response, moving=False)
+    state = await turn_state(hub, session, number)
+    response.status_code = 202 if state.status == "running" else 200
+    return state
+
+
+async def _answer(
+    hub: Hub, session: str, turn: Turn, wait: float, response: Response, *, moving: bool = True
+) -> TurnState:
+    """A turn at its end, or after so long, or, if that ends the wait, once robots drive."""
+    try:
+        await turn.begin()
+        run = await turn.wait(wait, moving=moving)
+    except InputError as error:
+        if error.kind != "repeated":
+            raise
+        return await turn_state(hub, session, error.facts["turn"])
+    if run is not None:
+        return TurnState.of(run, turn.number, turn.asked.by)
+    response.status_code = 202
+    moves = turn.moving.is_set()
+    return TurnState(turn=turn.number, status="running", by=turn.asked.by, moving=moves)
+
+
+async def turn_state(hub: Hub, session: str, number: int) -> TurnState:
+    """A turn from the log; the last one with its whole report.
+
+    Raises:
+        InputError: there is none of that number.
+    """
+    held = await hub.service.fresh(session)
+    events = await asyncio.to_thread(hub.service.events, session)
+    state = state_in(events, number)
+    last = max(e.number for e in events if e.kind in ("session", "turn", "resume"))
+    if held.run is not None and number == last and state.status == held.run.report.status:
+        return state.model_copy(update={"report": held.run.report})
+    if state.status == "interrupted" and hub.service.is_written(session):
+        return state.model_copy(update={"status": "running"})
+    return state
+
+
+def state_in(events: Sequence[Event], number: int) -> TurnState:
+    """A turn from the events of a session.
+
+    Raises:
+        InputError: there is none of that number.
+    """
+    begun = events[number - 1] if 1 <= number <= len(events) else None
+    if begun is None or begun.kind not in ("turn", "resume"):
+        raise InputError(f"There is no turn {number} in this session.", "missing")
+    said = next(e for e in reversed(events[:number]) if e.kind == "turn")
+    words, by = str(said.data["words"]), str(begun.data.get("by", ""))
+    state = TurnState(turn=number, status="interrupted", words=words, by=by)
+    moving = False
+    for event in events[number:]:
+        if event.kind in ("turn", "resume"):
+            break
+        moving = moving or event.kind == "moving"
+        if event.kind == "end":
+            told = {"status": event.data["status"], "message": event.data["message"]}
+            return state.model_copy(update=told)
+    message = "Its process ended before it did; robots were held. Say what to do next."
+    return state.model_copy(update={"message": message, "moving": moving})
