@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...agent.service import Service
-from ...agent.store.places import store_at
 from ...tools.errors import InputError
 from .. import options as o
-from ..agents import agent_of
+from .. import serve
 from ..main import INTERRUPTED
 
 if TYPE_CHECKING:
     from ..server.hub import Hub
 
 NEEDED = "formup mcp needs an extra that is not installed: pip install 'formup[mcp]'."
-Http = Annotated[bool, typer.Option("--http", help="Over HTTP instead: formup serve, under /mcp.")]
+Http = Annotated[
+    bool, typer.Option("--http", help="Over HTTP instead, at /mcp: the same as formup serve.")
+]
 Pictures = Annotated[
     list[Path] | None,
     typer.Option(metavar="DIR", help="Whose pictures may be opened; by default this folder's."),
@@ -30,8 +30,12 @@ Pictures = Annotated[
 
 def mcp(
     pictures: Pictures = None,
+    http: Http = False,
+    host: serve.Host = None,
+    port: serve.Port = None,
+    tokens_file: serve.TokensFile = None,
     store: o.StoreUrl = None,
-    model: o.ModelName = "offline",
+    model: serve.Models = None,
     base_url: o.BaseUrl = None,
     planner: o.PlannerName = None,
     prompt: o.PromptName = None,
@@ -47,17 +51,21 @@ def mcp(
         from ..server.settings import ServerSettings
         from ..server.tokens import Tokens
         from .server import make_server
-    except ImportError:
+    except ModuleNotFoundError as error:
+        if error.name not in ("mcp", "fastapi", "uvicorn", "prometheus_client"):
+            raise
         raise InputError(NEEDED) from None
-    settings = ServerSettings.of(store=store, fleet=fleet)
-    folders = pictures or [Path()]
+    rest = (base_url, planner, prompt, prompts, limit, policy)
+    if http:
+        serve.serve(host, port, tokens_file, store, model, *rest, fleet)
+    settings = ServerSettings.of(store=store, fleet=fleet, model=model and ",".join(model))
+    folders = [folder.resolve() for folder in pictures or [Path()]]
     for folder in folders:
         if not folder.is_dir():
             raise InputError(f"--pictures {folder} is no folder.")
-    with agent_of(model, planner, base_url, prompt, prompts, limit, policy, talks=True) as agent:
-        hub = Hub(Service(agent, store_at(settings.store)), settings, Tokens(None), Metrics())
-        server = make_server(hub, [folder.resolve() for folder in folders])
-        raise typer.Exit(asyncio.run(_serve(hub, server.run_stdio_async())))
+    with serve.service_of(settings, planner, base_url, prompt, prompts, limit, policy) as service:
+        hub = Hub(service, settings, Tokens(None), Metrics())
+        raise typer.Exit(asyncio.run(_serve(hub, make_server(hub, folders).run_stdio_async())))
 
 
 async def _serve(hub: "Hub", work: Coroutine[Any, Any, None]) -> int:
