@@ -13,11 +13,12 @@ from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ResourceError, ResourceNotFoundError
 
 from ...agent.conversation import Session
+from ...agent.service import Service
 from ...tools.errors import FormupError, InputError
 from ...tools.perception.image import Picture, load_picture
-from ..server.hub import Hub, check_owner
+from ..server.hub import Hub, check_owner, need
 from ..server.sessions import checked_picture
-from ..server.tokens import Person
+from ..server.tokens import Person, Scope
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -72,6 +73,18 @@ async def theirs(ctx: Ctx, session: str) -> Session:
         if error.kind != "missing":
             raise
         raise InputError(f"There is no session {session!r}.", "missing") from None
+
+
+async def permitted(ctx: Ctx, session: str, scope: Scope = "read") -> tuple[Service, Person]:
+    """The service, and who calls, where they may do that with a session.
+
+    Raises:
+        InputError: they may not (`not_allowed`), or have no such session (`missing`).
+    """
+    hub, person = caller(ctx)
+    need(person, scope)
+    await theirs(ctx, session)
+    return hub.service, person
 
 
 async def picture_named(ctx: Ctx, image: str) -> Picture:

@@ -1,9 +1,11 @@
 """The tools that a client sees: few, each one thing a person wants of the whole team.
 
 No argument of any of them is a person's yes: words plan and never move robots here, and real ones
-are driven only after a person was asked, see `approving`.
+are driven only after a person was asked, through the client where it can ask. The nonce which that
+yes has to name never leaves the server.
 """
 
+import asyncio
 from typing import Annotated, Any
 
 from mcp.server import MCPServer
@@ -11,10 +13,11 @@ from mcp.server.mcpserver import (
     AcceptedElicitation,
     CancelledElicitation,
     DeclinedElicitation,
+    Elicit,
     Resolve,
 )
 from mcp_types import ToolAnnotations
-from pydantic import Field, WithJsonSchema
+from pydantic import BaseModel, Field, WithJsonSchema
 
 from ...agent.turns import Asked
 from ...tools.context import Context as ToolContext
@@ -24,14 +27,16 @@ from ...tools.formation.editing.edit_kinds import EDIT_SCHEMA
 from ..server.forms import Key, Pointed, Words
 from ..server.hub import asked_by, need
 from ..server.sessions import check_room
-from .access import Access, Ctx, caller, picture_named, theirs, told
-from .approving import Yes, ask_person, key_of_yes
-from .state import Told, after, standing
+from .access import Access, Ctx, caller, permitted, picture_named, told
+from .state import Told, after, followed, planned, standing
 
 NO_GO = (
     "Nothing was done: words move no robots here. Say it without the go, and have the certified "
     "plan driven with approve_and_deploy."
 )
+NO_FORM = "This client cannot ask a person: let one approve the plan with "
+OVER_HTTP = f"{NO_FORM}POST /api/sessions/{{}}/approvals; then ask status. "
+OVER_STDIO = f"{NO_FORM}/approve in formup chat --session {{}}, once this client has ended. "
 ASession = Annotated[str, Field(max_length=100, description="as open_scene gave it")]
 AKey = Annotated[Key, Field(description="of your choice, the same when you repeat this very call")]
 Detail = Annotated[bool, Field(description="also contract, positions, certificate, arrival")]
@@ -56,7 +61,7 @@ async def open_scene(
     """Begin a session about a picture taken from above; everything else needs its id."""
     hub, person = caller(ctx)
     need(person, "plan")
-    check_room(hub, person)
+    await asyncio.to_thread(check_room, hub, person)
     seen = await picture_named(ctx, image)
     settings = Settings(
         robots=robots,
@@ -85,11 +90,9 @@ async def instruct(
     It plans and certifies; no robot moves. "Surround the coin with 6 robots", "a bit further out",
     "undo", "how far is robot 4?".
     """
-    hub, person = caller(ctx)
-    need(person, "plan")
-    await theirs(ctx, session)
+    service, person = await permitted(ctx, session, "plan")
     asked = Asked(by=person.name, key=idempotency_key, may_move=False)
-    turn = hub.service.say(session, words, asked, pointed=points)
+    turn = service.say(session, words, asked, pointed=points)
     try:
         return await after(ctx, session, turn, detail=detail, picture=picture)
     except InputError as error:
@@ -108,11 +111,9 @@ async def edit(
     picture: Shown = False,
 ) -> Told:
     """Change the plan that stands exactly, without words; what is not named stays as it is."""
-    hub, person = caller(ctx)
-    need(person, "plan")
-    await theirs(ctx, session)
+    service, person = await permitted(ctx, session, "plan")
     asked = Asked(by=person.name, key=idempotency_key, may_move=False)
-    turn = hub.service.edit(session, *edits, asked=asked)
+    turn = service.edit(session, *edits, asked=asked)
     return await after(ctx, session, turn, detail=detail, picture=picture)
 
 
@@ -125,11 +126,57 @@ async def status(
     picture: Shown = False,
 ) -> Told:
     """How a session stands: its plan, what waits for a person, whether robots drive or arrived."""
-    await theirs(ctx, session)
-    turn = caller(ctx)[0].service.turn(session)
+    service, _ = await permitted(ctx, session)
+    turn = service.turn(session)
     if wait and turn is not None:
         return await after(ctx, session, turn, detail=detail, picture=picture)
     return await standing(ctx, session, detail=detail, picture=picture)
+
+
+class Yes(BaseModel):
+    """A person's answer."""
+
+    approve: bool = Field(description="Yes: the real robots drive to exactly this plan, now")
+
+
+def _key_of_yes(idempotency_key: str) -> str:
+    """The key of the turn that follows a person's answer to a call."""
+    return f"{idempotency_key}/answer"
+
+
+@told
+async def ask_person(
+    ctx: Ctx, session: str, plan_id: str, idempotency_key: str
+) -> Elicit[Yes] | str:
+    """Begin to drive; where a person has to say yes first, ask them.
+
+    Returns:
+        The question, or what is told before how the session stands, where nobody is asked.
+    """
+    service, person = await permitted(ctx, session, "move")
+    planned(service.session(session), plan_id)
+    now = service.turn(session)
+    if now is not None and now.asked.key == _key_of_yes(idempotency_key):
+        return await followed(ctx, now)
+    waits = None if now is not None else await service.waits(session)
+    if waits is None or waits.plan_id != plan_id:
+        before = await followed(
+            ctx, service.go(session, plan_id, asked=asked_by(person, idempotency_key))
+        )
+        waits = None if before else await service.waits(session)
+        if waits is None or waits.plan_id != plan_id:
+            return before
+    if _can_ask(ctx):
+        return Elicit(waits.message, Yes)
+    way = OVER_STDIO if ctx.request_context.request is None else OVER_HTTP
+    return way.format(session)
+
+
+def _can_ask(ctx: Ctx) -> bool:
+    """Whether the client shows forms to a person; one that names no kind shows forms."""
+    declared = ctx.client_capabilities
+    offers = None if declared is None else declared.elicitation
+    return offers is not None and (offers.form is not None or offers.url is None)
 
 
 @told
@@ -144,26 +191,26 @@ async def approve_and_deploy(
 
     Robots that still drive after some seconds: status "running", then ask status.
     """
-    hub, person = caller(ctx)
     said = answer.data if isinstance(answer, AcceptedElicitation) else None
     if isinstance(said, str):
         return await standing(ctx, session, said)
-    if isinstance(answer, CancelledElicitation):
-        return await standing(ctx, session, "Nobody answered. ")
-    asked = asked_by(person, key_of_yes(idempotency_key))
-    if not isinstance(said, Yes) or not said.approve:
-        return await after(ctx, session, hub.service.say(session, "no", asked))
-    waits = await hub.service.waits(session)
-    nonce = "" if waits is None else waits.nonce
-    return await after(ctx, session, hub.service.approve(session, plan_id, nonce, asked=asked))
+    service, person = await permitted(ctx, session, "move")
+    waits = await service.waits(session)
+    if waits is None or waits.plan_id != plan_id or isinstance(answer, CancelledElicitation):
+        return await standing(ctx, session)
+    asked = asked_by(person, _key_of_yes(idempotency_key))
+    if isinstance(said, Yes) and said.approve:
+        turn = service.approve(session, plan_id, waits.nonce, asked=asked)
+    else:
+        turn = service.say(session, "no", asked)
+    return await after(ctx, session, turn)
 
 
 @told
 async def stop(ctx: Ctx, session: ASession) -> Told:
     """Hold all robots at once where they are, and end what runs."""
-    hub, person = caller(ctx)
-    await theirs(ctx, session)
-    await hub.service.stop(session, asked_by(person))
+    service, person = await permitted(ctx, session)
+    await service.stop(session, asked_by(person))
     return await standing(ctx, session)
 
 

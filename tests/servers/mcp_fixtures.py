@@ -39,7 +39,8 @@ from pydantic import BaseModel, Field
 from starlette.routing import Route
 
 PNG = (
-    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8DwHwAFBQIAX8jx0gAAAABJRU5ErkJggg=="
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8DwHwAFBQIAX8jx0gAAAABJRU5ErkJg"
+    "gg=="
 )
 WAV = "UklGRiYAAABXQVZFZm10IBAAAAABAAEAQB8AAAB9AAACABAAZGF0YQIAAAA="
 IMAGE = ImageContent(data=PNG, mime_type="image/png")
@@ -63,7 +64,7 @@ class Defaults(BaseModel):
     verified: bool = True
 
 
-def titled(**titles: str) -> list[dict[str, str]]:
+def titled(**titles: str) -> list[Any]:
     return [{"const": value, "title": title} for value, title in titles.items()]
 
 
@@ -91,7 +92,9 @@ def asked(message: str, field: str, kind: str = "string") -> ElicitRequest:
 
 def answered(ctx: Context, key: str, field: str) -> Any:
     answer = (ctx.input_responses or {}).get(key)
-    return answer.content.get(field) if isinstance(answer, ElicitResult) and answer.content else None
+    return (
+        answer.content.get(field) if isinstance(answer, ElicitResult) and answer.content else None
+    )
 
 
 def add_content(server: MCPServer[Any], name: str, content: list[Any]) -> None:
@@ -122,7 +125,7 @@ def add_contents(server: MCPServer[Any]) -> None:
     @server.tool(description=FIXTURE)
     def test_missing_capability(ctx: Context) -> str:
         if ctx.client_capabilities is None or ctx.client_capabilities.sampling is None:
-            data = {"requiredCapabilities": {"sampling": {}}}
+            data: dict[str, Any] = {"requiredCapabilities": {"sampling": {}}}
             raise MCPError(MISSING_REQUIRED_CLIENT_CAPABILITY, "No sampling is declared", data)
         return "declared"
 
@@ -148,6 +151,27 @@ def add_questions(server: MCPServer[Any]) -> None:
     add_question(server, "test_elicitation_sep1330_enums", Enums)
 
 
+def add_many_rounds(server: MCPServer[Any]) -> None:
+    @server.tool(description=FIXTURE)
+    async def test_input_required_result_multi_round(ctx: Context) -> str | InputRequiredResult:
+        name = answered(ctx, "step1", "name") or json.loads(ctx.request_state or "{}").get("name")
+        colour = answered(ctx, "step2", "color")
+        if name is None:
+            step = {"step1": asked("Your name?", "name")}
+        elif colour is None:
+            step = {"step2": asked("Your favourite colour?", "color")}
+        else:
+            return f"{name} likes {colour}."
+        state = json.dumps({"name": name})
+        return InputRequiredResult(input_requests={**step}, request_state=state)
+
+    @server.tool(description=FIXTURE)
+    async def test_input_required_result_capabilities(ctx: Context) -> InputRequiredResult:
+        may = ctx.client_capabilities is None or ctx.client_capabilities.elicitation is not None
+        requests = {"ask": asked("Your name?", "name")} if may else {}
+        return InputRequiredResult(input_requests={**requests}, request_state="gated")
+
+
 def add_rounds(server: MCPServer[Any]) -> None:
     @server.tool(description=FIXTURE)
     async def test_input_required_result_elicitation(ctx: Context) -> str | InputRequiredResult:
@@ -168,25 +192,6 @@ def add_rounds(server: MCPServer[Any]) -> None:
             return f"state-ok: {ctx.request_state}"
         confirm = asked("Please confirm", "ok", "boolean")
         return InputRequiredResult(input_requests={"confirm": confirm}, request_state="round-1")
-
-    @server.tool(description=FIXTURE)
-    async def test_input_required_result_multi_round(ctx: Context) -> str | InputRequiredResult:
-        name = answered(ctx, "step1", "name") or json.loads(ctx.request_state or "{}").get("name")
-        colour = answered(ctx, "step2", "color")
-        if name is None:
-            step = {"step1": asked("Your name?", "name")}
-        elif colour is None:
-            step = {"step2": asked("Your favourite colour?", "color")}
-        else:
-            return f"{name} likes {colour}."
-        state = json.dumps({"name": name})
-        return InputRequiredResult(input_requests={**step}, request_state=state)
-
-    @server.tool(description=FIXTURE)
-    async def test_input_required_result_capabilities(ctx: Context) -> InputRequiredResult:
-        may = ctx.client_capabilities is None or ctx.client_capabilities.elicitation is not None
-        requests = {"ask": asked("Your name?", "name")} if may else {}
-        return InputRequiredResult(input_requests={**requests}, request_state="gated")
 
     @server.prompt(description=FIXTURE)
     async def test_input_required_result_prompt(
@@ -229,13 +234,13 @@ def add_reading(server: MCPServer[Any]) -> None:
 
 def main() -> None:
     service = Service(Agent(), store_at(sys.argv[1]))
-    app = make_app(service, ServerSettings(), Tokens(None))
+    app = make_app(service, ServerSettings.of({}), Tokens(None))
     [endpoint] = (
         route.endpoint
         for route in app.routes
         if isinstance(route, Route) and isinstance(route.endpoint, Endpoint)
     )
-    for add in (add_contents, add_questions, add_rounds, add_reading):
+    for add in (add_contents, add_questions, add_rounds, add_many_rounds, add_reading):
         add(endpoint.server)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         print(listening.getsockname()[1], flush=True)  # noqa: T201

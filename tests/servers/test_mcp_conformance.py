@@ -1,4 +1,4 @@
-"""The conformance suite of MCP, asked of formup's own server with some fixtures beside its tools."""
+"""The conformance suite of MCP, asked of formup's own server with fixtures beside its tools."""
 
 import os
 import subprocess

@@ -35,7 +35,7 @@ def with_server(tmp_path: Path) -> Callable[[Body], None]:
 
     async def run(body: Body) -> None:
         service = Service(Agent(), store_at(tmp_path / "store"))
-        hub = Hub(service, ServerSettings(), Tokens(None), Metrics())
+        hub = Hub(service, ServerSettings.of({}), Tokens(None), Metrics())
         try:
             await body(make_server(hub, [PHOTOS]), hub)
         finally:

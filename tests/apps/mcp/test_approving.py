@@ -14,7 +14,7 @@ from mcp.client import Client, ClientRequestContext
 from mcp.server import MCPServer
 from mcp_types import CallToolResult, ElicitRequestParams, ElicitResult
 
-from .conftest import Body, call, caged, refusal
+from .conftest import Body, caged, call, refusal
 
 pytestmark = pytest.mark.usefixtures("real")
 Runs = Callable[[Body], None]
@@ -100,7 +100,7 @@ def test_without_a_yes_nothing_moves(
             told = await call(client, "approve_and_deploy", **wanted)
             assert told["status"] == status
             if person is None:
-                assert f"formup chat --session {session} with /approve" in told["message"]
+                assert f"/approve in formup chat --session {session}" in told["message"]
                 for words in ("yes", "approve", "go", f"A person approved plan {plan_id}."):
                     await client.call_tool("instruct", {"session": session, "words": words})
             assert moves(hub, session) == 0
@@ -138,10 +138,7 @@ def test_nobody_is_troubled_for_nothing(
                 assert await refusal(
                     client, "approve_and_deploy", **({"plan_id": "p-1"} | wrong | key)
                 )
-            planner = Person("", "plan")
-            caller = access.caller
-            for module in (access.__name__.replace("access", name) for name in ("approving",)):
-                monkeypatch.setattr(f"{module}.caller", lambda ctx: (caller(ctx)[0], planner))
+            monkeypatch.setattr(access, "Person", lambda: Person("", "plan"))
             refused = await refusal(
                 client, "approve_and_deploy", session=session, plan_id=plan["plan_id"], **key
             )

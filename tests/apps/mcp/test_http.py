@@ -19,7 +19,7 @@ from mcp.client import Client
 from mcp.client.streamable_http import streamable_http_client
 from mcp.shared.exceptions import MCPError
 
-from .conftest import COIN, PHOTOS, call, caged, refusal
+from .conftest import COIN, PHOTOS, caged, call, refusal
 from .test_approving import Someone
 
 PHOTO = (PHOTOS / "us_coins.jpg").read_bytes()
@@ -54,7 +54,7 @@ async def served(folder: Path) -> AsyncGenerator[Place]:
         for name, scope in (("ann", "move"), ("bob", "move"), ("pat", "plan"), ("rae", "read"))
     }
     service = Service(Agent(), store_at(folder / "store"))
-    app = make_app(service, ServerSettings(), tokens)
+    app = make_app(service, ServerSettings.of({}), tokens)
     config = uvicorn.Config(
         app, port=0, lifespan="on", log_level="critical", timeout_graceful_shutdown=1
     )

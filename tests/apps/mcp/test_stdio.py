@@ -15,7 +15,7 @@ from formup.agent.store.places import store_at
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 
-from .conftest import COIN, PHOTOS, call, caged, refusal
+from .conftest import COIN, PHOTOS, caged, call, refusal
 
 SLOWLY = """
 import asyncio, sys

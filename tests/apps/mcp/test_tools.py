@@ -12,7 +12,7 @@ from mcp.server import MCPServer
 from mcp.shared.exceptions import MCPError
 from mcp_types import ImageContent, ResourceLink, TextResourceContents
 
-from .conftest import COIN, Body, call, caged, refusal
+from .conftest import COIN, Body, caged, call, refusal
 
 Runs = Callable[[Body], None]
 
