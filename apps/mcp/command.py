@@ -57,7 +57,7 @@ def mcp(
         raise InputError(NEEDED) from None
     rest = (base_url, planner, prompt, prompts, limit, policy)
     if http:
-        serve.serve(host, port, tokens_file, store, model, *rest, fleet)
+        return serve.serve(host, port, tokens_file, store, model, *rest, fleet)
     settings = ServerSettings.of(store=store, fleet=fleet, model=model and ",".join(model))
     folders = [folder.resolve() for folder in pictures or [Path()]]
     for folder in folders:

@@ -1,5 +1,10 @@
 import asyncio
 import base64
+import os
+import re
+import signal
+import subprocess
+import sys
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -218,3 +223,23 @@ def test_nobody_gets_in_without_a_token(place: Places) -> None:
             assert (await ann.post("/mcp", json=ping, headers=hers)).status_code == 200
 
     place(talk)
+
+
+def test_the_command_serves_what_formup_serve_does(tmp_path: Path, era: str) -> None:
+    command = [sys.executable, "-m", "formup", "mcp", "--http", "--port", "0"]
+    home = os.environ | {"XDG_DATA_HOME": str(tmp_path)}
+
+    async def talk(url: str) -> None:
+        async with Client(url, mode=era) as client:
+            assert (await caged(client, URL))["status"] == "planned"
+
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=home) as run:
+        assert run.stderr is not None
+        lines = iter(run.stderr.readline, "")
+        [url] = next(found for line in lines if (found := re.findall(r"http://[0-9.:]+", line)))
+        try:
+            asyncio.run(talk(f"{url}/mcp"))
+        finally:
+            run.terminate()
+            run.communicate()
+    assert run.returncode in (0, -signal.SIGTERM), "uvicorn passes the signal on at its end"
