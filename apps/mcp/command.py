@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..server.hub import Hub
 
 NEEDED = "formup mcp needs an extra that is not installed: pip install 'formup[mcp]'."
+LIBRARIES = ("mcp", "mcp_types", "fastapi", "uvicorn", "prometheus_client")
 Http = Annotated[
     bool, typer.Option("--http", help="Over HTTP instead, at /mcp: the same as formup serve.")
 ]
@@ -52,7 +53,7 @@ def mcp(
         from ..server.tokens import Tokens
         from .server import make_server
     except ModuleNotFoundError as error:
-        if error.name not in ("mcp", "fastapi", "uvicorn", "prometheus_client"):
+        if str(error.name).partition(".")[0] not in LIBRARIES:
             raise
         raise InputError(NEEDED) from None
     rest = (base_url, planner, prompt, prompts, limit, policy)

@@ -91,17 +91,16 @@ async def standing(
     """
     service, held = caller(ctx)[0].service, await theirs(ctx, session)
     now = service.turn(session)
-    report = None if held.run is None else held.run.report
     if now is not None or await asyncio.to_thread(service.is_written, session):
         driving = now is not None and now.moving.is_set()
         doing = "The robots are driving" if driving else "A turn is under way"
         state = State(session=session, status="running", message=f"{doing}; ask status again.")
-    elif report is None:
-        width, height = held.picture.size
-        message = f"The picture is open, {width} by {height} px. Say what to do with instruct."
+    elif held.run is None:
+        size = "{} by {} px".format(*held.picture.size)
+        message = f"The picture is open, {size}. Say what to do with instruct."
         state = State(session=session, status="open", message=message)
     else:
-        state = _reported(session, report, detail=detail)
+        state = _reported(session, held.run.report, detail=detail)
     state.message = before + state.message
     content: list[ContentBlock] = [TextContent(text=state.model_dump_json(exclude_none=True))]
     name = f"plans/{state.plan_id}/picture" if state.plan_id else "scene"

@@ -146,3 +146,11 @@ def test_a_folder_that_is_none() -> None:
     assert done.returncode == 2
     assert done.stdout == ""
     assert "nowhere is no folder" in done.stderr
+
+
+def test_without_its_extra() -> None:
+    code = "import sys; sys.modules['mcp'] = None; from formup.apps.main import main; main()"
+    command = [sys.executable, "-c", code, "mcp"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "pip install 'formup[mcp]'" in done.stderr
