@@ -19,7 +19,14 @@ from pathlib import Path
 from ..tools.errors import StorageError
 
 Looks = Iterator[tuple[str, str, Callable[[], object]]]
-PURPOSES = {"dev": "tests", "otel": "spans", "postgres": "a store", "ray": "evals on a cluster"}
+PURPOSES = {
+    "dev": "tests",
+    "mcp": "MCP clients",
+    "otel": "spans",
+    "postgres": "a store",
+    "ray": "evals on a cluster",
+    "serve": "a server",
+}
 """What extras are for; of others their packages are named."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox")
 

@@ -78,7 +78,7 @@ async def _server(store: str) -> AsyncGenerator[httpx.AsyncClient]:
         while not (found := re.search(r"http://\S+:\d+", process.stderr.readline())):
             pass
         drain = asyncio.get_running_loop().run_in_executor(None, process.stderr.read)
-        limits = httpx.Limits(max_connections=None)
+        limits = httpx.Limits(max_connections=None, keepalive_expiry=2)
         try:
             async with httpx.AsyncClient(
                 base_url=found[0].rstrip(";"), timeout=600, limits=limits, trust_env=False
