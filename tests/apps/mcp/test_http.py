@@ -25,7 +25,7 @@ from mcp.client.streamable_http import streamable_http_client
 from mcp.shared.exceptions import MCPError
 
 from .conftest import COIN, PHOTOS, caged, call, refusal
-from .test_approving import Someone
+from .test_approval import Someone
 
 PHOTO = (PHOTOS / "us_coins.jpg").read_bytes()
 URL = f"data:image/jpeg;base64,{base64.b64encode(PHOTO).decode()}"
