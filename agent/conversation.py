@@ -257,7 +257,10 @@ class Session:
         outcome = run.outcome
         assert isinstance(outcome, Paused)
         if outcome.call.name == "ask_user":
-            return await self.agent.aresume(run, answer=words, show=show)
+            fixed = run.context.settings
+            fixed = fixed.model_copy(update={"may_deploy": fixed.may_deploy and self.may_move})
+            left = replace(run, context=replace(run.context, settings=fixed))
+            return await self.agent.aresume(left, answer=words, show=show)
         if words.strip(" .!").lower() in NO:
             return await self._commanded().aresume(run, approve=False, answer=words, show=show)
         read = read_followup(words, self._standing(run))

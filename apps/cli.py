@@ -18,6 +18,7 @@ from ..tools.perception.image import load_picture
 from . import arguments, chat, deploy, doctor, evaluate, prompts, serve, sessions, tools, trace
 from . import options as o
 from .agents import agent_of, tracer_of_environment
+from .mcp.command import mcp
 from .run_files import Folder, write_files
 from .starts import starts as read_starts
 from .stated import decided
@@ -151,6 +152,7 @@ def resume(
 
 app.command(name="chat", cls=chat.InOrder)(chat.chat)
 app.command(name="serve")(serve.serve)
+app.command(name="mcp")(mcp)
 app.add_typer(serve.tokens, name="tokens")
 app.command(name="deploy")(deploy.deploy)
 app.command(name="trace")(trace.show_trace)

@@ -1,8 +1,9 @@
 """`formup serve` and `formup tokens`: the team over HTTP, and who may reach it."""
 
-from contextlib import ExitStack
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -65,13 +66,22 @@ def serve(
     if settings.tokens_file is None and usual.exists():
         settings = settings.model_copy(update={"tokens_file": usual})
     check_reach(settings)
+    with service_of(settings, planner, base_url, prompt, prompts, limit, policy) as service:
+        raise typer.Exit(run(service, settings))
+
+
+@contextmanager
+def service_of(settings: "ServerSettings", *rest: Any) -> Generator[Service]:
+    """The service of a server.
+
+    Args:
+        rest: options of its agents, as `agent_of` takes them.
+    """
     with ExitStack() as stack:
         agents: dict[str, Agent] = {}
-        for name in settings.model.split(","):
-            rest = (planner, base_url, prompt, prompts, limit, policy)
-            agents[name.strip()] = stack.enter_context(agent_of(name.strip(), *rest, talks=True))
-        service = Service(agents, store_at(settings.store))
-        raise typer.Exit(run(service, settings))
+        for name in map(str.strip, settings.model.split(",")):
+            agents[name] = stack.enter_context(agent_of(name, *rest, talks=True))
+        yield Service(agents, store_at(settings.store))
 
 
 def check_reach(settings: "ServerSettings") -> None:

@@ -101,7 +101,9 @@ def test_libraries_stay_in_their_rooms(path: Path) -> None:
 def test_heavy_libraries_are_imported_where_they_are_used(path: Path) -> None:
     if path.relative_to(ROOT).parts[0] in ("evals", "benchmarks"):
         return  # nothing a user waits for imports the graders
-    modules = {m.partition(".")[0] for _, m in imports(path, top_level=True)}
+    if path.parent == ROOT / "apps/mcp" and path.name != "command.py":
+        return  # loaded by its command alone, and by a server: see tests/apps/mcp/test_stdio.py
+    modules = {m.partition(".")[0] for n, m in imports(path, top_level=True) if not n}
     assert not modules & HEAVY
 
 

@@ -3,6 +3,7 @@
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from importlib.metadata import version
+from importlib.util import find_spec
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -43,6 +44,10 @@ def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> Fast
     app.state.hub = hub
     for part in (health, sessions, turns, streams):
         app.include_router(part.router)
+    if find_spec("mcp") is not None:
+        from ..mcp.server import mount
+
+        mount(app, hub)
     app.add_middleware(Guard, hub=hub)
     app.add_exception_handler(FormupError, _formup_error)
     app.add_exception_handler(RequestValidationError, _invalid_request)

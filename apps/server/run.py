@@ -85,6 +85,7 @@ def log() -> None:
     """Log to standard error."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonLines())
+    logging.basicConfig(level=logging.WARNING, handlers=[handler])  # before a library does
     for name in ("uvicorn", "formup"):
         logger = logging.getLogger(name)
         logger.handlers, logger.propagate = [handler], False

@@ -259,6 +259,11 @@ def test_who_may_only_plan_moves_nothing(
             with pytest.raises(InputError) as refused:
                 await (service.say(name, words, asked) if words else service.go(name, asked=asked))
             assert refused.value.kind == "not_allowed"
+        # Nor does an answer, in a turn begun by somebody who may.
+        name = opened(service, picture)
+        assert (await service.say(name, "Place robots")).report.status == "question"
+        answered = await service.say(name, "around it", asked)
+        assert answered.report.status == "planned"
 
     asyncio.run(talk())
     assert not drives

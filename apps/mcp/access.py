@@ -1,0 +1,131 @@
+"""Who calls, what they may reach, and how errors are told to a client."""
+
+import asyncio
+import base64
+import binascii
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+from mcp.server.mcpserver import Context
+from mcp.server.mcpserver.exceptions import ResourceError, ResourceNotFoundError
+
+from ...agent.conversation import Session
+from ...agent.service import Service
+from ...tools.errors import FormupError, InputError
+from ...tools.perception.image import Picture, load_picture
+from ..server.hub import Hub, check_owner, need
+from ..server.sessions import checked_picture
+from ..server.tokens import Person, Scope
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Access:
+    """What a server works with.
+
+    Attributes:
+        folders: whose pictures may be opened by their paths; over HTTP none may.
+    """
+
+    hub: Hub
+    folders: tuple[Path, ...] = ()
+
+
+Ctx = Context[Access, Any]
+
+
+def caller(ctx: Ctx) -> tuple[Hub, Person]:
+    """The hub, and who calls: over HTTP whom the guard found, else the user of this machine."""
+    request = ctx.request_context.request
+    person = Person() if request is None else request.state.person
+    return ctx.request_context.lifespan_context.hub, person
+
+
+def told(work: Callable[P, Awaitable[R]]) -> Callable[P, Awaitable[R]]:
+    """A tool or resource whose errors that were raised on purpose are told; others are masked."""
+
+    @wraps(work)
+    async def telling(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return await work(*args, **kwargs)
+        except FormupError as error:
+            kind = ResourceNotFoundError if error.kind == "missing" else ResourceError
+            raise kind(str(error)) from None
+
+    return telling
+
+
+async def theirs(ctx: Ctx, session: str) -> Session:
+    """A session of whoever calls; those of others are as if they were not there.
+
+    Raises:
+        InputError: there is none (`missing`).
+    """
+    hub, person = caller(ctx)
+    try:
+        return await hub.service.fresh(check_owner(session, person))
+    except InputError as error:
+        if error.kind != "missing":
+            raise
+        raise InputError(f"There is no session {session!r}.", "missing") from None
+
+
+async def permitted(ctx: Ctx, session: str, scope: Scope = "read") -> tuple[Service, Person]:
+    """The service, and who calls, where they may do that with a session.
+
+    Raises:
+        InputError: they may not (`not_allowed`), or have no such session (`missing`).
+    """
+    hub, person = caller(ctx)
+    need(person, scope)
+    await theirs(ctx, session)
+    return hub.service, person
+
+
+async def picture_named(ctx: Ctx, image: str) -> Picture:
+    """The picture that a client names: a data URL, else a file, over HTTP one of a session.
+
+    Raises:
+        InputError: there is none that may be used.
+    """
+    hub, folders = caller(ctx)[0], ctx.request_context.lifespan_context.folders
+    if image.startswith("data:"):
+        try:
+            data = base64.b64decode(image.partition(",")[2], validate=True)
+        except binascii.Error:
+            raise InputError(
+                "That data URL cannot be read; give data:image/jpeg;base64, and the file in base64."
+            ) from None
+        return await asyncio.to_thread(checked_picture, data, "picture", hub)
+    if folders:
+        return await asyncio.to_thread(lambda: load_picture(_inside(image, folders)))
+    try:
+        return (await theirs(ctx, image)).picture
+    except InputError as error:
+        if error.kind != "missing":
+            raise
+        raise InputError(
+            f"{image[:80]!r} is neither a data URL nor the id of a session of yours; files of the "
+            "server's machine cannot be named: send the picture with POST /api/sessions, and give "
+            "the id it answers."
+        ) from None
+
+
+def _inside(image: str, folders: Sequence[Path]) -> Path:
+    """The file of a path, links followed, where it lies in one of the folders."""
+    try:
+        paths = [((folder / image).resolve(), folder.resolve()) for folder in folders]
+        inside = [path for path, folder in paths if path.is_relative_to(folder)]
+        if inside:
+            return next((path for path in inside if path.exists()), inside[0])
+    except (OSError, ValueError, RuntimeError):
+        pass  # no path at all
+    there = ", ".join(map(str, folders))
+    raise InputError(
+        f"{image[:200]!r} is not inside {there}; formup mcp --pictures DIR allows another folder."
+    )

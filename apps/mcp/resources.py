@@ -1,0 +1,65 @@
+"""What a client may read of a session, and a prompt that begins one."""
+
+import asyncio
+import json
+
+from mcp.server import MCPServer
+
+from .access import Access, Ctx, caller, theirs, told
+from .state import JPEG, planned, view
+
+ROOT = "formup://sessions/{session}"
+JSON = "application/json"
+
+
+@told
+async def scene(ctx: Ctx, session: str) -> bytes:
+    """The picture with rulers in px; what a question offers is outlined and numbered."""
+    return await asyncio.to_thread(view, await theirs(ctx, session))
+
+
+@told
+async def plan(ctx: Ctx, session: str, plan_id: str) -> str:
+    """A plan with its contract, positions and certificate, and what it was made from."""
+    return planned(await theirs(ctx, session), plan_id).model_dump_json()
+
+
+@told
+async def certificate(ctx: Ctx, session: str, plan_id: str) -> str:
+    """Whether a plan is as it was said to be: findings and measures."""
+    return planned(await theirs(ctx, session), plan_id).plan.verdict.model_dump_json()
+
+
+@told
+async def plan_picture(ctx: Ctx, session: str, plan_id: str) -> bytes:
+    """A plan's robots, drawn on the picture."""
+    return await asyncio.to_thread(view, await theirs(ctx, session), plan_id)
+
+
+@told
+async def trace(ctx: Ctx, session: str) -> str:
+    """All that happened, an event a line."""
+    await theirs(ctx, session)
+    events = await asyncio.to_thread(caller(ctx)[0].service.events, session)
+    rows = ({"number": e.number, "kind": e.kind, "data": dict(e.data)} for e in events)
+    return "\n".join(map(json.dumps, rows))
+
+
+def formation(image: str, wish: str, robots: str = "as many as it takes") -> str:
+    """Bring a team of robots into a formation, step by step, with the person deciding."""
+    return (
+        f"Open the scene {image} with open_scene. Then have robots placed with instruct, in my own "
+        f"words: {wish!r}; robots: {robots}. Show me each message and picture as they are. Where "
+        "something is asked, ask me, and give my answer to instruct. When I say that it is right, "
+        "and not before, call approve_and_deploy with that plan_id, and status until they arrived."
+    )
+
+
+def add_resources(server: MCPServer[Access]) -> None:
+    """Offer them."""
+    server.resource(f"{ROOT}/scene", mime_type=JPEG)(scene)
+    server.resource(f"{ROOT}/plans/{{plan_id}}", mime_type=JSON)(plan)
+    server.resource(f"{ROOT}/plans/{{plan_id}}/certificate", mime_type=JSON)(certificate)
+    server.resource(f"{ROOT}/plans/{{plan_id}}/picture", mime_type=JPEG)(plan_picture)
+    server.resource(f"{ROOT}/trace", mime_type="application/jsonl")(trace)
+    server.prompt()(formation)

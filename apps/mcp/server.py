@@ -1,0 +1,93 @@
+"""The MCP server, and its endpoint over HTTP behind the same guard as all other routes."""
+
+from collections.abc import AsyncGenerator, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from mcp.server import MCPServer
+from mcp.server.auth.middleware.auth_context import AuthContextMiddleware
+from mcp.server.auth.middleware.bearer_auth import AuthenticatedUser
+from mcp.server.auth.provider import AccessToken
+from mcp.server.transport_security import TransportSecuritySettings
+from starlette.applications import Starlette
+from starlette.routing import Route
+from starlette.types import Receive, Scope, Send
+
+from ..server.hub import Hub
+from ..server.tokens import Person
+from .access import Access
+from .resources import add_resources
+from .tools import add_tools
+
+INSTRUCTIONS = (
+    "Places a team of robots in a picture by what a person says, proves the placement, and drives "
+    "there. open_scene first; then instruct with the person's own words, which it reads itself: do "
+    "not compute positions. Show its messages and questions to the person. Robots move by "
+    "approve_and_deploy alone; stop holds them at once."
+)
+
+
+def make_server(hub: Hub, folders: Sequence[Path] = ()) -> MCPServer[Access]:
+    """A server for MCP.
+
+    Args:
+        folders: whose pictures may be opened by their paths.
+    """
+    access = Access(hub, tuple(folders))
+
+    @asynccontextmanager
+    async def lifespan(server: MCPServer[Access]) -> AsyncGenerator[Access]:
+        yield access
+
+    server = MCPServer[Access](
+        "formup",
+        version=version("formup"),
+        instructions=INSTRUCTIONS,
+        lifespan=lifespan,
+        log_level="WARNING",
+    )
+    add_tools(server)
+    add_resources(server)
+    return server
+
+
+class Endpoint:
+    """An ASGI application for one path, behind the guard, which has found who calls.
+
+    Attributes:
+        server: what it serves.
+    """
+
+    def __init__(self, hub: Hub) -> None:
+        self.server = make_server(hub)
+        checked = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # by the guard
+        self.server.streamable_http_app(
+            max_request_body_size=hub.settings.upload_bytes, transport_security=checked
+        )
+        self._manager = self.server.session_manager
+        self._app = AuthContextMiddleware(self._manager.handle_request)
+
+    def running(self) -> AbstractAsyncContextManager[None]:
+        """While it can be called; once."""
+        return self._manager.run()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request; a session and a question belong to the token they began with."""
+        person: Person = scope["state"]["person"]
+        token = AccessToken(token="", client_id=person.name, scopes=[person.scope])
+        await self._app({**scope, "user": AuthenticatedUser(token)}, receive, send)
+
+
+def mount(app: Starlette, hub: Hub) -> None:
+    """Serve MCP at /mcp of an application, for as long as that runs."""
+    endpoint, before = Endpoint(hub), app.router.lifespan_context
+
+    @asynccontextmanager
+    async def lifespan(app: Starlette) -> AsyncGenerator[Any]:
+        async with endpoint.running(), before(app) as state:
+            yield state
+
+    app.router.lifespan_context = lifespan
+    app.router.routes.append(Route("/mcp", endpoint))

@@ -1,0 +1,161 @@
+"""What tools answer with: a session as it stands, short; positions and pictures on demand."""
+
+import asyncio
+from typing import Annotated, Any, Literal
+
+from mcp.server.mcpserver import Image
+from mcp_types import CallToolResult, ContentBlock, ResourceLink, TextContent
+from pydantic import BaseModel
+
+from ...agent.conversation import Session
+from ...agent.report import Report, Status
+from ...agent.turns import Turn
+from ...tools.draw import draw_view
+from ...tools.errors import InputError
+from ...tools.world import World
+from .access import Ctx, caller, theirs
+
+HEARTBEAT = 5.0
+"""Seconds between signs of life while a turn goes on."""
+PATIENCE = 18.0
+"""Seconds after which a call answers that its turn goes on; many clients give up after 60."""
+DETAIL = {"contract", "positions", "headings_deg", "robots", "targets", "verdict", "arrival"}
+"""Fields of a report that are told on demand."""
+JPEG = "image/jpeg"
+
+
+class State(BaseModel):
+    """A session as it stands.
+
+    Status open: nothing was said yet. running: ask status again. question: answer with instruct.
+    needs_approval: a person has to say yes. The message is for the person, as it is. certified:
+    whether the plan is proven to be as said. candidates: what a question offers. detail, on
+    demand: contract, positions in px in robot order, certificate, arrival.
+    """
+
+    session: str
+    status: Status | Literal["open", "running"]
+    message: str
+    plan_id: str | None = None
+    certified: bool | None = None
+    robots: int | None = None
+    candidates: list[dict[str, Any]] | None = None
+    detail: dict[str, Any] | None = None
+
+
+Told = Annotated[CallToolResult, State]
+
+
+async def followed(ctx: Ctx, turn: Turn) -> str:
+    """Wait for the end of a turn, for `PATIENCE` at most, with signs of life meanwhile.
+
+    Returns:
+        What is told before its message, where it was done before.
+
+    Raises:
+        InputError: it could not begin.
+    """
+    beats, left = 0, PATIENCE
+    while left > 0:
+        await asyncio.wait({turn.task}, timeout=min(HEARTBEAT, left))
+        if turn.task.done():
+            break
+        beats, left = beats + 1, left - HEARTBEAT
+        doing = "The robots are driving" if turn.moving.is_set() else "Working"
+        await ctx.report_progress(beats, message=f"{doing} ({beats * HEARTBEAT:g} s).")
+    try:
+        if turn.task.done():
+            await turn.ended()
+    except InputError as error:
+        if error.kind != "repeated":
+            raise
+        return f"{error} Now: "
+    return ""
+
+
+async def after(
+    ctx: Ctx, session: str, turn: Turn, *, detail: bool = False, picture: bool = False
+) -> CallToolResult:
+    """A session after a turn, or while it goes on."""
+    before = await followed(ctx, turn)
+    return await standing(ctx, session, before, detail=detail, picture=picture)
+
+
+async def standing(
+    ctx: Ctx, session: str, before: str = "", *, detail: bool = False, picture: bool = False
+) -> CallToolResult:
+    """A session as it stands.
+
+    Args:
+        before: what is told before its message.
+    """
+    service, held = caller(ctx)[0].service, await theirs(ctx, session)
+    now = service.turn(session)
+    if now is not None or await asyncio.to_thread(service.is_written, session):
+        driving = now is not None and now.moving.is_set()
+        doing = "The robots are driving" if driving else "A turn is under way"
+        state = State(session=session, status="running", message=f"{doing}; ask status again.")
+    elif held.run is None:
+        size = "{} by {} px".format(*held.picture.size)
+        message = f"The picture is open, {size}. Say what to do with instruct."
+        state = State(session=session, status="open", message=message)
+    else:
+        state = _reported(session, held.run.report, detail=detail)
+    state.message = before + state.message
+    content: list[ContentBlock] = [TextContent(text=state.model_dump_json(exclude_none=True))]
+    name = f"plans/{state.plan_id}/picture" if state.plan_id else "scene"
+    uri = f"formup://sessions/{session}/{name}"
+    content.append(ResourceLink(uri=uri, name=name, mime_type=JPEG))
+    if picture:
+        data = await asyncio.to_thread(view, held, state.plan_id)
+        content.append(Image(data=data, format="jpeg").to_image_content())
+    return CallToolResult(
+        content=content, structured_content=state.model_dump(mode="json", exclude_none=True)
+    )
+
+
+def _reported(session: str, report: Report, *, detail: bool) -> State:
+    more = report.model_dump(mode="json", include=DETAIL) if detail else None
+    return State(
+        session=session,
+        status=report.status,
+        message=report.message,
+        plan_id=report.plan_id,
+        certified=None if report.verdict is None else report.verdict.certified,
+        robots=None if report.positions is None else len(report.positions),
+        candidates=None if report.candidates is None else list(report.candidates),
+        detail=more,
+    )
+
+
+def view(held: Session, plan_id: str | None = None) -> bytes:
+    """The picture with rulers, as JPEG: with a plan's robots, or with what a question offers.
+
+    Raises:
+        InputError: there is no such plan.
+    """
+    run = held.run
+    if run is None:
+        return draw_view(held.picture, World.of(held.picture))
+    if plan_id is not None:
+        return draw_view(run.context.picture, run.world, plan=planned(held, plan_id).plan)
+    offered = [choice["id"] for choice in run.report.candidates or ()]
+    targets = tuple(target for target in run.world.targets if target.id in offered)
+    named = {target.id for target in targets}
+    candidates = [run.context.candidate(name) for name in offered if name not in named]
+    return draw_view(run.context.picture, run.world.having(targets=targets), candidates=candidates)
+
+
+def planned(held: Session, plan_id: str) -> Any:
+    """A plan of a session, with what it was made from.
+
+    Raises:
+        InputError: there is none.
+    """
+    plans = {} if held.run is None else held.run.world.plans
+    if plan_id not in plans:
+        known = ", ".join(list(plans)[-8:]) or "none yet"
+        raise InputError(
+            f"There is no plan {plan_id!r} in this session; there is {known}.", "missing"
+        )
+    return plans[plan_id]

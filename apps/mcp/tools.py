@@ -1,0 +1,224 @@
+"""The tools that a client sees: few, each one thing a person wants of the whole team.
+
+No argument of any of them is a person's yes: words plan and never move robots here, and real ones
+are driven only after a person was asked, through the client where it can ask. The nonce which that
+yes has to name never leaves the server.
+"""
+
+import asyncio
+from typing import Annotated, Any
+
+from mcp.server import MCPServer
+from mcp.server.mcpserver import (
+    AcceptedElicitation,
+    CancelledElicitation,
+    DeclinedElicitation,
+    Elicit,
+    Resolve,
+)
+from mcp_types import ToolAnnotations
+from pydantic import BaseModel, Field, WithJsonSchema
+
+from ...agent.turns import Asked
+from ...tools.context import Context as ToolContext
+from ...tools.context import Settings
+from ...tools.errors import InputError
+from ...tools.formation.editing.edit_kinds import EDIT_SCHEMA
+from ..server.forms import Key, Pointed, Words
+from ..server.hub import asked_by, need
+from ..server.sessions import check_room
+from .access import Access, Ctx, caller, permitted, picture_named, told
+from .state import Told, after, followed, planned, standing
+
+NO_GO = (
+    "Nothing was done: words move no robots here. Say it without the go, and have the certified "
+    "plan driven with approve_and_deploy."
+)
+NO_FORM = "This client cannot ask a person: let one approve the plan with "
+OVER_HTTP = f"{NO_FORM}POST /api/sessions/{{}}/approvals; then ask status. "
+OVER_STDIO = f"{NO_FORM}/approve in formup chat --session {{}}, once this client has ended. "
+ASession = Annotated[str, Field(max_length=100, description="as open_scene gave it")]
+AKey = Annotated[Key, Field(description="of your choice, the same when you repeat this very call")]
+Detail = Annotated[bool, Field(description="also contract, positions, certificate, arrival")]
+Shown = Annotated[bool, Field(description="also the picture of what stands")]
+Things = Annotated[Pointed, Field(description="things meant, pointed at in px of the picture")]
+Answer = AcceptedElicitation[Any] | DeclinedElicitation | CancelledElicitation
+Edits = Annotated[
+    list[Annotated[dict[str, Any], WithJsonSchema(EDIT_SCHEMA)]], Field(min_length=1, max_length=20)
+]
+
+
+@told
+async def open_scene(
+    ctx: Ctx,
+    image: Annotated[str, Field(description="path of a file, or over HTTP an id; or a data URL")],
+    robots: Annotated[int | None, Field(ge=1, le=10_000)] = None,
+    metres_per_pixel: Annotated[float | None, Field(gt=0, le=1e6)] = None,
+    robot_radius: Annotated[float | None, Field(ge=0, le=1e5, description="px")] = None,
+    clearance: Annotated[float | None, Field(ge=0, le=1e5, description="px")] = None,
+    picture: Shown = False,
+) -> Told:
+    """Begin a session about a picture taken from above; everything else needs its id."""
+    hub, person = caller(ctx)
+    need(person, "plan")
+    await asyncio.to_thread(check_room, hub, person)
+    seen = await picture_named(ctx, image)
+    settings = Settings(
+        robots=robots,
+        metres_per_pixel=metres_per_pixel,
+        robot_radius=robot_radius,
+        clearance=clearance,
+        fleet=hub.settings.fleet,
+    )
+    ToolContext.of(seen, settings)  # what cannot be is said before anything is kept
+    made = hub.service.open(seen, settings=settings, owner=person.name)
+    return await standing(ctx, made, picture=picture)
+
+
+@told
+async def instruct(
+    ctx: Ctx,
+    session: ASession,
+    words: Words,
+    points: Things = (),
+    idempotency_key: AKey | None = None,
+    detail: Detail = False,
+    picture: Shown = False,
+) -> Told:
+    """Say in the person's own words what the team shall do or change; also questions and answers.
+
+    It plans and certifies; no robot moves. "Surround the coin with 6 robots", "a bit further out",
+    "undo", "how far is robot 4?".
+    """
+    service, person = await permitted(ctx, session, "plan")
+    asked = Asked(by=person.name, key=idempotency_key, may_move=False)
+    turn = service.say(session, words, asked, pointed=points)
+    try:
+        return await after(ctx, session, turn, detail=detail, picture=picture)
+    except InputError as error:
+        if error.kind != "not_allowed":
+            raise
+        raise InputError(NO_GO) from None
+
+
+@told
+async def edit(
+    ctx: Ctx,
+    session: ASession,
+    edits: Edits,
+    idempotency_key: AKey | None = None,
+    detail: Detail = False,
+    picture: Shown = False,
+) -> Told:
+    """Change the plan that stands exactly, without words; what is not named stays as it is."""
+    service, person = await permitted(ctx, session, "plan")
+    asked = Asked(by=person.name, key=idempotency_key, may_move=False)
+    turn = service.edit(session, *edits, asked=asked)
+    return await after(ctx, session, turn, detail=detail, picture=picture)
+
+
+@told
+async def status(
+    ctx: Ctx,
+    session: ASession,
+    wait: Annotated[bool, Field(description="for some seconds, for the end of what runs")] = False,
+    detail: Detail = False,
+    picture: Shown = False,
+) -> Told:
+    """How a session stands: its plan, what waits for a person, whether robots drive or arrived."""
+    service, _ = await permitted(ctx, session)
+    turn = service.turn(session)
+    if wait and turn is not None:
+        return await after(ctx, session, turn, detail=detail, picture=picture)
+    return await standing(ctx, session, detail=detail, picture=picture)
+
+
+class Yes(BaseModel):
+    """A person's answer."""
+
+    approve: bool = Field(description="Yes: the real robots drive to exactly this plan, now")
+
+
+def _key_of_yes(idempotency_key: str) -> str:
+    """The key of the turn that follows a person's answer to a call."""
+    return f"{idempotency_key}/answer"
+
+
+@told
+async def ask_person(
+    ctx: Ctx, session: str, plan_id: str, idempotency_key: str
+) -> Elicit[Yes] | str:
+    """Begin to drive; where a person has to say yes first, ask them.
+
+    Returns:
+        The question, or what is told before how the session stands, where nobody is asked.
+    """
+    service, person = await permitted(ctx, session, "move")
+    planned(service.session(session), plan_id)
+    now = service.turn(session)
+    if now is not None and now.asked.key == _key_of_yes(idempotency_key):
+        return await followed(ctx, now)
+    waits = None if now is not None else await service.waits(session)
+    if waits is None or waits.plan_id != plan_id:
+        before = await followed(
+            ctx, service.go(session, plan_id, asked=asked_by(person, idempotency_key))
+        )
+        waits = None if before else await service.waits(session)
+        if waits is None or waits.plan_id != plan_id:
+            return before
+    if _can_ask(ctx):
+        return Elicit(waits.message, Yes)
+    way = OVER_STDIO if ctx.request_context.request is None else OVER_HTTP
+    return way.format(session)
+
+
+def _can_ask(ctx: Ctx) -> bool:
+    """Whether the client shows forms to a person; one that names no kind shows forms."""
+    declared = ctx.client_capabilities
+    offers = None if declared is None else declared.elicitation
+    return offers is not None and (offers.form is not None or offers.url is None)
+
+
+@told
+async def approve_and_deploy(
+    ctx: Ctx,
+    session: ASession,
+    plan_id: Annotated[str, Field(min_length=1, max_length=100)],
+    idempotency_key: AKey,
+    answer: Annotated[Answer, Resolve(ask_person)],
+) -> Told:
+    """Drive the robots to a certified plan. Real ones only after a person said yes, who is asked.
+
+    Robots that still drive after some seconds: status "running", then ask status.
+    """
+    said = answer.data if isinstance(answer, AcceptedElicitation) else None
+    if isinstance(said, str):
+        return await standing(ctx, session, said)
+    service, person = await permitted(ctx, session, "move")
+    waits = await service.waits(session)
+    if waits is None or waits.plan_id != plan_id or isinstance(answer, CancelledElicitation):
+        return await standing(ctx, session)
+    asked = asked_by(person, _key_of_yes(idempotency_key))
+    if isinstance(said, Yes) and said.approve:
+        turn = service.approve(session, plan_id, waits.nonce, asked=asked)
+    else:
+        turn = service.say(session, "no", asked)
+    return await after(ctx, session, turn)
+
+
+@told
+async def stop(ctx: Ctx, session: ASession) -> Told:
+    """Hold all robots at once where they are, and end what runs."""
+    service, person = await permitted(ctx, session)
+    await service.stop(session, asked_by(person))
+    return await standing(ctx, session)
+
+
+def add_tools(server: MCPServer[Access]) -> None:
+    """Offer them."""
+    for tool in (open_scene, instruct, edit, stop):
+        hints = ToolAnnotations(destructive_hint=False, open_world_hint=False)
+        server.add_tool(tool, annotations=hints)
+    server.add_tool(status, annotations=ToolAnnotations(read_only_hint=True))
+    hints = ToolAnnotations(destructive_hint=True, idempotent_hint=True)
+    server.add_tool(approve_and_deploy, annotations=hints)
