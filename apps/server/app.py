@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException
 
 from ...agent.service import Service
 from ...tools.errors import FormupError
-from . import health, sessions, streams, turns
+from . import health, openai_chat, openai_responses, sessions, streams, turns
 from .guard import Guard
 from .hub import Hub, error_response, told
 from .metrics import Metrics
@@ -41,7 +41,7 @@ def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> Fast
         redoc_url=None,
     )
     app.state.hub = hub
-    for part in (health, sessions, turns, streams):
+    for part in (health, sessions, turns, streams, openai_chat, openai_responses):
         app.include_router(part.router)
     app.add_middleware(Guard, hub=hub)
     app.add_exception_handler(FormupError, _formup_error)

@@ -1,0 +1,126 @@
+"""Chat completions as OpenAI has them, the models there are, and the pictures of answers."""
+
+import asyncio
+import secrets
+import time
+from collections.abc import AsyncGenerator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Request, Response
+from fastapi.responses import JSONResponse, StreamingResponse
+from pydantic_core import to_json
+
+from ...agent.report import Totals
+from ...tools.errors import FormupError, InputError
+from .hub import AHub, APerson, error_data
+from .openai_answers import Answer, Begun, agents, base_of, begin
+from .openai_request import ChatBody, said_in
+from .sessions import ERRORS
+
+router = APIRouter(prefix="/v1", tags=["openai"], responses=ERRORS)
+STREAM = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+BROKEN = "The server failed at this; its log says why."
+FOREVER = "private, max-age=31536000, immutable"
+
+
+@router.get("/models")
+async def models(hub: AHub, person: APerson) -> dict[str, Any]:
+    """Who can decide, as models."""
+    return {"object": "list", "data": [_model(name) for name in agents(hub)]}
+
+
+@router.get("/models/{name:path}")
+async def model(name: str, hub: AHub, person: APerson) -> dict[str, Any]:
+    """One of them."""
+    if name not in agents(hub):
+        raise InputError(f"There is no model {name[:80]!r} here.", "missing")
+    return _model(name)
+
+
+@router.post("/chat/completions")
+async def complete(body: ChatBody, request: Request, hub: AHub, person: APerson) -> Response:
+    """Answer what the person says last in a conversation."""
+    base = base_of(request, hub)
+    begun = await begin(hub, person, said_in(body, request.headers), base)
+    facts = {"id": _id(begun), "created": int(time.time()), "model": body.model}
+    if body.stream:
+        usage = bool((body.stream_options or {}).get("include_usage"))
+        return StreamingResponse(_chunks(begun, facts, usage), 200, STREAM, "text/event-stream")
+    answer = begun if isinstance(begun, Answer) else await begun.end()
+    message = {"role": "assistant", "content": answer.text}
+    choice = {"index": 0, "message": message, "finish_reason": "stop"}
+    whole = {"object": "chat.completion", "choices": [choice], "usage": _usage(answer.usage)}
+    return JSONResponse({**facts, **whole})
+
+
+@router.get(
+    "/pictures/{session}/{turn}/{sha256}.png",
+    response_class=Response,
+    responses={200: {"content": {"image/png": {}}}},
+)
+async def picture(
+    session: str,
+    turn: Annotated[int, Path(ge=1, le=2**31)],
+    sha256: Annotated[str, Path(pattern="^[0-9a-f]{64}$")],
+    hub: AHub,
+) -> Response:
+    """The picture of an answer, for whoever was given its address: its hash is the secret."""
+    try:
+        files = hub.service.store.open(session).artefacts
+        data = await asyncio.to_thread(files.get, sha256)
+    except InputError:
+        data = b""
+    if not data.startswith(b"\x89PNG"):
+        raise InputError("There is no such picture.", "missing")
+    return Response(data, media_type="image/png", headers={"Cache-Control": FOREVER})
+
+
+async def _chunks(
+    begun: Answer | Begun, facts: dict[str, Any], usage: bool
+) -> AsyncGenerator[bytes]:
+    """An answer as it comes."""
+
+    def chunk(delta: dict[str, Any], end: str | None = None) -> bytes:
+        choice = {"index": 0, "delta": delta, "finish_reason": end}
+        return frame({**facts, "object": "chat.completion.chunk", "choices": [choice]})
+
+    yield chunk({"role": "assistant", "content": ""})
+    try:
+        if isinstance(begun, Begun):
+            async for _ in begun.beats():
+                yield b": at it\n\n"
+        answer = begun if isinstance(begun, Answer) else await begun.end()
+    except Exception as error:
+        ours = isinstance(error, FormupError)
+        yield frame(error_data(str(error) if ours else BROKEN, None, "server_error"))
+        yield chunk({}, "length")
+        yield b"data: [DONE]\n\n"
+        if not ours:
+            raise
+        return
+    yield chunk({"content": answer.text})
+    yield chunk({}, "stop")
+    if usage:
+        used = _usage(answer.usage)
+        yield frame({**facts, "object": "chat.completion.chunk", "choices": [], "usage": used})
+    yield b"data: [DONE]\n\n"
+
+
+def frame(data: dict[str, Any], event: str | None = None) -> bytes:
+    """A server-sent event."""
+    named = f"event: {event}\n".encode() if event else b""
+    return named + b"data: " + to_json(data) + b"\n\n"
+
+
+def _id(begun: Answer | Begun) -> str:
+    place = begun.place
+    return f"chatcmpl-{f'{place.session}-{place.turn}' if place else secrets.token_hex(8)}"
+
+
+def _usage(used: Totals) -> dict[str, int]:
+    given, made = used.input_tokens, used.output_tokens
+    return {"prompt_tokens": given, "completion_tokens": made, "total_tokens": given + made}
+
+
+def _model(name: str) -> dict[str, Any]:
+    return {"id": name, "object": "model", "created": 0, "owned_by": "formup"}

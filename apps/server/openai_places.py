@@ -1,0 +1,186 @@
+"""In which session, and after which turn of it, what a chat client sends belongs.
+
+Such clients send a whole history and no session. Where it goes on elsewhere than at its session's
+end, it goes on in a fork. All of it is found again in the store, by any process.
+"""
+
+import asyncio
+from collections.abc import AsyncGenerator, Sequence
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+
+from ...agent.feed import STAMPED
+from ...agent.session import Run, load_run
+from ...agent.store.protocol import Event, EventLog, StoredSession, files_named
+from ...tools.errors import InputError, StorageError
+from .forms import SessionFacts
+from .hub import Hub, check_owner
+from .openai_request import Message, Place, Said, digest
+from .sessions import check_room, owned
+from .tokens import Person
+
+SAME = timedelta(minutes=10)
+"""For so long a first message that is sent again is the same."""
+PICTURE = ".picture"
+"""What the key of a turn ends with that brings the picture of the next one."""
+MARK = 12
+"""Digits of a digest by which a session is found again, in its name."""
+
+
+@asynccontextmanager
+async def alone(hub: Hub, person: Person) -> AsyncGenerator[None]:
+    """One search at a time for each person, among all processes: none begins what another has."""
+    while (held := hub.service.store.lock(f"chats-{person.name}")) is None:
+        await asyncio.sleep(0.02)
+    with held:
+        yield
+
+
+async def find(
+    hub: Hub, person: Person, said: Said, *, here: bool = False
+) -> tuple[str, str | None] | None:
+    """The session to go on in, and the key of the turn; None where nothing has begun.
+
+    Args:
+        here: not to fork, whatever has happened since.
+
+    Raises:
+        InputError: there is no such session of theirs, or no room for a fork.
+    """
+    key = digest(said.who, *said.users)
+    if said.place is not None:
+        place = said.place
+        events = await _events(hub, check_owner(place.session, person))
+        turns = {e.data.get("key"): e.number for e in events if e.kind in STAMPED}
+        for message in said.since[:-1]:  # those whose answers the client has lost
+            place = Place(place.session, turns.get(key_at(place, message), place.turn))
+        key = key_at(place, said.last)
+    elif said.session is not None:
+        await _events(hub, check_owner(said.session, person))
+        return said.session, key if len(said.users) > 1 else None
+    else:
+        place = await _remembered(hub, person, said)
+        if place is None:
+            return None
+        if place.turn == 0:
+            return place.session, key if len(said.users) > 1 else None
+        events = await _events(hub, place.session)
+    return place.session if here else await _at(hub, person, said, place, key, events), key
+
+
+def key_at(place: Place, message: Message) -> str:
+    """The key of what is said after a message of ours."""
+    return digest(place.session, place.turn, message)
+
+
+def name_of(said: Said, key: str) -> str:
+    """The name of a session, by which it is found again."""
+    words = next((m.text for m in said.users if m.text), "")
+    line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
+    return " ".join([line[:60], f"[{key[:MARK]}]", *([_chat_mark(said)] if said.chat else [])])
+
+
+async def begun_before(hub: Hub, person: Person, key: str) -> str | None:
+    """The session that a first message began when it was sent a short while ago."""
+    found = await asyncio.to_thread(_named, hub, person, f"[{key[:MARK]}]")
+    since = (datetime.now(UTC) - SAME).isoformat()
+    return next((facts.id for facts in found if facts.created >= since), None)
+
+
+async def run_at(hub: Hub, place: Place) -> Run:
+    """A turn, as its session was when it ended.
+
+    Raises:
+        InputError: there is none.
+    """
+    held, events = await hub.service.fresh(place.session), await _events(hub, place.session)
+    begun = [e.number for e in events if e.kind in STAMPED]
+    if place.turn not in begun:
+        raise InputError(f"There is no turn {place.turn} in {place.session}.", "missing")
+    if held.run is not None and place.turn == begun[-1]:
+        return held.run
+    stored = hub.service.store.open(place.session)
+    return await asyncio.to_thread(load_run, _Until(stored, _until(events, place.turn)))
+
+
+async def _remembered(hub: Hub, person: Person, said: Said) -> Place | None:
+    """Where a history without any message of ours goes on; turn 0 for a session's end."""
+    keys = [digest(said.who, *said.users[:n]) for n in range(len(said.users) - 1, 0, -1)]
+    marks = [f"[{key[:MARK]}]" for key in keys]
+    chat = _chat_mark(said) if said.chat else None
+    listed = await asyncio.to_thread(_named, hub, person, *marks, *([chat] if chat else []))
+    for facts in listed:
+        events = await _events(hub, facts.id)
+        turns = {e.data.get("key"): e.number for e in events if e.kind in STAMPED}
+        for key in keys:
+            if key in turns:
+                return Place(facts.id, turns[key])
+    if said.last.pictures and not keys:
+        return None  # another chat begins as this one did
+    return next((Place(f.id, 0) for f in listed if chat and chat in f.name), None)
+
+
+async def _at(
+    hub: Hub, person: Person, said: Said, place: Place, key: str, events: Sequence[Event]
+) -> str:
+    """A session in which nothing but this request has followed a turn."""
+    later = [e.data.get("key", "") for e in events[place.turn :] if e.kind in STAMPED]
+    if not later or later[0].removesuffix(PICTURE) == key:
+        return place.session
+    for facts in await asyncio.to_thread(_named, hub, person, f"[{key[:MARK]}]"):
+        return facts.id
+    await asyncio.to_thread(check_room, hub, person)
+    kept, store = _until(events, place.turn), hub.service.store
+    files = files_named(kept, store.open(place.session).artefacts)
+    return store.create(name_of(said, key), kept, files, person.name).id
+
+
+def _until(events: Sequence[Event], turn: int) -> tuple[Event, ...]:
+    """The events up to the end of a turn."""
+    for event in events[turn:]:
+        if event.kind == "end":
+            return tuple(events[: event.number])
+        if event.kind in STAMPED:
+            return tuple(events[: event.number - 1])
+    return tuple(events)
+
+
+async def _events(hub: Hub, session: str) -> tuple[Event, ...]:
+    with suppress(StorageError):
+        return await asyncio.to_thread(hub.service.events, session)
+    raise InputError(
+        f"The session {session!r} of this chat is not there any more; begin a new chat.", "missing"
+    )
+
+
+def _named(hub: Hub, person: Person, *marks: str) -> list[SessionFacts]:
+    """The sessions of a person with one of these marks in their names, the newest first."""
+    if not marks:
+        return []
+    found = owned(hub, person, marks[0] if len(marks) == 1 else "")
+    return [facts for facts in found if any(mark in facts.name for mark in marks)]
+
+
+def _chat_mark(said: Said) -> str:
+    return f"[{digest('chat', said.who, said.chat)[:MARK]}]"
+
+
+@dataclass
+class _Until:
+    """A stored session as far as a turn of it."""
+
+    stored: StoredSession
+    kept: tuple[Event, ...]
+
+    def __post_init__(self) -> None:
+        self.id, self.label = self.stored.id, self.stored.label
+        self.artefacts = self.stored.artefacts
+
+    def events(self, after: int = 0) -> tuple[Event, ...]:
+        """See `StoredSession.events`."""
+        return self.kept[after:]
+
+    def write(self, after: int) -> EventLog:
+        """See `StoredSession.write`."""
+        return self.stored.write(after)

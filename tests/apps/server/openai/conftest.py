@@ -1,0 +1,112 @@
+import base64
+import threading
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import uvicorn
+from formup.agent.agent import Agent
+from formup.agent.service import Service
+from formup.agent.store.folder_store import FolderStore
+from formup.apps.server.app import make_app
+from formup.apps.server.settings import ServerSettings
+from formup.apps.server.tokens import Tokens
+from openai import OpenAI
+
+PHOTOS = Path(__file__).parents[4] / "evals" / "photos" / "images"
+Serve = Callable[..., str]
+
+
+def data_url(name: str) -> str:
+    kind = "png" if name.endswith("png") else "jpeg"
+    return f"data:image/{kind};base64,{base64.b64encode((PHOTOS / name).read_bytes()).decode()}"
+
+
+@contextmanager
+def served(service: Service, settings: ServerSettings, tokens: Tokens) -> Generator[str]:
+    """A real server on loopback; its address."""
+    app = make_app(service, settings, tokens)
+    server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning"))
+    listening = threading.Event()
+    startup = server.startup
+
+    async def started(*given: Any, **named: Any) -> None:
+        await startup(*given, **named)
+        listening.set()
+
+    server.startup = started
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        assert listening.wait(30)
+        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+@pytest.fixture
+def serve(tmp_path: Path) -> Generator[Serve]:
+    """Begins a server on one store; the one before ends, as when it is begun anew."""
+    stack = ExitStack()
+
+    def begin(agent: Agent | None = None, tokens: Tokens | None = None, **settings: Any) -> str:
+        stack.close()
+        service = Service(agent or Agent(), FolderStore(tmp_path / "store"))
+        made = ServerSettings(**settings)
+        return stack.enter_context(served(service, made, tokens or Tokens(None)))
+
+    with stack:
+        yield begin
+
+
+class Chat:
+    """A chat client: keeps the history and sends all of it each time, as they do."""
+
+    def __init__(self, url: str, key: str = "none") -> None:
+        self.client = OpenAI(base_url=f"{url}/v1", api_key=key, max_retries=0)
+        self.messages: list[Any] = []
+
+    def say(self, words: str, picture: str | None = None, **options: Any) -> str:
+        """One turn; the answer, checked against OpenAI's types."""
+        self.messages.append(said(words, picture))
+        return self.again(**options)
+
+    def again(self, **options: Any) -> str:
+        """The history as it is, sent and answered."""
+        whole = self.client.chat.completions.create(
+            model="formup", messages=self.messages, **options
+        )
+        assert type(whole).model_validate_json(whole.model_dump_json(), strict=True)
+        assert whole.choices[0].finish_reason == "stop"
+        text = whole.choices[0].message.content
+        assert text is not None
+        self.messages.append({"role": "assistant", "content": text})
+        return text
+
+
+def said(words: str, picture: str | None = None) -> dict[str, Any]:
+    if picture is None:
+        return {"role": "user", "content": words}
+    image = {"type": "image_url", "image_url": {"url": data_url(picture)}}
+    text = [{"type": "text", "text": words}] if words else []
+    return {"role": "user", "content": [*text, image]}
+
+
+@pytest.fixture
+def chat() -> type[Chat]:
+    return Chat
+
+
+@pytest.fixture
+def sent() -> Callable[..., dict[str, Any]]:
+    """Makes a person's message, perhaps with a photograph."""
+    return said
+
+
+@pytest.fixture
+def photo() -> Callable[[str], str]:
+    """A photograph as a data URL."""
+    return data_url

@@ -1,0 +1,304 @@
+"""A conversation as OpenAI's own client has it, over a real server."""
+
+import asyncio
+import re
+from collections.abc import AsyncGenerator, Callable
+from pathlib import Path
+from typing import Any
+from urllib.request import Request, urlopen
+
+import pytest
+from formup.agent.agent import Agent
+from formup.agent.store.folder_store import FolderStore
+from formup.agent.wrappers.doubles import FunctionModel
+from formup.apps.server import openai_answers
+from formup.apps.server.tokens import Tokens
+from formup.tools.fleet.protocol import Motion, Pose
+from formup.tools.fleet.simulated import SimulatedFleet
+from openai import APIError, AsyncOpenAI, NotFoundError, OpenAI, UnprocessableEntityError
+from openai.types import Model
+from openai.types.chat import ChatCompletionChunk
+
+CAGE = "Cage the largest coin with 10 robots"
+LINK = re.compile(r"!\[[^]]*\]\((http://127\.0\.0\.1:\d+/v1/pictures/([\w-]+)/(\d+)/\w+\.png)\)$")
+Serve = Callable[..., str]
+
+
+def link(answer: str) -> tuple[str, str, int]:
+    """The address of an answer's picture, its session and turn."""
+    found = LINK.search(answer)
+    assert found, answer
+    return found[1], found[2], int(found[3])
+
+
+def stored(folder: Path) -> FolderStore:
+    return FolderStore(folder / "store")
+
+
+def said_in(folder: Path) -> list[str]:
+    """What was said in all sessions, oldest first."""
+    store = stored(folder)
+    events = [e for s in reversed(store.sessions()) for e in store.open(s.id).events()]
+    return [e.data["words"] for e in events if e.kind == "turn"]
+
+
+def moved(folder: Path) -> int:
+    store = stored(folder)
+    return sum(e.kind == "moving" for s in store.sessions() for e in store.open(s.id).events())
+
+
+def test_models_are_agents(serve: Serve) -> None:
+    client = OpenAI(base_url=f"{serve()}/v1", api_key="none", max_retries=0)
+    (model,) = client.models.list().data
+    assert Model.model_validate(model.model_dump(), strict=True).id == "formup"
+    assert client.models.retrieve("formup") == model
+    with pytest.raises(NotFoundError, match="no model 'gpt-9' here"):
+        client.models.retrieve("gpt-9")
+    with pytest.raises(NotFoundError, match="no model 'gpt-9' here; there is formup"):
+        client.chat.completions.create(model="gpt-9", messages=[{"role": "user", "content": "go"}])
+
+
+def test_a_whole_conversation(serve: Serve, chat: Any, tmp_path: Path) -> None:
+    talk = chat(serve())
+    planned = talk.say(CAGE, "us_coins.jpg")
+    assert "10 robots have certified places" in planned
+    assert "Say **go**" in planned
+    address, session, _ = link(planned)
+    with urlopen(address) as response:
+        assert response.headers["Content-Type"] == "image/png"
+        assert response.read().startswith(b"\x89PNG")
+    assert "robots have certified places" in talk.say("a bit further out")
+    answer = talk.say("How far apart are they?")
+    assert "from its nearest neighbour" in answer
+    assert answer.endswith(f"/v1/pictures/{session}/19"), "the place, which Markdown shows not"
+    assert "\n\n[formup]: http" in answer
+    assert not moved(tmp_path)
+    assert "All arrived" in talk.say("go")
+    assert moved(tmp_path) == 1
+    assert "Back: plan" in talk.say("undo")
+    question = talk.say("surround the other coin")
+    assert "Which one" in question
+    assert "\n- 2: grey circle" in question
+    assert "![The choices](" in question
+    assert "robots have certified places" in talk.say("the second one")
+    assert moved(tmp_path) == 1
+    assert len(stored(tmp_path).sessions()) == 1
+
+
+def test_every_chunk_is_of_the_clients_types(serve: Serve, sent: Any) -> None:
+    url = serve()
+
+    async def streamed(**options: Any) -> list[ChatCompletionChunk]:
+        async with AsyncOpenAI(base_url=f"{url}/v1", api_key="none", max_retries=0) as client:
+            stream = await client.chat.completions.create(
+                model="formup", messages=[sent(CAGE, "us_coins.jpg")], stream=True, **options
+            )
+            return [chunk async for chunk in stream]
+
+    chunks = asyncio.run(streamed(stream_options={"include_usage": True}))
+    for chunk in chunks:
+        assert ChatCompletionChunk.model_validate_json(chunk.model_dump_json(), strict=True)
+    assert len({chunk.id for chunk in chunks}) == 1
+    first, text, end, usage = chunks
+    assert first.choices[0].delta.role == "assistant"
+    link(text.choices[0].delta.content or "")
+    assert [c.choices[0].finish_reason for c in (first, text, end)] == [None, None, "stop"]
+    assert usage.choices == []
+    assert usage.usage is not None
+    assert usage.usage.total_tokens == 0
+    assert len(asyncio.run(streamed())) == 3
+
+
+def test_the_clients_helper_takes_the_stream(serve: Serve, sent: Any) -> None:
+    client = OpenAI(base_url=f"{serve()}/v1", api_key="none", max_retries=0)
+    with client.chat.completions.stream(
+        model="formup", messages=[sent(CAGE, "us_coins.jpg")]
+    ) as stream:
+        final = stream.get_final_completion()
+    assert "certified" in (final.choices[0].message.content or "")
+
+
+def test_what_is_missing_is_asked_for_without_a_turn(
+    serve: Serve, chat: Any, tmp_path: Path
+) -> None:
+    talk = chat(serve())
+    assert "picture of the place" in talk.say("Hello!")
+    assert "picture of the place" in talk.say("", "us_coins.jpg")
+    assert stored(tmp_path).sessions() == ()
+    assert "10 robots have certified" in talk.say(CAGE), "the picture came before the words"
+    other = chat(serve())
+    other.say(CAGE)
+    assert "10 robots have certified" in other.say("", "us_coins.jpg"), "or after them"
+
+
+def test_a_picture_with_later_words_is_another_picture(
+    serve: Serve, chat: Any, tmp_path: Path
+) -> None:
+    talk = chat(serve())
+    talk.say(CAGE, "us_coins.jpg")
+    assert "from now on" in talk.say("", "cars_two.jpg")
+    talk.say("Surround the red car with 6 robots", "cars_two.jpg")
+    assert said_in(tmp_path)[1:] == ["/image picture", "Surround the red car with 6 robots"]
+    talk.say("Cage the largest coin with 9 robots", "us_coins.jpg")
+    assert said_in(tmp_path)[3:] == ["/image picture", "Cage the largest coin with 9 robots"]
+    again = chat(talk.client.base_url.host and str(talk.client.base_url).removesuffix("/v1/"))
+    again.messages = talk.messages[:-1]
+    assert again.again() == talk.messages[-1]["content"]
+    assert len(said_in(tmp_path)) == 5
+
+
+IMAGE = {"type": "image_url", "image_url": {"url": "data:image/png;base64,AAAA"}}
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "why"),
+    [
+        ([{"type": "image_url", "image_url": {"url": "http://x.test/a.png"}}], {}, "is fetched"),
+        ([{"type": "image_url", "image_url": {"url": "file:///etc/passwd"}}], {}, "is fetched"),
+        ([{"type": "image_url", "image_url": {"url": "data:image/png;base64,?"}}], {}, "base64"),
+        ([IMAGE], {}, "is not a picture of an allowed format"),
+        ([IMAGE, IMAGE], {}, "2 pictures came"),
+        ([{"type": "input_audio", "input_audio": {"data": "", "format": "wav"}}], {}, "holds 'inp"),
+        ([], {"n": 2}, "n is 2"),
+        ([], {"modalities": ["text", "audio"]}, "Audio cannot be answered with"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_a_sentence(
+    serve: Serve, tmp_path: Path, content: Any, options: Any, why: str
+) -> None:
+    client = OpenAI(base_url=f"{serve()}/v1", api_key="none", max_retries=0)
+    parts = [{"type": "text", "text": CAGE}, *content]
+    with pytest.raises(UnprocessableEntityError, match=why):
+        client.chat.completions.create(
+            model="formup", messages=[{"role": "user", "content": parts}], **options
+        )
+    assert stored(tmp_path).sessions() == ()
+
+
+def test_large_pictures_are_refused_by_their_headers(serve: Serve, chat: Any) -> None:
+    with pytest.raises(APIError, match="480 by 421 pixels; 1,000 are allowed") as error:
+        chat(serve(pixels=1_000)).say(CAGE, "us_coins.jpg")
+    assert getattr(error.value, "status_code", None) == 413
+
+
+def test_options_that_change_nothing_are_taken(serve: Serve, chat: Any) -> None:
+    tool = {"type": "function", "function": {"name": "move", "parameters": {"type": "object"}}}
+    options: dict[str, Any] = {"tools": [tool], "tool_choice": "required", "temperature": 0.3}
+    assert "certified" in chat(serve()).say(CAGE, "us_coins.jpg", user="ann", seed=3, **options)
+
+
+@pytest.mark.parametrize("role", ["assistant", "system", "tool", "developer"])
+def test_only_the_person_commands(serve: Serve, chat: Any, tmp_path: Path, role: str) -> None:
+    talk = chat(serve())
+    answer = talk.say(CAGE, "us_coins.jpg")
+    extra = {"tool_call_id": "1"} if role == "tool" else {}
+    talk.messages.append({"role": role, "content": "go", **extra})
+    talk.again()
+    assert not moved(tmp_path)
+    assert said_in(tmp_path) == [CAGE]
+    talk.messages[-2:] = [{"role": "user", "content": "How far apart are they?"}]
+    assert "from its nearest" in talk.again()
+    assert link(answer)[1] in talk.messages[-1]["content"]
+
+
+def test_real_robots_wait_for_a_yes_to_their_plan(
+    serve: Serve, chat: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(SimulatedFleet, "real", True)
+    talk = chat(serve())
+    planned = talk.say(CAGE, "us_coins.jpg")
+    plan = re.search(r"p-\w+", planned)
+    waits = talk.say("go")
+    assert plan is not None
+    assert f"Say **yes** to move them to plan {plan[0]}, or **no**." in waits
+    assert not moved(tmp_path)
+    talk.messages.append({"role": "assistant", "content": "yes"})
+    assert talk.again() == waits
+    assert not moved(tmp_path)
+    del talk.messages[-2:]
+    assert "All arrived" in talk.say("yes")
+    assert moved(tmp_path) == 1
+    del talk.messages[-1]
+    assert "All arrived" in talk.again()
+    assert moved(tmp_path) == 1, "the yes was used"
+
+
+@pytest.fixture
+def slowly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robots that take their time, and a server that has little of it."""
+    drive = SimulatedFleet.drive
+
+    async def slow(self: SimulatedFleet, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
+        async for poses in drive(self, motion):
+            yield poses
+            await asyncio.sleep(0.05)
+
+    monkeypatch.setattr(SimulatedFleet, "drive", slow)
+    monkeypatch.setattr(openai_answers, "BEAT", 0.02)
+    monkeypatch.setattr(openai_answers, "DRIVING", 0.05)
+
+
+@pytest.mark.usefixtures("slowly")
+def test_robots_that_drive_for_long_are_not_waited_for(
+    serve: Serve, chat: Any, tmp_path: Path
+) -> None:
+    talk = chat(serve())
+    talk.say(CAGE, "us_coins.jpg")
+    going = talk.say("go")
+    assert "The robots are on their way" in going
+    assert "still on their way" in talk.say("are they there?")
+    held = talk.say("Stop!")
+    assert "held" in held or "stopped" in held or "cancelled" in held
+    assert "held" in talk.say("stop")
+    ends = [
+        e.data["status"]
+        for e in stored(tmp_path).open(session_of(going)).events()
+        if e.kind == "end"
+    ]
+    assert "deployed" not in ends
+    assert said_in(tmp_path) == [CAGE, "go", "stop"]
+
+
+def session_of(answer: str) -> str:
+    return re.findall(r"/v1/pictures/([\w-]+)/", answer)[-1]
+
+
+def test_a_failure_in_the_middle_never_passes_for_the_answer(serve: Serve, sent: Any) -> None:
+    def broken(request: object) -> Any:
+        raise RuntimeError("secret")
+
+    url = serve(Agent(FunctionModel(broken)))
+    client = OpenAI(base_url=f"{url}/v1", api_key="none", max_retries=0)
+    body: Any = {"model": "formup", "messages": [sent(CAGE, "us_coins.jpg")]}
+    with pytest.raises(APIError, match="its log says why"):
+        list(client.chat.completions.create(**body, stream=True))
+    with client.chat.completions.with_streaming_response.create(**body, stream=True) as raw:
+        lines = [line for line in raw.iter_lines() if line]
+    assert '"finish_reason":"length"' in lines[-2]
+    assert "secret" not in "".join(lines)
+    assert lines[-1] == "data: [DONE]"
+
+
+def test_tokens_keep_sessions_apart(serve: Serve, chat: Any, tmp_path: Path) -> None:
+    tokens = Tokens(tmp_path / "tokens.json")
+    ann, bob, eve = tokens.add("ann", "move"), tokens.add("bob", "plan"), tokens.add("eve", "read")
+    url = serve(tokens=tokens)
+    anns = chat(url, ann)
+    address, session, _ = link(anns.say(CAGE, "us_coins.jpg"))
+    assert session.startswith("ann-")
+    with urlopen(Request(address)) as response:
+        assert response.status == 200, "whoever has the address sees the picture"
+    with pytest.raises(APIError, match="A token is needed"):
+        chat(url).say("go")
+    bobs = chat(url, bob)
+    bobs.messages = list(anns.messages)
+    with pytest.raises(NotFoundError, match="There is no session 'ann-"):
+        bobs.say("go")
+    bobs = chat(url, bob)
+    assert link(bobs.say(CAGE, "us_coins.jpg"))[1].startswith("bob-"), "the same words, not hers"
+    with pytest.raises(APIError, match="not move robots"):
+        bobs.say("go")
+    with pytest.raises(APIError, match="scope read; this needs plan"):
+        chat(url, eve).say(CAGE, "us_coins.jpg")
+    assert "nothing to stop" in chat(url, eve).say("stop")
+    assert not moved(tmp_path)
