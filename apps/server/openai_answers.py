@@ -7,6 +7,7 @@ import asyncio
 import base64
 import binascii
 import io
+import logging
 import re
 import time
 from collections.abc import AsyncGenerator
@@ -15,17 +16,17 @@ from dataclasses import dataclass, field
 from fastapi import Request
 
 from ...agent.conversation import STOP
-from ...agent.outcomes import Paused
+from ...agent.outcomes import Cancelled, Paused
 from ...agent.report import Totals
 from ...agent.session import Run
 from ...agent.turns import Turn
 from ...tools.context import Settings
 from ...tools.draw import draw_plan
-from ...tools.errors import InputError
+from ...tools.errors import FormupError, InputError
 from ...tools.perception.image import Picture
 from ..run_display import choice_words
 from ..run_files import draw_choices
-from .hub import Hub, asked_by, need
+from .hub import Hub, asked_by, check_owner, need
 from .openai_chores import chore
 from .openai_places import PICTURE, alone, begun_before, find, name_of, run_at
 from .openai_request import Message, Place, Said, digest
@@ -48,6 +49,7 @@ ON_THE_WAY = (
 )
 DRIVES = "The robots are still on their way. Wait for them, or say **stop** to hold them."
 CUT_OFF = "That was stopped before it began; nothing was done."
+BROKEN_OFF = "That was broken off before its end; robots that drove are held. Say what to do next."
 NOTHING_MOVES = "No robots move here; there is nothing to stop."
 DATA = re.compile(r"data:image/[\w.+-]+;base64,", re.I)
 UNSAFE = re.compile(r"\](?=[(\[:])|<(?=[a-z/!?])", re.I)
@@ -65,6 +67,15 @@ class Answer:
     text: str
     place: Place | None = None
     usage: Totals = field(default_factory=Totals)
+
+    async def beats(self) -> AsyncGenerator[None]:
+        """None: it is there."""
+        for _ in ():
+            yield
+
+    async def end(self) -> "Answer":
+        """Itself."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -107,6 +118,14 @@ class Begun:
         return await told(self.place, run, self.base)
 
 
+def problem(error: Exception) -> str:
+    """What a client is told of an error; only the log has what is our own."""
+    if isinstance(error, FormupError):
+        return str(error)
+    logging.getLogger("formup").error("a turn broke", exc_info=error)
+    return "The server failed at this; its log says why."
+
+
 def base_of(request: Request, hub: Hub) -> str:
     """The address of this server, as browsers reach it."""
     return (hub.settings.public_url or str(request.base_url)).rstrip("/")
@@ -134,6 +153,9 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
         )
     if (answer := chore(said)) is not None:
         return Answer(answer)
+    if said.place is not None and not said.since:  # nothing has been said since our answer
+        check_owner(said.place.session, person)
+        return await told(said.place, await run_at(hub, said.place), base)
     _check(said.last)
     if said.last.text.strip(" .!").lower() in STOP:
         return await _stopped(hub, person, said, base)
@@ -163,7 +185,8 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
 async def told(place: Place, run: Run, base: str) -> Answer:
     """What came of a turn, with its picture, which lies in its session."""
     report, choices = run.report, run.report.candidates or ()
-    lines = [UNSAFE.sub(r"\\\g<0>", report.message)]
+    message = BROKEN_OFF if isinstance(run.outcome, Cancelled) else report.message
+    lines = [UNSAFE.sub(r"\\\g<0>", message)]
     if choices:
         lines.append("\n".join(f"- {choice_words(choice)}" for choice in choices))
     if isinstance(run.outcome, Paused) and run.outcome.plan_id is not None:

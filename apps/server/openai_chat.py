@@ -11,15 +11,14 @@ from fastapi.responses import JSONResponse, StreamingResponse
 from pydantic_core import to_json
 
 from ...agent.report import Totals
-from ...tools.errors import FormupError, InputError
+from ...tools.errors import InputError
 from .hub import AHub, APerson, error_data
-from .openai_answers import Answer, Begun, agents, base_of, begin
+from .openai_answers import Answer, Begun, agents, base_of, begin, problem
 from .openai_request import ChatBody, said_in
 from .sessions import ERRORS
 
 router = APIRouter(prefix="/v1", tags=["openai"], responses=ERRORS)
 STREAM = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
-BROKEN = "The server failed at this; its log says why."
 FOREVER = "private, max-age=31536000, immutable"
 
 
@@ -46,7 +45,7 @@ async def complete(body: ChatBody, request: Request, hub: AHub, person: APerson)
     if body.stream:
         usage = bool((body.stream_options or {}).get("include_usage"))
         return StreamingResponse(_chunks(begun, facts, usage), 200, STREAM, "text/event-stream")
-    answer = begun if isinstance(begun, Answer) else await begun.end()
+    answer = await begun.end()
     message = {"role": "assistant", "content": answer.text}
     choice = {"index": 0, "message": message, "finish_reason": "stop"}
     whole = {"object": "chat.completion", "choices": [choice], "usage": _usage(answer.usage)}
@@ -86,23 +85,17 @@ async def _chunks(
 
     yield chunk({"role": "assistant", "content": ""})
     try:
-        if isinstance(begun, Begun):
-            async for _ in begun.beats():
-                yield b": at it\n\n"
-        answer = begun if isinstance(begun, Answer) else await begun.end()
+        async for _ in begun.beats():
+            yield b": at it\n\n"
+        answer = await begun.end()
+        yield chunk({"content": answer.text})
+        yield chunk({}, "stop")
+        if usage:
+            used = _usage(answer.usage)
+            yield frame({**facts, "object": "chat.completion.chunk", "choices": [], "usage": used})
     except Exception as error:
-        ours = isinstance(error, FormupError)
-        yield frame(error_data(str(error) if ours else BROKEN, None, "server_error"))
+        yield frame(error_data(problem(error), None, "server_error"))
         yield chunk({}, "length")
-        yield b"data: [DONE]\n\n"
-        if not ours:
-            raise
-        return
-    yield chunk({"content": answer.text})
-    yield chunk({}, "stop")
-    if usage:
-        used = _usage(answer.usage)
-        yield frame({**facts, "object": "chat.completion.chunk", "choices": [], "usage": used})
     yield b"data: [DONE]\n\n"
 
 

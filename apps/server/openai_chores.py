@@ -28,11 +28,11 @@ HEAD = 400
 """Characters of a system's message that tell a chore; long ones speak of everything."""
 SUGGESTIONS = ("A bit further out", "How far apart are the robots?", "Undo")
 KINDS: tuple[tuple[str, str, object], ...] = (
+    (r"tool_calls|function_calling", "tool_calls", ()),
     (r"autocomplet", "text", ""),
     (r"follow.?up|suggest", "follow_ups", SUGGESTIONS),
     (r"\btags?\b|tags_", "tags", ("Robotics", "Formation")),
-    (r"\bquer(y|ies)\b|query_", "queries", ()),
-    (r"tool_calls|function_calling", "tool_calls", ()),
+    (r"search quer|query_", "queries", ()),
     (r"\bimage generation\b|image_prompt", "prompt", ""),
 )
 """By what each is told, and what it is given."""

@@ -8,10 +8,10 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse, StreamingResponse
 
-from ...tools.errors import FormupError, InputError
+from ...tools.errors import InputError
 from .hub import AHub, APerson, check_owner
-from .openai_answers import USUAL, Answer, Begun, base_of, begin, told
-from .openai_chat import BROKEN, STREAM, frame
+from .openai_answers import USUAL, Answer, Begun, base_of, begin, problem, told
+from .openai_chat import STREAM, frame
 from .openai_places import run_at
 from .openai_request import ResponsesBody, place_of, said_in
 from .sessions import ERRORS
@@ -27,7 +27,7 @@ async def respond(body: ResponsesBody, request: Request, hub: AHub, person: APer
     facts = _facts(begun, body.model) | {"previous_response_id": body.previous_response_id}
     if body.stream:
         return StreamingResponse(_events(begun, facts), 200, STREAM, "text/event-stream")
-    return JSONResponse(_whole(begun if isinstance(begun, Answer) else await begun.end(), facts))
+    return JSONResponse(_whole(await begun.end(), facts))
 
 
 @router.get("/responses/{response}")
@@ -57,17 +57,13 @@ async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerato
     yield event("response.created", response=facts)
     yield event("response.in_progress", response=facts)
     try:
-        if isinstance(begun, Begun):
-            async for _ in begun.beats():
-                yield b": at it\n\n"
-        answer = begun if isinstance(begun, Answer) else await begun.end()
+        async for _ in begun.beats():
+            yield b": at it\n\n"
+        answer = await begun.end()
     except Exception as error:
-        ours = isinstance(error, FormupError)
-        why = {"code": "server_error", "message": str(error) if ours else BROKEN}
+        why = {"code": "server_error", "message": problem(error)}
         yield event("error", **why, param=None)
         yield event("response.failed", response={**facts, "status": "failed", "error": why})
-        if not ours:
-            raise
         return
     text = answer.text
     yield event("response.output_item.added", output_index=0, item=_message(item))

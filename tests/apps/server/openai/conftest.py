@@ -1,6 +1,6 @@
 import base64
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -62,11 +62,20 @@ def serve(tmp_path: Path) -> Generator[Serve]:
         yield begin
 
 
+@pytest.fixture
+def client() -> Generator[Callable[..., OpenAI]]:
+    """OpenAI's own client of a server."""
+    with ExitStack() as stack:
+        yield lambda url, key="none": stack.enter_context(
+            OpenAI(base_url=f"{url}/v1", api_key=key, max_retries=0)
+        )
+
+
 class Chat:
     """A chat client: keeps the history and sends all of it each time, as they do."""
 
-    def __init__(self, url: str, key: str = "none") -> None:
-        self.client = OpenAI(base_url=f"{url}/v1", api_key=key, max_retries=0)
+    def __init__(self, client: OpenAI) -> None:
+        self.client = client
         self.messages: list[Any] = []
 
     def say(self, words: str, picture: str | None = None, **options: Any) -> str:
@@ -96,8 +105,15 @@ def said(words: str, picture: str | None = None) -> dict[str, Any]:
 
 
 @pytest.fixture
-def chat() -> type[Chat]:
-    return Chat
+def chat(client: Callable[..., OpenAI]) -> Callable[..., Chat]:
+    """A chat with a server, perhaps with a token, perhaps with a history."""
+
+    def begin(url: str, key: str = "none", messages: Sequence[Any] = ()) -> Chat:
+        talk = Chat(client(url, key))
+        talk.messages = list(messages)
+        return talk
+
+    return begin
 
 
 @pytest.fixture
