@@ -5,7 +5,7 @@ A turn goes on when its client has gone, and the same request sent again finds i
 
 import asyncio
 import base64
-import binascii
+import hashlib
 import io
 import logging
 import re
@@ -23,7 +23,6 @@ from ...agent.turns import Turn
 from ...tools.context import Settings
 from ...tools.draw import draw_plan
 from ...tools.errors import FormupError, InputError
-from ...tools.perception.image import Picture
 from ..run_display import choice_words
 from ..run_files import draw_choices
 from .hub import Hub, asked_by, check_owner, need
@@ -111,11 +110,9 @@ class Begun:
         async for _ in self.beats():
             pass
         if not self.turn.task.done():
-            return Answer(f"{ON_THE_WAY}{_mark(self.base, self.place)}", self.place)
+            return _at_once(ON_THE_WAY, self.base, self.place)
         run = await self.turn.ended()
-        if run is None:
-            return Answer(CUT_OFF)
-        return await told(self.place, run, self.base)
+        return Answer(CUT_OFF) if run is None else await told(self.place, run, self.base)
 
 
 def problem(error: Exception) -> str:
@@ -158,10 +155,10 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
         return await told(said.place, await run_at(hub, said.place), base)
     _check(said.last)
     if said.last.text.strip(" .!").lower() in STOP:
-        return await _stopped(hub, person, said, base)
+        return await _hold(hub, person, said, base)
     need(person, "plan")
     async with alone(hub, person):
-        found = await find(hub, person, said) or await _opened(hub, person, said)
+        found = await find(hub, person, said) or await _open_session(hub, person, said)
     if found is None:
         return Answer(NEEDED)
     session, key = found
@@ -186,19 +183,21 @@ async def told(place: Place, run: Run, base: str) -> Answer:
     """What came of a turn, with its picture, which lies in its session."""
     report, choices = run.report, run.report.candidates or ()
     message = BROKEN_OFF if isinstance(run.outcome, Cancelled) else report.message
-    lines = [UNSAFE.sub(r"\\\g<0>", message)]
+    lines = [message]
     if choices:
         lines.append("\n".join(f"- {choice_words(choice)}" for choice in choices))
     if isinstance(run.outcome, Paused) and run.outcome.plan_id is not None:
         lines.append(f"Say **yes** to move them to plan {run.outcome.plan_id}, or **no**.")
     elif report.status == "planned":
         lines.append("Say **go** to move them there, or what to change.")
-    mark, png = _mark(base, place), await asyncio.to_thread(_picture, run)
-    if png is not None and run.stored is not None:
-        sha256 = await asyncio.to_thread(run.stored.artefacts.put, png)
-        address = f"{_address(base, place)}/{sha256}.png"
-        mark = f"\n\n![{'The choices' if choices else f'Plan {report.plan_id}'}]({address})"
-    return Answer("\n\n".join(lines) + mark, place, report.usage)
+    text = UNSAFE.sub(r"\\\g<0>", "\n\n".join(lines))
+    png = await asyncio.to_thread(_picture, run)
+    if png is None or run.stored is None:
+        return _at_once(text, base, place, report.usage)
+    sha256 = await asyncio.to_thread(run.stored.artefacts.put, png)
+    shows = "The choices" if choices else f"Plan {report.plan_id}"
+    text += f"\n\n![{shows}]({base}{place.path}/{sha256}.png)"
+    return Answer(text, place, report.usage)
 
 
 async def _turn(hub: Hub, person: Person, said: Said, session: str, key: str | None) -> Turn | None:
@@ -208,26 +207,25 @@ async def _turn(hub: Hub, person: Person, said: Said, session: str, key: str | N
         InputError: it cannot begin, or was there before.
     """
     held, turn, words = await hub.service.fresh(session), None, said.last.text
-    if held.run is None:  # it was opened for this, with a picture that may have come before
-        words = next(m.text for m in reversed(said.users) if m.text)
-    elif said.last.pictures:
-        picture = await _decoded(hub, said.last.pictures[0])
-        if picture.sha256 != held.run.context.picture.sha256:
+    if held.run is None and not words:  # they came before the picture
+        words = next((m.text for m in reversed(said.users) if m.text), "")
+    for address in said.last.pictures:
+        data = _data(address)
+        if hashlib.sha256(data).hexdigest() != held.picture.sha256:
+            picture = await asyncio.to_thread(checked_picture, data, "picture", hub)
             turn = hub.service.image(session, picture, asked_by(person, key and key + PICTURE))
-            await asyncio.wait({turn.task})
-            turn = None if words and _was_done(turn) else turn
-    if words and turn is None:
+    if words:
+        try:
+            if turn is not None:
+                await turn
+        except InputError as error:
+            if error.kind != "repeated":
+                raise
         turn = hub.service.say(session, words, asked_by(person, key))
     return turn
 
 
-def _was_done(turn: Turn) -> bool:
-    """Whether a turn is over, now or before."""
-    error = turn.task.exception()
-    return error is None or (isinstance(error, InputError) and error.kind == "repeated")
-
-
-async def _opened(hub: Hub, person: Person, said: Said) -> tuple[str, str] | None:
+async def _open_session(hub: Hub, person: Person, said: Said) -> tuple[str, str] | None:
     """A new session, or the one that the same message began just now; None without a picture."""
     pictured = [m for m in said.users if m.pictures]
     if not pictured or not any(m.text for m in said.users):
@@ -237,8 +235,9 @@ async def _opened(hub: Hub, person: Person, said: Said) -> tuple[str, str] | Non
         return before, key
     await asyncio.to_thread(check_room, hub, person)
     _check(pictured[-1])
+    data = _data(pictured[-1].pictures[0])
     made = hub.service.open(
-        await _decoded(hub, pictured[-1].pictures[0]),
+        await asyncio.to_thread(checked_picture, data, "picture", hub),
         settings=Settings(fleet=hub.settings.fleet),
         name=name_of(said, key),
         agent=agents(hub)[said.model],
@@ -247,7 +246,7 @@ async def _opened(hub: Hub, person: Person, said: Said) -> tuple[str, str] | Non
     return made, key
 
 
-async def _stopped(hub: Hub, person: Person, said: Said, base: str) -> Answer:
+async def _hold(hub: Hub, person: Person, said: Said, base: str) -> Answer:
     """Hold the robots, whoever asks and whatever has happened since."""
     found = await find(hub, person, said, here=True)
     run = await hub.service.stop(found[0], asked_by(person)) if found else None
@@ -256,11 +255,11 @@ async def _stopped(hub: Hub, person: Person, said: Said, base: str) -> Answer:
     return await told(Place(found[0], hub.service.last_turn(found[0])), run, base)
 
 
-async def _decoded(hub: Hub, address: str) -> Picture:
-    """The picture of a data URL; nothing is ever fetched.
+def _data(address: str) -> bytes:
+    """What a data URL holds; nothing is ever fetched.
 
     Raises:
-        InputError: it is none, or no picture that can be used.
+        InputError: it is none of a picture.
     """
     head = DATA.match(address)
     if head is None:
@@ -270,10 +269,9 @@ async def _decoded(hub: Hub, address: str) -> Picture:
             "as a data URL (data:image/png;base64,...)."
         )
     try:
-        data = base64.b64decode(address[head.end() :], validate=True)
-    except (binascii.Error, ValueError):
+        return base64.b64decode(address[head.end() :], validate=True)
+    except ValueError:
         raise InputError("The picture's data URL is no valid base64; attach it again.") from None
-    return await asyncio.to_thread(checked_picture, data, "picture", hub)
 
 
 def _check(message: Message) -> None:
@@ -302,14 +300,7 @@ def _picture(run: Run) -> bytes | None:
     return file.getvalue()
 
 
-def _at_once(text: str, base: str, place: Place | None) -> Answer:
-    return Answer(text + (_mark(base, place) if place else ""), place)
-
-
-def _mark(base: str, place: Place) -> str:
-    """What tells a message's place where it shows no picture; Markdown shows nothing of it."""
-    return f"\n\n[formup]: {_address(base, place)}"
-
-
-def _address(base: str, place: Place) -> str:
-    return f"{base}/v1/pictures/{place.session}/{place.turn}"
+def _at_once(text: str, base: str, place: Place | None, usage: Totals | None = None) -> Answer:
+    """An answer without a picture: a definition that Markdown does not show has its place."""
+    mark = f"\n\n[formup]: {base}{place.path}" if place else ""
+    return Answer(text + mark, place, usage or Totals())

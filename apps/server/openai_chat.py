@@ -25,7 +25,7 @@ FOREVER = "private, max-age=31536000, immutable"
 @router.get("/models")
 async def models(hub: AHub, person: APerson) -> dict[str, Any]:
     """Who can decide, as models."""
-    return {"object": "list", "data": [_model(name) for name in agents(hub)]}
+    return {"object": "list", "data": [_model_facts(name) for name in agents(hub)]}
 
 
 @router.get("/models/{name:path}")
@@ -33,7 +33,7 @@ async def model(name: str, hub: AHub, person: APerson) -> dict[str, Any]:
     """One of them."""
     if name not in agents(hub):
         raise InputError(f"There is no model {name[:80]!r} here.", "missing")
-    return _model(name)
+    return _model_facts(name)
 
 
 @router.post("/chat/completions")
@@ -115,5 +115,5 @@ def _usage(used: Totals) -> dict[str, int]:
     return {"prompt_tokens": given, "completion_tokens": made, "total_tokens": given + made}
 
 
-def _model(name: str) -> dict[str, Any]:
+def _model_facts(name: str) -> dict[str, Any]:
     return {"id": name, "object": "model", "created": 0, "owned_by": "formup"}

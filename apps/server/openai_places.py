@@ -7,12 +7,11 @@ end, it goes on in a fork. All of it is found again in the store, by any process
 import asyncio
 from collections.abc import AsyncGenerator, Sequence
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
-from ...agent.feed import STAMPED
+from ...agent.feed import STAMPED, FedSession, Feed
 from ...agent.session import Run, load_run
-from ...agent.store.protocol import Event, EventLog, StoredSession, files_named
+from ...agent.store.protocol import Event, StoredSession, files_named
 from ...tools.errors import InputError, StorageError
 from .forms import SessionFacts
 from .hub import Hub, check_owner
@@ -48,30 +47,20 @@ async def find(
     Raises:
         InputError: there is no such session of theirs, or no room for a fork.
     """
-    key = digest(said.who, *said.users)
+    place = said.place or await _remembered(hub, person, said)
+    if place is None:
+        return None
+    events = await _events(hub, check_owner(place.session, person))
+    key = None if len(said.users) == 1 else digest(said.who, *said.users)
+    if place.turn == 0:
+        return place.session, key
     if said.place is not None:
-        place = said.place
-        events = await _events(hub, check_owner(place.session, person))
-        turns = {e.data.get("key"): e.number for e in events if e.kind in STAMPED}
+        turns = _turns(events)
         for message in said.since[:-1]:  # those whose answers the client has lost
-            place = Place(place.session, turns.get(key_at(place, message), place.turn))
-        key = key_at(place, said.last)
-    elif said.session is not None:
-        await _events(hub, check_owner(said.session, person))
-        return said.session, key if len(said.users) > 1 else None
-    else:
-        place = await _remembered(hub, person, said)
-        if place is None:
-            return None
-        if place.turn == 0:
-            return place.session, key if len(said.users) > 1 else None
-        events = await _events(hub, place.session)
-    return place.session if here else await _at(hub, person, said, place, key, events), key
-
-
-def key_at(place: Place, message: Message) -> str:
-    """The key of what is said after a message of ours."""
-    return digest(place.session, place.turn, message)
+            place = Place(place.session, turns.get(_key(place, message), place.turn))
+        key = _key(place, said.last)
+    assert key is not None, "a history that is remembered has more than one message"
+    return place.session if here else await _in_session(hub, person, said, place, key, events), key
 
 
 def name_of(said: Said, key: str) -> str:
@@ -83,7 +72,7 @@ def name_of(said: Said, key: str) -> str:
 
 async def begun_before(hub: Hub, person: Person, key: str) -> str | None:
     """The session that a first message began when it was sent a short while ago."""
-    found = await asyncio.to_thread(_named, hub, person, f"[{key[:MARK]}]")
+    found = await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]")
     since = (datetime.now(UTC) - SAME).isoformat()
     return next((facts.id for facts in found if facts.created >= since), None)
 
@@ -101,7 +90,7 @@ async def run_at(hub: Hub, place: Place) -> Run:
     if held.run is not None and place.turn == begun[-1]:
         return held.run
     stored = hub.service.store.open(place.session)
-    return await asyncio.to_thread(load_run, _Until(stored, _until(events, place.turn)))
+    return await asyncio.to_thread(load_run, _Until(stored, place.turn))
 
 
 async def _remembered(hub: Hub, person: Person, said: Said) -> Place | None:
@@ -109,26 +98,24 @@ async def _remembered(hub: Hub, person: Person, said: Said) -> Place | None:
     keys = [digest(said.who, *said.users[:n]) for n in range(len(said.users) - 1, 0, -1)]
     marks = [f"[{key[:MARK]}]" for key in keys]
     chat = _chat_mark(said) if said.chat else None
-    listed = await asyncio.to_thread(_named, hub, person, *marks, *([chat] if chat else []))
+    listed = await asyncio.to_thread(_marked, hub, person, *marks, *([chat] if chat else []))
     for facts in listed:
-        events = await _events(hub, facts.id)
-        turns = {e.data.get("key"): e.number for e in events if e.kind in STAMPED}
-        for key in keys:
-            if key in turns:
-                return Place(facts.id, turns[key])
+        turns = _turns(await _events(hub, facts.id))
+        if number := next((turns[key] for key in keys if key in turns), None):
+            return Place(facts.id, number)
     if said.last.pictures and not keys:
         return None  # another chat begins as this one did
     return next((Place(f.id, 0) for f in listed if chat and chat in f.name), None)
 
 
-async def _at(
+async def _in_session(
     hub: Hub, person: Person, said: Said, place: Place, key: str, events: Sequence[Event]
 ) -> str:
     """A session in which nothing but this request has followed a turn."""
-    later = [e.data.get("key", "") for e in events[place.turn :] if e.kind in STAMPED]
-    if not later or later[0].removesuffix(PICTURE) == key:
+    later = [e for e in events[place.turn :] if e.kind in STAMPED]
+    if not later or later[0].data.get("key") in (key, key + PICTURE):
         return place.session
-    for facts in await asyncio.to_thread(_named, hub, person, f"[{key[:MARK]}]"):
+    for facts in await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]"):
         return facts.id
     await asyncio.to_thread(check_room, hub, person)
     kept, store = _until(events, place.turn), hub.service.store
@@ -154,7 +141,7 @@ async def _events(hub: Hub, session: str) -> tuple[Event, ...]:
     )
 
 
-def _named(hub: Hub, person: Person, *marks: str) -> list[SessionFacts]:
+def _marked(hub: Hub, person: Person, *marks: str) -> list[SessionFacts]:
     """The sessions of a person with one of these marks in their names, the newest first."""
     if not marks:
         return []
@@ -166,21 +153,23 @@ def _chat_mark(said: Said) -> str:
     return f"[{digest('chat', said.who, said.chat)[:MARK]}]"
 
 
-@dataclass
-class _Until:
+def _key(place: Place, message: Message) -> str:
+    """The key of what is said after a message of ours."""
+    return digest(place.session, place.turn, message)
+
+
+def _turns(events: Sequence[Event]) -> dict[str | None, int]:
+    """The numbers of turns, by the keys they were asked for under."""
+    return {e.data.get("key"): e.number for e in events if e.kind in STAMPED}
+
+
+class _Until(FedSession):
     """A stored session as far as a turn of it."""
 
-    stored: StoredSession
-    kept: tuple[Event, ...]
-
-    def __post_init__(self) -> None:
-        self.id, self.label = self.stored.id, self.stored.label
-        self.artefacts = self.stored.artefacts
+    def __init__(self, stored: StoredSession, turn: int) -> None:
+        super().__init__(stored, Feed(stored, ()))
+        self._turn = turn
 
     def events(self, after: int = 0) -> tuple[Event, ...]:
         """See `StoredSession.events`."""
-        return self.kept[after:]
-
-    def write(self, after: int) -> EventLog:
-        """See `StoredSession.write`."""
-        return self.stored.write(after)
+        return _until(super().events(), self._turn)[after:]

@@ -25,11 +25,16 @@ class Place:
     """What a message of ours came of.
 
     Attributes:
-        turn: number of the event that began it.
+        turn: number of the event that began it; 0 for wherever the session stands.
     """
 
     session: str
     turn: int
+
+    @property
+    def path(self) -> str:
+        """What tells it again, in a message of ours."""
+        return f"/v1/pictures/{self.session}/{self.turn}"
 
 
 class Part(BaseModel):
@@ -114,8 +119,7 @@ class Said:
         model: who is to decide.
         users: the person's messages, the last one last.
         since: those after `place`.
-        place: the last message of ours in the history, if one can be told.
-        session: named by a header.
+        place: of the last message of ours in the history, or that the client names.
         chat: the client's name for the conversation; empty if it gives none.
         who: what tells apart the people behind one token.
         system: the first of the client's own instructions, which tell its chores.
@@ -127,7 +131,6 @@ class Said:
     users: tuple[Message, ...]
     since: tuple[Message, ...]
     place: Place | None
-    session: str | None
     chat: str
     who: str
     system: str
@@ -153,6 +156,8 @@ def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
             place, after = Place(found[-1][0], int(found[-1][1])), number
     if isinstance(body, ResponsesBody) and body.previous_response_id is not None:
         place, after = place_of(body.previous_response_id), 0
+    if place is None and (session := headers.get("x-formup-session")):
+        place = Place(session, 0)
     users = tuple(m for m in messages if m.role == "user")
     if not users:
         raise InputError("The request holds no message of role user; give what the person says.")
@@ -163,7 +168,6 @@ def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
         users=users,
         since=tuple(m for m in messages[after:] if m.role == "user"),
         place=place,
-        session=headers.get("x-formup-session"),
         chat=chat or headers.get("x-openwebui-chat-id", ""),
         who=f"{body.user or ''} {headers.get('x-openwebui-user-id', '')}",
         system="\n".join(m.text for m in messages if m.role in ("system", "developer")),

@@ -24,10 +24,10 @@ async def respond(body: ResponsesBody, request: Request, hub: AHub, person: APer
     """Answer what the person says."""
     said = said_in(body, request.headers)
     begun = await begin(hub, person, said, base_of(request, hub))
-    facts = _facts(begun, body.model) | {"previous_response_id": body.previous_response_id}
+    facts = _response(begun, body.model) | {"previous_response_id": body.previous_response_id}
     if body.stream:
         return StreamingResponse(_events(begun, facts), 200, STREAM, "text/event-stream")
-    return JSONResponse(_whole(await begun.end(), facts))
+    return JSONResponse(_completed(await begun.end(), facts))
 
 
 @router.get("/responses/{response}")
@@ -40,7 +40,7 @@ async def again(response: str, request: Request, hub: AHub, person: APerson) -> 
         raise InputError(f"The response {response!r} was not kept.", "missing")
     check_owner(place.session, person)
     answer = await told(place, await run_at(hub, place), base_of(request, hub))
-    return JSONResponse(_whole(answer, _facts(answer, USUAL)))
+    return JSONResponse(_completed(answer, _response(answer, USUAL)))
 
 
 async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerator[bytes]:
@@ -72,10 +72,10 @@ async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerato
     yield event("response.output_text.done", **at, text=text, logprobs=[])
     yield event("response.content_part.done", **at, part=_part(text))
     yield event("response.output_item.done", output_index=0, item=_message(item, text))
-    yield event("response.completed", response=_whole(answer, facts))
+    yield event("response.completed", response=_completed(answer, facts))
 
 
-def _facts(begun: Answer | Begun, model: str) -> dict[str, Any]:
+def _response(begun: Answer | Begun, model: str) -> dict[str, Any]:
     """A response before it has come to anything."""
     place = begun.place
     made_of = f"{place.session}_{place.turn}" if place else f"none_{secrets.token_hex(8)}"
@@ -97,7 +97,7 @@ def _facts(begun: Answer | Begun, model: str) -> dict[str, Any]:
     }
 
 
-def _whole(answer: Answer, facts: dict[str, Any]) -> dict[str, Any]:
+def _completed(answer: Answer, facts: dict[str, Any]) -> dict[str, Any]:
     """A response at its end."""
     used, item = answer.usage, f"msg_{facts['id'].removeprefix('resp_')}"
     usage = {

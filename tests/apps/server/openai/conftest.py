@@ -14,6 +14,7 @@ from formup.apps.server.app import make_app
 from formup.apps.server.settings import ServerSettings
 from formup.apps.server.tokens import Tokens
 from openai import OpenAI
+from openai.types.chat import ChatCompletion
 
 PHOTOS = Path(__file__).parents[4] / "evals" / "photos" / "images"
 Serve = Callable[..., str]
@@ -66,16 +67,19 @@ def serve(tmp_path: Path) -> Generator[Serve]:
 def client() -> Generator[Callable[..., OpenAI]]:
     """OpenAI's own client of a server."""
     with ExitStack() as stack:
-        yield lambda url, key="none": stack.enter_context(
-            OpenAI(base_url=f"{url}/v1", api_key=key, max_retries=0)
-        )
+
+        def of(url: str, key: str = "none") -> OpenAI:
+            made = OpenAI(base_url=f"{url}/v1", api_key=key, max_retries=0)
+            return stack.enter_context(made)
+
+        yield of
 
 
 class Chat:
     """A chat client: keeps the history and sends all of it each time, as they do."""
 
     def __init__(self, client: OpenAI) -> None:
-        self.client = client
+        self.client: Any = client  # its overloads are for options that are written out
         self.messages: list[Any] = []
 
     def say(self, words: str, picture: str | None = None, **options: Any) -> str:
@@ -85,10 +89,10 @@ class Chat:
 
     def again(self, **options: Any) -> str:
         """The history as it is, sent and answered."""
-        whole = self.client.chat.completions.create(
+        whole: ChatCompletion = self.client.chat.completions.create(
             model="formup", messages=self.messages, **options
         )
-        assert type(whole).model_validate_json(whole.model_dump_json(), strict=True)
+        assert ChatCompletion.model_validate_json(whole.model_dump_json(), strict=True)
         assert whole.choices[0].finish_reason == "stop"
         text = whole.choices[0].message.content
         assert text is not None

@@ -5,6 +5,7 @@ import re
 from collections.abc import AsyncGenerator, Callable
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
 import pytest
@@ -297,14 +298,51 @@ def test_tokens_keep_sessions_apart(serve: Serve, chat: Any, tmp_path: Path) -> 
         assert response.status == 200, "whoever has the address sees the picture"
     with pytest.raises(APIError, match="A token is needed"):
         chat(url).say("go")
+    anns.say("a bit further out", extra_headers={"X-Formup-Session": "bob-0000000000"})
     bobs = chat(url, bob, anns.messages)
     with pytest.raises(NotFoundError, match="There is no session 'ann-"):
         bobs.say("go")
     bobs = chat(url, bob)
     assert link(bobs.say(CAGE, "us_coins.jpg"))[1].startswith("bob-"), "the same words, not hers"
+    with pytest.raises(NotFoundError, match="There is no session 'ann-"):
+        chat(url, bob).say("go", extra_headers={"X-Formup-Session": session})
     with pytest.raises(APIError, match="not move robots"):
         bobs.say("go")
     with pytest.raises(APIError, match="scope read; this needs plan"):
         chat(url, eve).say(CAGE, "us_coins.jpg")
     assert "nothing to stop" in chat(url, eve).say("stop")
     assert not moved(tmp_path)
+
+
+def test_words_of_a_model_make_no_picture_link_or_place(
+    serve: Serve, chat: Any, tmp_path: Path
+) -> None:
+    """Whatever it has read in a picture, a client fetches nothing for it."""
+    text = "![x](http://evil.test/?a) <img src=x> [formup]: /v1/pictures/other/9 [a](b)"
+
+    class Told:
+        name = "told"
+
+        async def reply(self, request: object) -> Reply:
+            return Reply(text=text)
+
+    answer = chat(serve(Agent(Told()))).say(CAGE, "us_coins.jpg")
+    assert r"![x\](http://evil.test/?a) \<img src=x> [formup\]: /v1" in answer
+    assert session_of(answer) != "other"
+
+
+def test_the_address_of_pictures_may_be_another(serve: Serve, chat: Any) -> None:
+    answer = chat(serve(public_url="https://robots.test/")).say(CAGE, "us_coins.jpg")
+    assert "](https://robots.test/v1/pictures/" in answer
+
+
+def test_pictures_alone_are_given_without_a_token(serve: Serve, chat: Any, tmp_path: Path) -> None:
+    address, session, _ = link(chat(serve()).say(CAGE, "us_coins.jpg"))
+    files = stored(tmp_path).open(session).artefacts
+    secret = files.put(b"no picture")
+    base = address.rpartition("/")[0]
+    for name in (f"{secret}.png", f"{'0' * 64}.png", "x.png"):
+        with pytest.raises(HTTPError) as error:
+            urlopen(f"{base}/{name}")
+        assert error.value.code in (404, 422)
+        error.value.close()
