@@ -11,8 +11,8 @@ import re
 import stat
 import warnings
 from collections.abc import Generator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -66,7 +66,6 @@ class Picture:
     name: file name, for messages.
     notes: what a person should know of how the pixels came about; often empty.
     path: absolute, of the file it was loaded from; None where it came from none.
-    file: what that file held, or what was sent in its place; None for an array.
     """
 
     pixels: NDArray[np.uint8]
@@ -74,7 +73,6 @@ class Picture:
     name: str
     notes: tuple[str, ...]
     path: Path | None = None
-    file: bytes | None = field(default=None, repr=False)
 
     @property
     def width(self) -> int:
@@ -120,7 +118,7 @@ def picture_from_bytes(data: bytes, name: str) -> Picture:
         raise _empty(name)
     _check_bytes(name, len(data))
     pixels, notes = _decode(data, name)
-    return Picture(pixels, hashlib.sha256(data).hexdigest(), name, notes, file=data)
+    return Picture(pixels, hashlib.sha256(data).hexdigest(), name, notes)
 
 
 def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Picture:
@@ -145,9 +143,12 @@ def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Pictur
 
 
 def picture_file(picture: Picture) -> bytes:
-    """A file that holds the picture: the one it came from, else a PNG."""
-    if picture.file is not None:
-        return picture.file
+    """A file that holds the picture: the one it came from while that is the same, else a PNG."""
+    if picture.path is not None:
+        with suppress(ImageError, OSError, ValueError):
+            data = _file_bytes(picture.path, picture.name)
+            if hashlib.sha256(data).hexdigest() == picture.sha256:
+                return data
     file = BytesIO()
     Image.fromarray(picture.pixels).save(file, "PNG")
     return file.getvalue()
