@@ -2,8 +2,8 @@
 
 import time
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
-from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -11,10 +11,10 @@ from ..prompts import PromptLibrary
 from ..tools.builtin import TOOLS
 from ..tools.builtin.others import with_keep_outs
 from ..tools.context import Artefacts, Context, Services, Settings
-from ..tools.errors import InputError, StorageError
+from ..tools.errors import InputError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
-from ..tools.tool import Tool
+from ..tools.tool import Tool, to_its_end
 from ..tools.world import Target, World, to_json_values
 from .conversation import Session, in_own_loop
 from .first_message import check_turn, first_message, in_new_picture, pointed_at
@@ -22,13 +22,13 @@ from .limits import DEFAULT_LIMITS, Limits
 from .loop import ANYTHING, Approval
 from .loop import run as run_loop
 from .messages import History, closed
-from .model import Model
+from .model import Model, ShowText
 from .outcomes import Cancelled, Paused
 from .policy import Policy
 from .providers.registry import model_named
+from .recording import LogRecorder, recording, reopened
 from .report import Report, make_report
 from .session import (
-    LogRecorder,
     Run,
     RunOptions,
     Show,
@@ -67,6 +67,7 @@ class Agent:
         limits: bounds of each run.
         policy: which calls go ahead, wait for a person, or are refused.
         tracer: of OpenTelemetry; it is given spans of runs, replies and tools, and no texts.
+        show_text: for models given by name; see `model_named`.
 
     Raises:
         InputError: an unknown model or prompt, or a model that cannot be asked.
@@ -85,10 +86,11 @@ class Agent:
         limits: Limits = DEFAULT_LIMITS,
         policy: Policy = ANYTHING,
         tracer: "Tracer | None" = None,
+        show_text: ShowText | None = None,
     ) -> None:
         if base_url is not None and not isinstance(model, str):
             raise InputError("A base URL goes with a model's name; this model is an object.")
-        self.model = model_named(model, base_url) if isinstance(model, str) else model
+        self.model = model_named(model, base_url, show_text) if isinstance(model, str) else model
         own = None if system else getattr(self.model, "prompt", None)
         self.library = library or PromptLibrary()
         name = (own if planner is None else "planner") if prompt is None else prompt
@@ -96,9 +98,10 @@ class Agent:
         self.prompts = () if self.prompt is None else (self.prompt,)
         self.names: tuple[str, str | None] = (self.model.name, None)
         if planner is not None:
-            made = staged(self.model, planner, base_url, str(name), self.library)
-            self.model, self.prompts = made
-            self.names = made[0].names
+            if isinstance(planner, str):
+                planner = model_named(planner, base_url, show_text)
+            self.model, self.prompts = staged(self.model, planner, str(name), self.library)
+            self.names = self.model.names
         self.system = self.prompt.render() if self.prompt else system
         self.base_url, self.tools, self.limits, self.policy = base_url, tools, limits, policy
         self._tracer = tracer
@@ -154,13 +157,16 @@ class Agent:
         check_turn(context, instruction, pointed)
         context = context.at(with_keep_outs(context, keep_out))
         context = replace(context, steps=(context.world.step,))
-        log, stored = None, FolderSession(trace) if isinstance(trace, Path) else trace
+        begin, stored = None, FolderSession(trace) if isinstance(trace, Path) else trace
         if stored is not None:
             context.services.artefacts = stored.artefacts
-            log = FolderLog(trace, begin=True) if isinstance(trace, Path) else stored.write(begun)
-        with closing(LogRecorder(log, context.services.artefacts, None, show)) as recorder:
-            if log is not None and not begun:
-                recorder.event("session", self.facts(picture, context.services.artefacts))
+            anew = isinstance(trace, Path)
+            begin = partial(FolderLog, trace, begin=True) if anew else partial(stored.write, begun)
+        async with recording(begin, context.services.artefacts, None, show) as recorder:
+            if begin is not None and not begun:
+                files = context.services.artefacts
+                facts = await to_its_end(lambda: self.facts(picture, files))
+                await recorder.event("session", facts)
             return await self._turn(context, (), instruction, pointed, recorder, stored)
 
     def start(
@@ -230,11 +236,12 @@ class Agent:
         check_turn(context, words, pointed)
         context = context.at(with_keep_outs(context, keep_out))
         messages = closed(run.outcome.messages, "No result: the person interrupted it, or went on.")
-        with closing(_reopened(run, show)) as recorder:
+        async with reopened(run, show) as recorder:
             for message in messages[len(run.outcome.messages) :]:
-                recorder.message(message, run.world)
+                await recorder.message(message, run.world)
             if picture is not None:
-                recorder.event("picture", picture_facts(picture, context.services.artefacts))
+                facts = partial(picture_facts, picture, context.services.artefacts)
+                await recorder.event("picture", await to_its_end(facts))
             turn = context, messages, words, pointed, recorder, run.stored
             return await self._turn(*turn, fresh=picture is not None)
 
@@ -275,15 +282,16 @@ class Agent:
         """
         result, approved = answered_by(run, answer, approve)
         context, messages = replace(run.context, world=run.world), run.outcome.messages
-        with closing(_reopened(run, show)) as recorder:
-            recorder.event("resume", {})
+        async with reopened(run, show) as recorder:
+            await recorder.event("resume", {})
             if approve is not None and isinstance(run.outcome, Paused):
                 plan_id = run.outcome.plan_id if approved else None
-                recorder.event("approval", {"call": run.outcome.call.id, "plan_id": plan_id})
+                said = {"call": run.outcome.call.id, "plan_id": plan_id}
+                await recorder.event("approval", said)
                 fixed = context.settings.model_copy(update={"approved": plan_id})
                 context = replace(context, settings=fixed)
             if result is not None:
-                recorder.message(result, context.world)
+                await recorder.message(result, context.world)
                 messages = (*messages, result)
             left, spent = replace(run, context=context), run.report.usage.seconds
             return await self._go(left, messages, recorder, spent, approved)
@@ -300,12 +308,13 @@ class Agent:
         fresh: bool = False,
     ) -> Run:
         """Begin a turn and let the loop work on it."""
-        recorder.event("turn", {"words": words, "settings": to_json_values(context.settings)})
+        said = {"words": words, "settings": to_json_values(context.settings)}
+        await recorder.event("turn", said)
         world = context.world.having(pointed=tuple(pointed))
         context = replace(context, world=world, words=words)
         sees = getattr(self.model, "sees", False)
         first = first_message(context, messages, seen=sees, fresh=fresh)
-        recorder.message(first, world)
+        await recorder.message(first, world)
         blank = Report(status="stopped", message="", instruction=words, model=self.model.name)
         left = Cancelled((*messages, first), world)
         run = Run(blank, left, context, context.world, stored)
@@ -338,8 +347,7 @@ class Agent:
             context = replace(context, world=outcome.world)
             report = make_report(outcome, context, left.began, self.model.name, seconds)
             report = report.model_copy(update=prompt_facts(self))
-            recorder.world(outcome.world)
-            recorder.event("end", end_facts(outcome, report))
+            await recorder.end(outcome.world, end_facts(outcome, report))
             if recorder.problem is not None:
                 text = f"{report.message} The log ends before this: {recorder.problem}"
                 report = report.model_copy(update={"message": text})
@@ -368,18 +376,3 @@ class Agent:
                 await self.aclose()
 
         return in_own_loop(closing())
-
-
-def _reopened(run: Run, show: Show | None) -> LogRecorder:
-    """The recorder of a session that goes on.
-
-    Raises:
-        StorageError: another process writes its log, or it has gone on since it was read.
-    """
-    log = None
-    if run.stored is not None:
-        if run.events is None:
-            lost = "could not be written to its end; open it again with load_run."
-            raise StorageError(f"{run.stored.label} {lost}")
-        log = run.stored.write(run.events)
-    return LogRecorder(log, run.context.services.artefacts, run.world, show)

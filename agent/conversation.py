@@ -102,13 +102,16 @@ class Session:
         if words.strip(" .!").lower() in STOP:
             return await self.astop()
         show, pointed = options.get("show"), (*self.pointed, *options.get("pointed", ()))
-        run = self.run
+        run, said = self.run, words
         if run is not None and isinstance(run.outcome, Paused):
             if not pointed and read_followup(words, self._standing(run)).kind not in DROPS:
                 return self._keep(await self._answered(run, words, show))
             if pointed:  # the answer is a point
                 words = f"{run.report.instruction} {words}".strip()
         settings = await self._for_turn(words)
+        if run is not None and words != said:  # the same instruction: its numbers still hold
+            once = {name: getattr(run.context.settings, name) for name in ("robots", "starts")}
+            settings = settings.model_copy(update=once)
         self.pointed = ()
         if run is None:
             made = self.agent.arun(

@@ -44,6 +44,7 @@ class Feed:
 
     Attributes:
         last: the number of the last event.
+        loop: that subscribers and turns run in; None before any do.
         turn: the turn that is under way in this process, or was last.
         followers: how many subscribe.
         keys: digest and number of each turn that was asked for, by the key it was asked under.
@@ -52,6 +53,7 @@ class Feed:
     def __init__(self, stored: StoredSession, events: Sequence[Event]) -> None:
         self.stored, self.last = stored, 0
         self.turn: Turn | None = None
+        self.loop: asyncio.AbstractEventLoop | None = None
         self.followers, self._ended = 0, False
         self.keys: dict[str, tuple[str, int]] = {}
         self._kept: deque[Event] = deque(maxlen=MOST_KEPT)
@@ -62,7 +64,13 @@ class Feed:
             self.publish(event)
 
     def publish(self, event: Event) -> None:
-        """Tell an event that was written."""
+        """Tell an event that was written, in whichever thread."""
+        if self.loop is None or self.loop is running_loop():
+            self._publish(event)
+        else:
+            self.loop.call_soon_threadsafe(self._publish, event)
+
+    def _publish(self, event: Event) -> None:
         if event.number == self.last + 1:
             self.last = event.number
             self._kept.append(event)
@@ -95,6 +103,7 @@ class Feed:
             StorageError: the session cannot be read.
         """
         self.followers += 1
+        self.loop = asyncio.get_running_loop()
         try:
             async for what in self._follow(after, heartbeat):
                 yield what
@@ -140,6 +149,14 @@ class Feed:
     def _wake(self) -> None:
         self._changed.set()
         self._changed = asyncio.Event()
+
+
+def running_loop() -> asyncio.AbstractEventLoop | None:
+    """The event loop that runs in this thread, if one does."""
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None
 
 
 class FedSession:

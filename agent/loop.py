@@ -34,10 +34,10 @@ ANYTHING = Policy()
 class Recorder:
     """Is given what happens, as it happens; this one records nothing."""
 
-    def message(self, message: Message, world: World) -> None:
+    async def message(self, message: Message, world: World) -> None:
         """A new message, and the world after it."""
 
-    def moving(self, plan_id: str, world: World) -> None:
+    async def moving(self, plan_id: str, world: World) -> None:
         """Robots are about to move to a plan; raising keeps them where they are."""
 
 
@@ -57,18 +57,18 @@ class Conversation:
     world: World
     recorder: Recorder
 
-    def add(self, message: Reply | Result) -> None:
+    async def add(self, message: Reply | Result) -> None:
         """Append a message and record it."""
         self.messages = (*self.messages, message)
-        self.recorder.message(message, self.world)
+        await self.recorder.message(message, self.world)
 
     def keep(self, world: World) -> None:
         """Put the next world in place."""
         self.world = world
 
-    def moving(self, plan_id: str) -> None:
+    async def moving(self, plan_id: str) -> None:
         """Record that robots are about to move."""
-        self.recorder.moving(plan_id, self.world)
+        await self.recorder.moving(plan_id, self.world)
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ async def _converse(turn: Turn, talk: Conversation, clock: asyncio.Timeout) -> O
         if reason := exhausted(talk.messages, turn.limits):
             return Stopped(talk.messages, talk.world, "limit", reason)
         reply = await turn.ask(talk.messages)
-        talk.add(reply)
+        await talk.add(reply)
         if not reply.calls:
             return Answered(talk.messages, talk.world, reply.text)
 
@@ -198,10 +198,10 @@ async def _settle(
         await _shown(turn, talk, call)
         return Paused(talk.messages, talk.world, call, turn.plan_of(call, talk.messages))
     if decision == "skip":
-        talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
+        await talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
         return None
     if decision == "refuse":
-        talk.add(refused(call, f"{call.name} may not be called here; do without it."))
+        await talk.add(refused(call, f"{call.name} may not be called here; do without it."))
         return _ended(talk)
     context = replace(
         turn.context,
@@ -216,7 +216,7 @@ async def _settle(
             result = await answer(turn.tools, context, call, turn.limits.tool_seconds)
     except ApprovalError as needed:
         return Paused(talk.messages, talk.world, call, needed.plan_id)
-    talk.add(result)
+    await talk.add(result)
     return _ended(talk)
 
 

@@ -1,10 +1,14 @@
 """The cut between the loop and whatever decides: a model is a name and one method."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 from ..tools.tool import Tool
 from .messages import History, Reply
+
+ShowText = Callable[[str | None], None]
+"""Given fragments of text as they come; None: what was shown of this reply is void."""
 
 
 @dataclass(frozen=True)

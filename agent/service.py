@@ -369,7 +369,8 @@ class Service:
             check_key(turn, feed.keys)
             if check is not None:
                 check(held)
-            feed.turn, held.may_move = turn, asked.may_move
+            feed.turn, feed.loop = turn, asyncio.get_running_loop()
+            held.may_move = asked.may_move
             return await getattr(held, f"a{name}")(*arguments, **options)
 
         def over(task: asyncio.Task[Run]) -> None:

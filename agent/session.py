@@ -5,7 +5,6 @@ written down before anything follows from it, so that the log opens again after 
 """
 
 import gc
-import hashlib
 import io
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,18 +20,17 @@ from ..tools.errors import InputError, StorageError
 from ..tools.perception.image import Picture, load_picture, picture_file, picture_from_file
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.world import Step, Target, World
-from ..tools.world_changes import changes_since
 from .calls import refused
 from .first_message import check_text
 from .fold import State, fold, stepped
-from .loop import Approval, Recorder
+from .loop import Approval
 from .messages import Message, Reply, Result, unanswered
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .report import Report, make_report
 from .session_start import read_session
 from .store.folder import log_path
 from .store.folder_store import FolderSession
-from .store.protocol import EventLog, StoredSession
+from .store.protocol import StoredSession
 
 Show = Callable[[Message], None]
 
@@ -110,82 +108,6 @@ class Run:
         """The steps that undo goes through, this turn's among them."""
         world = self.world
         return stepped(self.context.steps, self.began.undone, world.step, world.undone)
-
-
-def message_facts(message: Message) -> dict[str, Any]:
-    """A message as JSON, images as their hashes."""
-    images = () if isinstance(message, Reply) else message.images
-    facts = message.model_dump(mode="json", exclude={"images"}, exclude_defaults=True)
-    hashes = [{"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)} for data in images]
-    return {"role": message.role, **facts} | {"images": hashes}
-
-
-class LogRecorder(Recorder):
-    """Writes down what happens, and shows it.
-
-    Once robots have moved, a log that can no longer be written does not undo that: the turn goes
-    on, and `problem` says what was wrong.
-
-    Args:
-        log: None to write nothing down.
-        world: as the log has it already; None where it has nothing yet.
-    """
-
-    def __init__(
-        self, log: EventLog | None, artefacts: Artefacts, world: World | None, show: Show | None
-    ) -> None:
-        self._log, self._artefacts, self._world, self._show = log, artefacts, world, show
-        self._moved = False
-        self.problem: str | None = None
-
-    @property
-    def events(self) -> int | None:
-        """How many events the log has; None where it could not be written any more."""
-        return None if self.problem else 0 if self._log is None else self._log.last
-
-    def event(self, kind: Any, data: Mapping[str, Any]) -> None:
-        """Write an event that changes no world."""
-        self._try(lambda log: log.append(kind, data))
-
-    def message(self, message: Message, world: World) -> None:
-        """Write a message after what has changed in the world, then show it."""
-        self.world(world)
-        self._try(lambda log: log.append("message", self._facts(message)))
-        if self._show is not None:
-            self._show(message)
-
-    def moving(self, plan_id: str, world: World) -> None:
-        """Write down that robots are about to move; if it cannot be, they do not."""
-        self.world(world)
-        self.event("moving", {"plan_id": plan_id})
-        self._moved = True
-
-    def world(self, world: World) -> None:
-        """Write what has changed in the world, if anything."""
-        changes = {} if world is self._world else changes_since(world, self._world)
-        if changes:
-            self.event("world", {"changes": changes})
-        self._world = world
-
-    def close(self) -> None:
-        """Let go of the log."""
-        if self._log is not None:
-            self._log.close()
-
-    def _facts(self, message: Message) -> dict[str, Any]:
-        for image in () if isinstance(message, Reply) else message.images:
-            self._artefacts.put(image)
-        return message_facts(message)
-
-    def _try(self, write: Callable[[EventLog], object]) -> None:
-        if self._log is None or self.problem is not None:
-            return
-        try:
-            write(self._log)
-        except InputError as error:
-            if not self._moved:
-                raise
-            self.problem = str(error)
 
 
 @contextmanager

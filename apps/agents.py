@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..agent.agent import Agent
-from ..agent.model import Model
+from ..agent.model import Model, ShowText
 from ..agent.wrappers.telemetry import environment_tracer
 from ..prompts import PromptLibrary
 from ..tools.errors import InputError
@@ -31,11 +31,13 @@ def agent_of(
     policies: list[str] | None,
     *,
     talks: bool = False,
+    show_text: ShowText | None = None,
 ) -> Generator[Agent, None, None]:
     """The agent that was chosen; the offline planner goes without a prompt.
 
     Args:
         talks: whether by default a language model is given the prompt for conversations.
+        show_text: see `Agent`.
     """
     if talks and prompt is None and planner is None and model != "offline":
         prompt = CONVERSE
@@ -50,6 +52,7 @@ def agent_of(
             limits=limits,
             policy=policy,
             tracer=tracer,
+            show_text=show_text,
         )
         if agent.model.name == "offline" and agent.prompt is not None:
             say(

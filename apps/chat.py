@@ -2,7 +2,9 @@
 
 import asyncio
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import typer
 from rich.console import Console
 from typer.core import TyperCommand
 
+from ..agent.agent import Agent
 from ..agent.service import Service
 from ..agent.store.places import data_folder, store_at
 from ..tools.context import Context, Settings
@@ -85,14 +88,22 @@ def chat(
     fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
     things = _in_order(arguments.pointed(point, box, outline, target), ctx.meta["words"])
     begin = Beginning(image, session, things, arguments.kept_out(keep_out), Settings(**fixed))
-    rules = ["deploy=refuse"] * plan_only + (policy or [])
-    rest = (planner, base_url, prompt, prompts, limit, rules)
+    rules, lines = ["deploy=refuse"] * plan_only + (policy or []), _lines(script, as_json)
     if auto and plan_only:
         raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
-    with agent_of(model, *rest, talks=True) as agent, Folder(out) as home:
-        service, lines = Service(agent, store_at(store), auto=auto), _lines(script, as_json)
-        talk = Talk(service, home, lambda name: agent_of(name, *rest, talks=True))
-        raise typer.Exit(asyncio.run(_serve(talk, begin, lines, plain=plain, as_json=as_json)))
+    display = None if as_json else _display(plain=plain or lines is not None)
+    chosen = partial(_agent, (planner, base_url, prompt, prompts, limit, rules), display, lines)
+    with chosen(model) as agent, Folder(out) as home:
+        talk = Talk(Service(agent, store_at(store), auto=auto), home, chosen)
+        raise typer.Exit(asyncio.run(_serve(talk, begin, lines, display, plain=plain)))
+
+
+def _agent(
+    rest: Any, display: Display | None, lines: Iterator[str] | None, model: str
+) -> AbstractContextManager[Agent]:
+    """The agent with a model, whose replies a person who types sees while they come."""
+    told = display.fragment if display is not None and lines is None else None
+    return agent_of(model, *rest, talks=True, show_text=told)
 
 
 @dataclass(frozen=True)
@@ -124,20 +135,24 @@ class Beginning:
 
 
 async def _serve(
-    talk: Talk, begin: Beginning, lines: Iterator[str] | None, *, plain: bool, as_json: bool
+    talk: Talk,
+    begin: Beginning,
+    lines: Iterator[str] | None,
+    display: Display | None,
+    *,
+    plain: bool,
 ) -> int:
     """Open the session and talk; what to exit with."""
-    console, service = Console(highlight=False), talk.service
+    service = talk.service
     talk.session = begin.open(service)
     try:
-        if lines is not None:
-            return await run_script(talk, lines, None if as_json else Display(talk.folder.path))
+        if lines is not None or display is None:
+            return await run_script(talk, lines or (), display)
         if plain:
-            display, ask = Display(talk.folder.path), ask_plainly
+            ask = ask_plainly
         else:
             from .chat_prompt import Prompt  # its library takes a while to load
 
-            display = Display(talk.folder.path, console, way_of_terminal(console))
             ask = Prompt(data_folder() / "history", talk.words).ask
         who = service.session(talk.session).agent.model.name
         display.line("session", f"{talk.session}, {who} decides; /help says what there is")
@@ -148,6 +163,12 @@ async def _serve(
         else:
             say(f"formup: formup chat --session {talk.session} goes on with this.", error=True)
         await service.close()
+
+
+def _display(*, plain: bool) -> Display:
+    """What shows a chat, in pictures too or in lines of text alone."""
+    console = None if plain else Console(highlight=False)
+    return Display(console, "none" if console is None else way_of_terminal(console))
 
 
 def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from PIL import Image
 from rich.console import Console
 
-from ..agent.messages import Message, Reply, Result, User
+from ..agent.messages import Message, Reply, Result
 from ..agent.report import Report
 from ..tools.draw.change import draw_small
 from .chat_lines import Shown
@@ -17,43 +17,68 @@ from .terminal_picture import Way, show_picture
 
 COLUMN = 14
 """Where texts begin."""
+NAMED = "{:>12}  "
 
 
 class Display:
     """Shows turns as they go.
 
     Args:
-        folder: of the files.
         console: for a person who sees; None for nothing but lines of text.
         way: how pictures are shown beside their files.
     """
 
-    def __init__(self, folder: Path, console: Console | None = None, way: Way = "none") -> None:
-        self._folder, self._console = folder, console
+    def __init__(self, console: Console | None, way: Way) -> None:
+        self._console = console
         self._way: Way = way
         self._last = 0.0
+        self._told, self._open = "", False  # of a reply that comes; whether its line goes on
+
+    def fragment(self, text: str | None) -> None:
+        """More of a reply's text as it comes; None: what was shown of it is void."""
+        if text is None:
+            if self._told:
+                self.line("note", "The reply broke off; it begins anew.")
+            self._told = ""
+            return
+        begins = not self._told
+        text = text.lstrip() if begins else text
+        if not text:
+            return
+        if self._console is None:
+            say(f"formup: {text}" if begins else text, end="")
+        else:
+            name = (NAMED.format("formup") if begins else "", "cyan")
+            self._console.print(styled(name, under(text, COLUMN)), end="", soft_wrap=True)
+        self._told, self._open = self._told + text, True
 
     def step(self, message: Message) -> None:
         """A message of a turn as it comes."""
         now, since = time.monotonic(), self._last
         self._last = now
-        if isinstance(message, User):
-            return
-        if isinstance(message, Reply) and message.calls and message.text.strip():
+        if isinstance(message, Reply) and not message.calls:
+            return  # `show` has what it says
+        told, self._told = self._told, ""
+        if isinstance(message, Reply) and message.text.strip() and not told:
             self.line("formup", message.text)
         elif isinstance(message, Result) and message.name != "ask_user":
             failed = f" ({message.error})" if message.error else ""
             self.line("step", f"{message.name}, {now - since:.2f} s{failed}")
 
-    def show(self, shown: Shown) -> None:
-        """What came of a line."""
+    def show(self, shown: Shown, folder: Path) -> None:
+        """What came of a line, with its files in that folder."""
         report = shown.report
-        status = "" if report.status == "answered" else f"{report.status}: "
+        told, self._told = self._told.rstrip(), ""
+        rest = report.message.strip().removeprefix(told).lstrip()
+        self._end_line()
+        status = "" if report.status == "answered" else report.status
+        head = f"{status}: " if status and rest else status
+        if told and not (head or rest):
+            return
         if self._console is None:
-            say(f"formup: {status}{report.message}")
+            say(f"formup: {head}{rest}")
         else:
-            head = (status, STATUS_STYLE[report.status])
-            self._console.print(styled(head, report.message))
+            self._console.print(styled((head, STATUS_STYLE[report.status]), rest))
         for choice in report.candidates or ():
             self.line("choice", choice_words(choice))
         if shown.changed and report.verdict is not None:
@@ -61,16 +86,22 @@ class Display:
                 self.line(name, text)
         files = report.files or {}
         if picture := files.get("picture"):
-            self._picture(shown, self._folder / picture)
+            self._picture(shown, folder / picture)
         if film := files.get("animation"):
-            self.line("film", str(self._folder / film))
+            self.line("film", str(folder / film))
 
     def line(self, name: str, text: str) -> None:
         """A text with its name before it."""
+        self._end_line()
         if self._console is None:
             say(f"{name}: {text}")
         else:
-            self._console.print(styled((f"{name:>12}  ", "cyan"), under(text, COLUMN)))
+            self._console.print(styled((NAMED.format(name), "cyan"), under(text, COLUMN)))
+
+    def _end_line(self) -> None:
+        if self._open:
+            say("")
+        self._open = False
 
     def _picture(self, shown: Shown, path: Path) -> None:
         if self._console is not None and self._way != "none":

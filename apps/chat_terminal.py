@@ -44,7 +44,7 @@ async def converse(talk: Talk, display: Display, ask: Ask) -> int:
             continue
         if shown is None:
             return INTERRUPTED
-        display.show(shown)
+        display.show(shown, talk.folder.path)
         if shown.ends:
             return 0
 
@@ -76,7 +76,7 @@ async def run_script(talk: Talk, lines: Iterable[str], display: Display | None) 
         if display is None:
             say(to_json({"turn": shown.turn, **shown.report.model_dump(mode="json")}).decode())
         else:
-            display.show(shown)
+            display.show(shown, talk.folder.path)
         if code or shown.ends:
             return code
     return 0

@@ -9,8 +9,9 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
+from ..agent.recording import LogRecorder
 from ..agent.report import Report, metric_data, target_data
-from ..agent.session import LogRecorder, load_run
+from ..agent.session import load_run
 from ..agent.store.folder import NAME, PICTURES, FolderArtefacts, FolderLog
 from ..tools.builtin.robots import drive_to
 from ..tools.context import Context, Settings
@@ -72,10 +73,10 @@ class Session:
         """A plan's world, with robots where the session left them."""
         return world if self.world is None else world.having(robots=self.world.robots)
 
-    def moving(self, plan_id: str) -> None:
+    async def moving(self, plan_id: str) -> None:
         """Write down that robots are about to move."""
         if self.world is not None:
-            self.recorder.moving(plan_id, self.world)
+            await self.recorder.moving(plan_id, self.world)
 
     def end(self, world: World) -> None:
         """Write down where robots are, and what was observed of a plan of the session."""
@@ -83,7 +84,7 @@ class Session:
             return
         known = {n: a for n, a in world.arrivals.items() if n in self.world.plans}
         arrivals = {**self.world.arrivals, **known}
-        self.recorder.world(self.world.having(robots=world.robots, arrivals=arrivals))
+        asyncio.run(self.recorder.world(self.world.having(robots=world.robots, arrivals=arrivals)))
 
 
 @contextmanager

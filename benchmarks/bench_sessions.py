@@ -3,6 +3,7 @@
 Turns are edits: a plan that moved a little, the call that asked for it, its result, what was said.
 """
 
+import asyncio
 import json
 import tempfile
 import time
@@ -16,7 +17,8 @@ from pydantic_core import to_json
 from ..agent.agent import Agent
 from ..agent.compaction import compacted
 from ..agent.messages import Call, History, Message, Reply, Result, Usage, User
-from ..agent.session import LogRecorder, Run, load_run, message_facts
+from ..agent.recording import LogRecorder, message_facts
+from ..agent.session import Run, load_run
 from ..agent.store.copies import fork, up_to_turn
 from ..agent.store.folder_store import FolderStore
 from ..agent.store.places import store_at
@@ -80,16 +82,24 @@ def long_session(turns: int, folder: Path) -> tuple[tuple[Event, ...], tuple[byt
     log = Listed(first.stored.events())
     files = files_named(log.written, first.stored.artefacts)
     recorder = LogRecorder(log, MemoryArtefacts(), first.world, None)
-    world, start = first.world, first.outcome.messages[0]
+    start = first.outcome.messages[0]
     assert isinstance(start, User)
+    settings = to_json_values(first.context.settings)
+    asyncio.run(written(recorder, first.world, start.text, settings, turns))
+    return tuple(log.written), files
+
+
+async def written(
+    recorder: LogRecorder, world: World, start: str, settings: Any, turns: int
+) -> None:
+    """Write the turns after the first."""
     for number in range(2, turns + 1):
         words = f"A bit further out than in turn {number - 1}"
-        recorder.event("turn", {"words": words, "settings": to_json_values(first.context.settings)})
+        await recorder.event("turn", {"words": words, "settings": settings})
         before, world = world, edited(world, number)
-        for message in said(number, words, start.text, world):
-            recorder.message(message, before if isinstance(message, User) else world)
-        recorder.event("end", ended(world))
-    return tuple(log.written), files
+        for message in said(number, words, start, world):
+            await recorder.message(message, before if isinstance(message, User) else world)
+        await recorder.end(world, ended(world))
 
 
 def edited(world: World, number: int) -> World:

@@ -113,7 +113,11 @@ async def _as_is(fleet: Fleet) -> Fleet:
 
 
 def _ignore(*what: object) -> None:
-    """Nobody keeps what a tool observes, or that robots move."""
+    """Nobody keeps what a tool observes."""
+
+
+async def _unrecorded(plan_id: str) -> None:
+    """Nobody keeps that robots move."""
 
 
 @dataclass
@@ -171,7 +175,7 @@ class Context:
         steps: those of the turns that changed the plan, after the one that undo ends at.
         observed: puts a world in place at once, because what it says was observed and holds even
             if the call fails or is cut off: measured things, poses of robots.
-        moving: is called with a plan's id before the first motion; raising prevents it.
+        moving: is awaited with a plan's id before the first motion; raising prevents it.
     """
 
     world: World
@@ -182,7 +186,7 @@ class Context:
     proposed: str | None = None
     steps: tuple[Step, ...] = ()
     observed: Callable[[World], None] = _ignore
-    moving: Callable[[str], None] = _ignore
+    moving: Callable[[str], Awaitable[None]] = _unrecorded
 
     @classmethod
     def of(

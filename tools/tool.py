@@ -13,7 +13,7 @@ import threading
 from collections.abc import Awaitable, Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_type_hints
+from typing import Any, Literal, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
@@ -22,6 +22,7 @@ from .errors import ArgumentsError
 from .schema import compact_schema, without_bounds
 from .world import World
 
+T = TypeVar("T")
 Kind = Literal["read", "commit", "actuate", "ask", "end"]
 """read: finds things out; commit: makes a plan; actuate: moves robots; ask: a person answers;
 end: gives up, which ends the turn."""
@@ -168,6 +169,26 @@ async def in_thread(work: Callable[[], Any]) -> Any:
     context = contextvars.copy_context()
     threading.Thread(target=context.run, args=(run,), name=THREAD, daemon=True).start()
     return await done
+
+
+async def to_its_end(work: Callable[[], T], *, last: bool = False) -> T:
+    """The result of work in a thread, such as a write, that is waited for in any case.
+
+    Being cancelled takes effect after it, so that what was done is what is known here.
+
+    Args:
+        last: nothing comes after it that could be cancelled.
+    """
+    job, task, cancelled = asyncio.ensure_future(in_thread(work)), asyncio.current_task(), False
+    while not job.done():
+        try:
+            await asyncio.wait([job])
+        except asyncio.CancelledError:
+            cancelled = True
+    if cancelled and not last and task is not None:
+        task.uncancel()
+        task.cancel()  # at whatever it waits for next
+    return job.result()
 
 
 def tool(kind: Kind) -> Callable[[ToolFunction], Tool]:

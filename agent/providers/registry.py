@@ -1,10 +1,9 @@
 """Models by name: who decides in a run."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from ...tools.errors import InputError
-from ..model import Model
+from ..model import Model, ShowText
 from ..offline.planner import OfflinePlanner
 
 PROVIDERS = ("openai", "openai-responses", "anthropic", "gemini", "ollama")
@@ -14,8 +13,7 @@ MODELS = ("offline", *(f"{provider}:NAME" for provider in PROVIDERS), "replay:FI
 def model_named(
     name: str,
     base_url: str | None = None,
-    *,
-    show: Callable[[str | None], None] | None = None,
+    show: ShowText | None = None,
 ) -> Model:
     """Look a model up.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ...tools.errors import ModelError
 from ..messages import Reply
-from ..model import Request
+from ..model import Request, ShowText
 from .anthropic import Anthropic
 from .endpoint import endpoint
 from .gemini import Gemini
@@ -16,7 +16,7 @@ from .openai_chat import OpenAIChat
 from .openai_responses import OpenAIResponses
 from .prices import UNKNOWN, Price, price_of
 from .transport import Sleep, Transport
-from .wire import Show, Wire
+from .wire import Wire
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class RemoteModel:
     """Whether it is given the picture."""
 
     def __init__(
-        self, name: str, wire: Wire, transport: Transport, show: Show | None = None
+        self, name: str, wire: Wire, transport: Transport, show: ShowText | None = None
     ) -> None:
         self.name = name
         self._wire, self._transport, self._show = wire, transport, show
@@ -119,7 +119,7 @@ def remote_model(
     model: str,
     base_url: str | None = None,
     *,
-    show: Show | None = None,
+    show: ShowText | None = None,
     sleep: Sleep = asyncio.sleep,
 ) -> RemoteModel:
     """A model of a provider, at its own address or another that speaks the same.

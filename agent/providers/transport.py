@@ -18,10 +18,10 @@ from pydantic_core import from_json
 
 from ...tools.errors import ModelError
 from ..messages import Reply
-from ..model import Request
+from ..model import Request, ShowText
 from .endpoint import Endpoint
 from .failures import AskError, of_error_body, of_status, unexpected
-from .wire import Assembly, Show, Wire
+from .wire import Assembly, Wire
 
 TRIES = 4
 FIRST_PAUSE = 0.5
@@ -64,7 +64,7 @@ class Transport:
         self._pools = WeakKeyDictionary()
 
     async def ask(
-        self, wire: Wire, request: Request, body: bytes, show: Show | None = None
+        self, wire: Wire, request: Request, body: bytes, show: ShowText | None = None
     ) -> Reply:
         """Send a request, whose body the wire has written, until it is answered.
 
@@ -110,7 +110,9 @@ class Transport:
             self._pools[loop] = pool
         return pool
 
-    async def _once(self, wire: Wire, request: Request, body: bytes, show: Show | None) -> Reply:
+    async def _once(
+        self, wire: Wire, request: Request, body: bytes, show: ShowText | None
+    ) -> Reply:
         post = httpx.Request(
             "POST", self._url, headers=self._headers, content=body, extensions=self._extensions
         )
@@ -124,7 +126,7 @@ class Transport:
             raise _network_failure(error) from None
 
     async def _read(
-        self, wire: Wire, request: Request, response: httpx.Response, show: Show | None
+        self, wire: Wire, request: Request, response: httpx.Response, show: ShowText | None
     ) -> Reply:
         if not response.is_success:
             body = await _whole_body(response)
@@ -138,7 +140,7 @@ class Transport:
         return Reply.model_validate(self._endpoint.masked(reply.model_dump()))
 
     async def _body(
-        self, response: httpx.Response, assembly: Assembly, show: Show | None
+        self, response: httpx.Response, assembly: Assembly, show: ShowText | None
     ) -> tuple[Any, bool]:
         """A complete body, a stream's or not whatever it is called, and whether text was shown."""
         events, plain, size, streamed, told = Events(), bytearray(), 0, False, False
@@ -171,7 +173,7 @@ class Transport:
                 assembly.add(event)
         return _ended(assembly) if listed else cast("Any", data)
 
-    def _take(self, events: list[bytes], assembly: Assembly, show: Show | None) -> bool:
+    def _take(self, events: list[bytes], assembly: Assembly, show: ShowText | None) -> bool:
         """Take the data of events in, and whether it brought text; an empty object says nothing."""
         told = False
         for event in events:

@@ -22,10 +22,6 @@ MOST_TOKENS = 10**12
 _JPEG = b"\xff\xd8"
 
 
-Show = Callable[[str | None], None]
-"""Given fragments of text as they come; None: what was shown of this reply is void."""
-
-
 class Assembly(Protocol):
     """Puts the events of a stream together to what would have come unstreamed."""
 

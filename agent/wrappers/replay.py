@@ -7,7 +7,8 @@ from typing import Any
 from ...tools.errors import ModelError
 from ..messages import Reply
 from ..model import Request
-from ..session import message_facts, model_name, prompt_name
+from ..recording import message_facts
+from ..session import model_name, prompt_name
 from ..session_start import read_session
 
 LONGEST = 120

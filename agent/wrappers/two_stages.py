@@ -13,7 +13,6 @@ from ...tools.errors import InputError
 from ...tools.tool import Tool
 from ..messages import History, Reply, Result, User, turn_of
 from ..model import Model, Request
-from ..providers.registry import model_named
 
 STANDARD = frozenset(tool.name for tool in TOOLS)
 
@@ -86,26 +85,21 @@ def prompt_named(library: PromptLibrary, name: str) -> Prompt:
 
 
 def staged(
-    looker: Model,
-    planner: str | Model,
-    base_url: str | None,
-    plan: str,
-    library: PromptLibrary,
+    looker: Model, planner: Model, plan: str, library: PromptLibrary
 ) -> tuple[TwoStages, tuple[Prompt, ...]]:
     """Two models as one, and their prompts.
 
     Raises:
-        InputError: an unknown model or prompt, or a model that reads no prompt.
+        InputError: an unknown prompt, or a model that reads none.
     """
-    second = model_named(planner, base_url) if isinstance(planner, str) else planner
-    blind = [m.name for m in (looker, second) if not getattr(m, "prompt", None)]
+    blind = [m.name for m in (looker, planner) if not getattr(m, "prompt", None)]
     if blind:
         raise InputError(
             f"{blind[0]} reads no prompt and cannot share the work: "
             "--model and --planner both take a language model, such as openai:NAME."
         )
     look, made, repair = (prompt_named(library, name) for name in ("context", plan, "repair"))
-    return TwoStages(looker, second, look=look, plan=made, repair=repair), (look, made, repair)
+    return TwoStages(looker, planner, look=look, plan=made, repair=repair), (look, made, repair)
 
 
 def measuring(messages: History) -> int | None:

@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections import defaultdict, deque
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
@@ -52,7 +52,8 @@ class Guard:
             self._check_place(scope["method"], headers)
             person = self._person(scope["path"], headers)
             scope.setdefault("state", {})["person"] = person
-            with self._counted(person):
+            counts = nullcontext() if scope["path"].startswith(OPEN) else self._counted(person)
+            with counts:
                 await self._app(scope, self._bounded(receive, headers), watched)
         except FormupError as error:
             if begun:

@@ -65,7 +65,7 @@ class Moves(Recorder):
     def __init__(self) -> None:
         self.plans: list[str] = []
 
-    def moving(self, plan_id: str, world: World) -> None:
+    async def moving(self, plan_id: str, world: World) -> None:
         self.plans.append(plan_id)
 
 

@@ -224,10 +224,10 @@ class Recorded(Recorder):
         self.given: list[tuple[Message, World]] = []
         self.moves: list[tuple[str, World]] = []
 
-    def message(self, message: Message, world: World) -> None:
+    async def message(self, message: Message, world: World) -> None:
         self.given.append((message, world))
 
-    def moving(self, plan_id: str, world: World) -> None:
+    async def moving(self, plan_id: str, world: World) -> None:
         self.moves.append((plan_id, world))
 
 

@@ -16,7 +16,7 @@ from formup.tools.context import Settings
 from formup.tools.errors import InputError
 from formup.tools.fleet.protocol import Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet
-from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.image import Picture, picture_from_array, picture_from_bytes
 from formup.tools.perception.target_prompt import TargetPrompt
 
 RED = (150.0, 130.0, 220.0, 190.0)
@@ -285,3 +285,17 @@ def test_ids_say_whose_a_conversation_is(tmp_path: Path, picture: Picture) -> No
     name = service.open(picture, owner="ann")
     assert name.startswith("ann-")
     assert asyncio.run(service.fresh(name)).run is None
+
+
+def test_a_picture_that_came_as_bytes_is_the_same_when_it_is_read_again(store: Store) -> None:
+    photo = Path(__file__).parents[2] / "evals/photos/images/us_coins.jpg"
+    sent = picture_from_bytes(photo.read_bytes(), "sent")
+
+    async def talk() -> None:
+        here, there = Service(Agent(), store), other(store)
+        name = here.open(sent, settings=Settings(robots=4))
+        assert (await there.fresh(name)).picture.sha256 == sent.sha256
+        await here.say(name, "Cage the largest coin")
+        assert (await there.fresh(here.fork(name))).picture.sha256 == sent.sha256
+
+    asyncio.run(talk())

@@ -1,6 +1,7 @@
 """`formup chat` with somebody at a terminal: a real process behind a real pseudo-terminal."""
 
 import fcntl
+import json
 import os
 import pty
 import re
@@ -11,9 +12,11 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -126,6 +129,61 @@ def silent() -> Iterator[tuple[str, threading.Event]]:
         threading.Thread(target=server.serve_forever, args=(0.01,)).start()
         yield f"http://127.0.0.1:{server.server_address[1]}/v1", asked
         over.set()
+        server.shutdown()
+
+
+class Speaker:
+    """A model's server that says replies a piece at a time; it waits at a None until told on.
+
+    Attributes:
+        replies: what is left to be said: pieces of text, and last perhaps a call of a tool. One
+            that ends in an exception is broken off.
+    """
+
+    def __init__(self, *replies: list[Any]) -> None:
+        self.replies, self.requests = list(replies), list[dict[str, Any]]()
+        self.go_on = threading.Semaphore(0)
+
+    def answer(self, request: dict[str, Any], write: Callable[[bytes], object]) -> None:
+        self.requests.append(request)
+        pieces = self.replies.pop(0)
+        calls: list[Any] = [piece for piece in pieces if isinstance(piece, dict)]
+        text = "".join(piece for piece in pieces if isinstance(piece, str))
+        if not request.get("stream"):
+            message = {"content": text, "tool_calls": calls}
+            write(json.dumps({"choices": [{"index": 0, "message": message}]}).encode())
+            return
+        for piece in pieces:
+            if piece is None:
+                assert self.go_on.acquire(timeout=PATIENCE)
+            elif isinstance(piece, Exception):
+                return
+            else:
+                delta = {"content": piece} if isinstance(piece, str) else {"tool_calls": [piece]}
+                event = {"choices": [{"index": 0, "delta": delta}]}
+                write(b"data: " + json.dumps(event).encode() + b"\n\n")
+        write(b"data: [DONE]\n\n")
+
+
+@contextmanager
+def speaking(speaker: Speaker) -> Generator[str]:
+    """The address of a server that says what the speaker does."""
+
+    class Speaking(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            request = json.loads(self.rfile.read(int(self.headers["content-length"])))
+            self.send_response(200)
+            kind = "text/event-stream" if request.get("stream") else "application/json"
+            self.send_header("content-type", kind)
+            self.end_headers()
+            speaker.answer(request, self.wfile.write)
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Say nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Speaking) as server:
+        threading.Thread(target=server.serve_forever, args=(0.01,)).start()
+        yield f"http://127.0.0.1:{server.server_address[1]}/v1"
         server.shutdown()
 
 
@@ -242,3 +300,86 @@ def test_plain_mode_is_nothing_but_lines(start: Start) -> None:
     assert b"\x1b" not in chat.raw
     assert "formup: planned: " in chat.seen
     assert not re.search("[\u2500-\u25ff\u2800-\u28ff]", chat.seen)
+
+
+PROPOSAL: dict[str, Any] = {
+    "contract": {"groups": [{"relation": "around", "targets": ["t1"], "robots": 5}]},
+    "targets": [{"id": "t1", "box": [55, 35, 125, 95]}],
+}
+CALL = {
+    "index": 0,
+    "id": "c1",
+    "type": "function",
+    "function": {"name": "propose_formation", "arguments": json.dumps(PROPOSAL)},
+}
+
+
+@pytest.mark.parametrize("options", [(), ("--plain",)], ids=["rich", "plain"])
+def test_a_reply_is_shown_while_it_comes_and_once(start: Start, options: tuple[str, ...]) -> None:
+    speaker = Speaker(
+        ["I look ", None, "at it\nnow.", CALL],
+        ["Five robots ", None, "have places."],
+        ["\nYou are ", None, "welcome."],
+    )
+    with speaking(speaker) as address:
+        chat = start("--model", "openai:any", "--base-url", address, *options)
+        chat.wait("you:")
+        chat.type(f"{SURROUND}\r")
+        for first, rest in (("I look ", "at it"), ("Five robots ", "have places.")):
+            chat.wait(first)
+            speaker.go_on.release()
+            chat.wait(rest)
+        chat.wait("planned\n")
+        chat.wait("plan-1.png")
+        chat.wait("you:")
+        chat.type("Thanks\r")
+        chat.wait("You are ")
+        speaker.go_on.release()
+        chat.wait("welcome.\n")
+        chat.wait("you:")
+        chat.type("/quit\r")
+        assert chat.end() == 0
+    for said in ("I look at it", "Five robots have places.\n", "You are welcome.\n"):
+        assert chat.seen.count(said) == 1
+    for last in ("now.", "places.", "welcome."):
+        assert chat.seen.count(last) == 1
+    assert "\nnow.\n" in chat.seen if options else "\n              now.\n" in chat.seen
+    assert [r["stream"] for r in speaker.requests] == [True] * 3
+
+
+def test_a_reply_that_broke_off_is_told_anew(start: Start) -> None:
+    speaker = Speaker(["Hello ", ConnectionError()], ["Good morning."])
+    with speaking(speaker) as address:
+        chat = start("--plain", "--model", "openai:any", "--base-url", address)
+        chat.wait("you:")
+        chat.type("Hi\r")
+        chat.wait("formup: Hello \nnote: The reply broke off; it begins anew.\n")
+        chat.wait("formup: Good morning.\n")
+        chat.wait("you:")
+        chat.type("\x04")
+        assert chat.end() == 0
+
+
+def test_a_turn_stopped_in_the_middle_of_a_reply(start: Start) -> None:
+    speaker = Speaker(["I begin", None])
+    with speaking(speaker) as address:
+        chat = start("--plain", "--model", "openai:any", "--base-url", address)
+        chat.wait("you:")
+        chat.type("Hi\r")
+        chat.wait("I begin")
+        chat.type("\x03")
+        chat.wait("\nformup: stopped: ")
+        speaker.go_on.release()
+        chat.wait("you:")
+        chat.type("\x04")
+        assert chat.end() == 0
+
+
+def test_scripts_are_told_whole_replies(start: Start, tmp_path: Path) -> None:
+    (tmp_path / "talk.txt").write_text("Hi")
+    speaker = Speaker(["Hello."])
+    with speaking(speaker) as address:
+        chat = start("--script", "talk.txt", "--model", "openai:any", "--base-url", address)
+        assert chat.end() == 0
+    assert "stream" not in speaker.requests[0]
+    assert chat.seen.count("Hello.") == 1

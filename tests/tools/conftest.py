@@ -40,7 +40,7 @@ class ToolCalls:
         changed = self.context.settings.model_copy(update=settings)
         self.context = replace(self.context, settings=changed).check()
 
-    def _moving(self, plan_id: str) -> None:
+    async def _moving(self, plan_id: str) -> None:
         self.moved.append(plan_id)
 
     async def acall(self, name: str, **arguments: Any) -> ToolResult:

@@ -30,7 +30,7 @@ from ..formation.plan import Plan
 from ..formation.site import Other
 from ..geometry.outline import FloatArray
 from ..motion.motion import obstacles
-from ..tool import in_thread
+from ..tool import in_thread, to_its_end
 from ..world import PlanNode, World
 from .others import met_by
 
@@ -141,7 +141,8 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bo
         raise ToolError(str(error)) from None
     arrival = _in_robot_order(made.arrival, plan)
     with suppress(StorageError):  # a film is not worth failing for
-        stored = context.services.artefacts.put(_track_file(made.track))
+        file, put = _track_file(made.track), context.services.artefacts.put
+        stored = await to_its_end(lambda: put(file))
         arrival = arrival.model_copy(update={"track": stored})
     world = world.having(robots=made.poses).with_arrival(plan.id, arrival)
     if arrival.reason is not None:

@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import aclosing, suppress
 from dataclasses import dataclass
 from typing import Literal
@@ -142,7 +142,7 @@ async def deploy(
     robots: Sequence[str],
     *,
     watch: Watch = lambda poses: None,
-    starting: Callable[[], None] = lambda: None,
+    starting: Callable[[], Awaitable[None]] | None = None,
 ) -> Deployment:
     """Move robots onto a plan that is certified here and now, observe, correct, and report.
 
@@ -154,7 +154,7 @@ async def deploy(
         robots: ids; robot i takes place i.
         watch: is called with the poses of the whole fleet whenever they have been observed; last,
             also after a failure or before CancelledError goes on, with where they ended.
-        starting: is called right before the first motion; raising prevents it.
+        starting: is awaited right before the first motion; raising prevents it.
 
     Raises:
         ToolError: the plan does not certify. Here and below nothing was moved.
@@ -235,7 +235,7 @@ class _Drive:
         self._frames: list[FloatArray] = []
         self._stride, self._seen = 1, 0
 
-    async def run(self, starting: Callable[[], None]) -> Deployment:
+    async def run(self, starting: Callable[[], Awaitable[None]] | None) -> Deployment:
         if len(set(self._robots)) != len(self._goals):
             raise FleetSizeError(
                 f"{len(set(self._robots))} robots are named; the plan has {len(self._goals)} "
@@ -248,7 +248,8 @@ class _Drive:
         await self._observe()
         self._check_idle()
         corrections, motion = 0, self._motion()
-        starting()
+        if starting is not None:
+            await starting()
         try:
             await self._drive(motion)
             while not self._arrived() and not self._fleet.stopped and corrections < CORRECTIONS:

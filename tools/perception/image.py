@@ -66,6 +66,7 @@ class Picture:
     name: file name, for messages.
     notes: what a person should know of how the pixels came about; often empty.
     path: absolute, of the file it was loaded from; None where it came from none.
+    file: the content of the file, where it has no path.
     """
 
     pixels: NDArray[np.uint8]
@@ -73,6 +74,7 @@ class Picture:
     name: str
     notes: tuple[str, ...]
     path: Path | None = None
+    file: bytes | None = None
 
     @property
     def width(self) -> int:
@@ -101,7 +103,8 @@ def load_picture(path: str | os.PathLike[str]) -> Picture:
         data = _file_bytes(Path(path), shown)
     except (OSError, ValueError) as error:
         raise _unreadable(shown, error) from None
-    return replace(picture_from_bytes(data, Path(path).name), path=Path(path).resolve())
+    picture = picture_from_bytes(data, Path(path).name)
+    return replace(picture, path=Path(path).resolve(), file=None)
 
 
 def picture_from_bytes(data: bytes, name: str) -> Picture:
@@ -118,7 +121,7 @@ def picture_from_bytes(data: bytes, name: str) -> Picture:
         raise _empty(name)
     _check_bytes(name, len(data))
     pixels, notes = _decode(data, name)
-    return Picture(pixels, hashlib.sha256(data).hexdigest(), name, notes)
+    return Picture(pixels, hashlib.sha256(data).hexdigest(), name, notes, file=data)
 
 
 def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Picture:
@@ -149,6 +152,8 @@ def picture_file(picture: Picture) -> bytes:
             data = _file_bytes(picture.path, picture.name)
             if hashlib.sha256(data).hexdigest() == picture.sha256:
                 return data
+    if picture.file is not None:
+        return picture.file
     file = BytesIO()
     Image.fromarray(picture.pixels).save(file, "PNG")
     return file.getvalue()

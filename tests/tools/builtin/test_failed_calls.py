@@ -154,7 +154,7 @@ def test_a_deployment_that_is_cancelled_leaves_where_they_stopped(work: "ToolCal
 def test_nothing_moves_if_it_cannot_be_written_down_that_it_will(work: "ToolCalls") -> None:
     plan = propose(work, 6)
 
-    def full(plan_id: str) -> None:
+    async def full(plan_id: str) -> None:
         raise InputError(f"The disk is full: {plan_id}.")
 
     work.context = replace(work.context, moving=full)
