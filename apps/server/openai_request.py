@@ -172,7 +172,7 @@ def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
         who=f"{body.user or ''} {headers.get('x-openwebui-user-id', '')}",
         system="\n".join(m.text for m in messages if m.role in ("system", "developer")),
         task=facts.get("task", ""),
-        as_json="json" in (body.response_format or {}).get("type", ""),
+        as_json="json" in str((body.response_format or {}).get("type")),
     )
 
 

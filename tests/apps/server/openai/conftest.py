@@ -1,18 +1,12 @@
 import base64
-import threading
 from collections.abc import Callable, Generator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
-import uvicorn
-from formup.agent.agent import Agent
-from formup.agent.service import Service
-from formup.agent.store.folder_store import FolderStore
-from formup.apps.server.app import make_app
-from formup.apps.server.settings import ServerSettings
-from formup.apps.server.tokens import Tokens
+from formup.agent.store.places import store_at
+from formup.agent.store.protocol import Store
 from openai import OpenAI
 from openai.types.chat import ChatCompletion
 
@@ -25,42 +19,20 @@ def data_url(name: str) -> str:
     return f"data:image/{kind};base64,{base64.b64encode((PHOTOS / name).read_bytes()).decode()}"
 
 
-@contextmanager
-def served(service: Service, settings: ServerSettings, tokens: Tokens) -> Generator[str]:
-    """A real server on loopback; its address."""
-    app = make_app(service, settings, tokens)
-    server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning"))
-    listening = threading.Event()
-    startup = server.startup
+@pytest.fixture
+def serve(serve: Callable[..., Any]) -> Serve:
+    """Begins a server beside those there are, on the same store; its address."""
 
-    async def started(*given: Any, **named: Any) -> None:
-        await startup(*given, **named)
-        listening.set()
+    def begin(agent: Any = None, tokens: Path | None = None, **settings: Any) -> str:
+        return serve(agent, tokens, **settings).url
 
-    server.startup = started
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    try:
-        assert listening.wait(30)
-        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    finally:
-        server.should_exit = True
-        thread.join()
+    return begin
 
 
 @pytest.fixture
-def serve(tmp_path: Path) -> Generator[Serve]:
-    """Begins a server on one store; the one before ends, as when it is begun anew."""
-    stack = ExitStack()
-
-    def begin(agent: Agent | None = None, tokens: Tokens | None = None, **settings: Any) -> str:
-        stack.close()
-        service = Service(agent or Agent(), FolderStore(tmp_path / "store"))
-        made = ServerSettings(**settings)
-        return stack.enter_context(served(service, made, tokens or Tokens(None)))
-
-    with stack:
-        yield begin
+def store(tmp_path: Path) -> Store:
+    """What servers keep sessions in."""
+    return store_at(f"sqlite:///{tmp_path}/s.db")
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from formup.agent.store.folder_store import FolderStore
+from formup.agent.store.protocol import Store
 
 RECORDED = json.loads((Path(__file__).parent / "recorded" / "chores.json").read_text("utf-8"))
 CAGE = "Cage the largest coin with 10 robots"
@@ -32,7 +32,7 @@ def told(openai: Any, body: dict[str, Any]) -> str:
 
 
 def test_recorded_chores_are_answered_without_a_turn(
-    serve: Callable[..., str], client: Any, tmp_path: Path
+    serve: Callable[..., str], client: Any, store: Store
 ) -> None:
     openai = client(serve())
     for record in RECORDED:
@@ -40,10 +40,10 @@ def test_recorded_chores_are_answered_without_a_turn(
         wanted = record["answer"]
         read = answer if isinstance(wanted, str) else json.loads(answer)
         assert read == wanted, f"{record['client']}: {record['chore']}"
-    assert FolderStore(tmp_path / "store").sessions() == ()
+    assert store.sessions() == ()
 
 
-def test_chores_leave_a_session_alone(serve: Callable[..., str], chat: Any, tmp_path: Path) -> None:
+def test_chores_leave_a_session_alone(serve: Callable[..., str], chat: Any, store: Store) -> None:
     talk = chat(serve())
     talk.say(CAGE, "us_coins.jpg")
     for record in RECORDED:
@@ -55,7 +55,7 @@ def test_chores_leave_a_session_alone(serve: Callable[..., str], chat: Any, tmp_
                 "metadata": {"task": "x", "chat_id": "c"},
             },
         )
-    (facts,) = FolderStore(tmp_path / "store").sessions()
+    (facts,) = store.sessions()
     assert facts.turns == 1
     assert "certified" in talk.say("a bit further out")
 

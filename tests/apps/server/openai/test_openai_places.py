@@ -4,13 +4,12 @@ import asyncio
 import re
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.messages import Reply
-from formup.agent.store.folder_store import FolderStore
+from formup.agent.store.protocol import Store
 from formup.apps.server import openai_places
 from openai import NotFoundError
 
@@ -23,9 +22,8 @@ def session_of(answer: str) -> str:
     return re.findall(r"/v1/pictures/([\w-]+)/", answer)[-1]
 
 
-def turns(folder: Path) -> dict[str, list[str]]:
+def turns(store: Store) -> dict[str, list[str]]:
     """What was said in each session."""
-    store = FolderStore(folder / "store")
     return {
         s.id: [e.data["words"] for e in store.open(s.id).events() if e.kind == "turn"]
         for s in store.sessions()
@@ -33,7 +31,7 @@ def turns(folder: Path) -> dict[str, list[str]]:
 
 
 def test_the_same_request_is_done_once_even_by_another_process(
-    serve: Serve, chat: Any, tmp_path: Path
+    serve: Serve, chat: Any, store: Store
 ) -> None:
     url = serve()
     talk = chat(url)
@@ -46,11 +44,11 @@ def test_the_same_request_is_done_once_even_by_another_process(
             again = chat(url, messages=talk.messages[:count])
             assert OURS.sub("", again.again()) == OURS.sub("", answer)
             assert session_of(again.messages[-1]["content"]) == session_of(first)
-    assert turns(tmp_path) == {session_of(first): [CAGE, "a bit further out", "go"]}
+    assert turns(store) == {session_of(first): [CAGE, "a bit further out", "go"]}
 
 
 def test_a_first_message_is_another_session_after_a_while(
-    serve: Serve, chat: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    serve: Serve, chat: Any, store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     url = serve()
     first = chat(url).say(CAGE, "us_coins.jpg")
@@ -58,12 +56,10 @@ def test_a_first_message_is_another_session_after_a_while(
     assert session_of(chat(url).say(CAGE, "us_coins.jpg", user="bob")) != session_of(first)
     monkeypatch.setattr(openai_places, "SAME", openai_places.SAME * 0)
     assert session_of(chat(url).say(CAGE, "us_coins.jpg")) != session_of(first)
-    assert len(turns(tmp_path)) == 3
+    assert len(turns(store)) == 3
 
 
-def test_the_same_message_twice_at_once_is_one_turn(
-    serve: Serve, chat: Any, tmp_path: Path
-) -> None:
+def test_the_same_message_twice_at_once_is_one_turn(serve: Serve, chat: Any, store: Store) -> None:
     url = serve()
     talks = [chat(url) for _ in range(4)]
     threads = [threading.Thread(target=t.say, args=(CAGE, "us_coins.jpg")) for t in talks]
@@ -71,11 +67,11 @@ def test_the_same_message_twice_at_once_is_one_turn(
         thread.start()
     for thread in threads:
         thread.join()
-    assert [*turns(tmp_path).values()] == [[CAGE]]
+    assert [*turns(store).values()] == [[CAGE]]
     assert len({t.messages[-1]["content"] for t in talks}) == 1
 
 
-def test_an_edited_message_goes_on_in_a_fork(serve: Serve, chat: Any, tmp_path: Path) -> None:
+def test_an_edited_message_goes_on_in_a_fork(serve: Serve, chat: Any, store: Store) -> None:
     url = serve()
     talk = chat(url)
     first = talk.say(CAGE, "us_coins.jpg")
@@ -87,14 +83,14 @@ def test_an_edited_message_goes_on_in_a_fork(serve: Serve, chat: Any, tmp_path: 
     assert again.again() == closer, "sent again, it is the same fork"
     edited.say("undo")
     talk.say("undo")
-    assert sorted(turns(tmp_path).values()) == [
+    assert sorted(turns(store).values()) == [
         [CAGE, "a bit closer", "undo"],
         [CAGE, "a bit further out", "undo"],
     ]
 
 
 def test_another_answer_to_a_question_forks_at_the_question(
-    serve: Serve, chat: Any, tmp_path: Path
+    serve: Serve, chat: Any, store: Store
 ) -> None:
     url = serve()
     talk = chat(url)
@@ -110,7 +106,7 @@ def test_another_answer_to_a_question_forks_at_the_question(
 
 
 def test_what_was_said_while_the_answer_was_lost_is_not_said_again(
-    serve: Serve, chat: Any, tmp_path: Path
+    serve: Serve, chat: Any, store: Store
 ) -> None:
     """The client cut the stream of "go", and keeps it in its history without an answer."""
     talk = chat(serve())
@@ -118,11 +114,11 @@ def test_what_was_said_while_the_answer_was_lost_is_not_said_again(
     talk.say("go")
     del talk.messages[-1]
     assert "all stand at their places" in talk.say("are they there?")
-    assert turns(tmp_path) == {session: [CAGE, "go", "are they there?"]}
+    assert turns(store) == {session: [CAGE, "go", "are they there?"]}
 
 
 def test_histories_without_our_addresses_are_known_by_what_was_said(
-    serve: Serve, chat: Any, tmp_path: Path
+    serve: Serve, chat: Any, store: Store
 ) -> None:
     def stripped(talk: Any) -> None:
         for message in talk.messages:
@@ -134,15 +130,15 @@ def test_histories_without_our_addresses_are_known_by_what_was_said(
     for words in ("a bit further out", "a bit further out", "go"):
         stripped(talk)
         assert session_of(talk.say(words)) == session
-    assert turns(tmp_path) == {session: [CAGE, "a bit further out", "a bit further out", "go"]}
+    assert turns(store) == {session: [CAGE, "a bit further out", "a bit further out", "go"]}
     stripped(talk)
     talk.messages[2:] = [{"role": "user", "content": "a bit closer"}]
     talk.again()
-    assert turns(tmp_path)[session_of(talk.messages[-1]["content"])] == [CAGE, "a bit closer"]
+    assert turns(store)[session_of(talk.messages[-1]["content"])] == [CAGE, "a bit closer"]
 
 
 @pytest.mark.parametrize("how", ["header", "metadata", "X-OpenWebUI-Chat-Id"])
-def test_a_client_may_name_its_chat(serve: Serve, chat: Any, tmp_path: Path, how: str) -> None:
+def test_a_client_may_name_its_chat(serve: Serve, chat: Any, store: Store, how: str) -> None:
     talk = chat(serve())
     named: dict[str, Any] = {"extra_headers": {how: "chat-7"}}
     if how == "metadata":
@@ -153,7 +149,7 @@ def test_a_client_may_name_its_chat(serve: Serve, chat: Any, tmp_path: Path, how
     for words in ("a bit further out", "a bit further out"):
         talk.messages.clear()  # a client that sends nothing but the last message
         assert session_of(talk.say(words, **named)) == session
-    assert turns(tmp_path) == {session: [CAGE, "a bit further out", "a bit further out"]}
+    assert turns(store) == {session: [CAGE, "a bit further out", "a bit further out"]}
     if how != "header":
         talk.messages.clear()
         assert (
@@ -162,16 +158,16 @@ def test_a_client_may_name_its_chat(serve: Serve, chat: Any, tmp_path: Path, how
         )
 
 
-def test_a_session_that_was_deleted_is_told(serve: Serve, chat: Any, tmp_path: Path) -> None:
+def test_a_session_that_was_deleted_is_told(serve: Serve, chat: Any, store: Store) -> None:
     talk = chat(serve())
     session = session_of(talk.say(CAGE, "us_coins.jpg"))
-    FolderStore(tmp_path / "store").delete(session)
+    store.delete(session)
     with pytest.raises(NotFoundError, match="not there any more; begin a new chat"):
         talk.say("a bit further out")
 
 
 def test_a_turn_goes_on_when_its_client_has_gone(
-    serve: Serve, chat: Any, sent: Any, tmp_path: Path
+    serve: Serve, chat: Any, sent: Any, store: Store
 ) -> None:
     asked, answered = threading.Event(), threading.Event()
 
@@ -194,4 +190,4 @@ def test_a_turn_goes_on_when_its_client_has_gone(
     stream.close()
     answered.set()
     assert "Nothing to do." in chat(url, messages=talk.messages).again()
-    assert [*turns(tmp_path).values()] == [[CAGE]]
+    assert [*turns(store).values()] == [[CAGE]]

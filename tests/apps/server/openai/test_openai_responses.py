@@ -2,13 +2,12 @@
 
 import asyncio
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.messages import Reply
-from formup.agent.store.folder_store import FolderStore
+from formup.agent.store.protocol import Store
 from openai import NotFoundError, UnprocessableEntityError
 from openai.types.responses import Response, ResponseStreamEvent
 from pydantic import TypeAdapter
@@ -42,7 +41,7 @@ def checked(response: Response) -> Response:
 
 
 def test_responses_follow_each_other(
-    serve: Serve, client: Any, caged: list[Any], tmp_path: Path
+    serve: Serve, client: Any, caged: list[Any], store: Store
 ) -> None:
     openai = client(serve())
     first = checked(openai.responses.create(model="formup", input=caged, store=True))
@@ -63,7 +62,7 @@ def test_responses_follow_each_other(
         openai.responses.create(model="formup", input="a bit closer", previous_response_id=first.id)
     )
     assert other.id.split("_")[1] != first.id.split("_")[1], "a fork"
-    assert sorted(s.turns for s in FolderStore(tmp_path / "store").sessions()) == [2, 3]
+    assert sorted(s.turns for s in store.sessions()) == [2, 3]
 
 
 def test_events_come_in_their_order(serve: Serve, client: Any, caged: list[Any]) -> None:
