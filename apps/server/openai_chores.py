@@ -11,8 +11,15 @@ from pydantic_core import to_json
 
 from .openai_request import Said
 
-BEGINS = re.compile(r"\s*#+ *\**task\b", re.I)
-TOOL_CHOICE = "return the correct tool(s) from the list of available tools"
+TASK = re.compile(r"\w+_generation|function_calling")
+"""How Open WebUI names chores, where it does."""
+KNOWN = re.compile(
+    r"\s*#+ *\**task\b|.*<chat_history>"
+    r"|.*return the correct tool\(s\) from the list of available tools"
+    r"|your task is to reflect the speaker's likely facial expression"
+    r"|you have been provided with a set of responses from various models",
+    re.I | re.S,
+)
 SIGNS = (
     re.compile(r"\b(title|name|tags?|summar\w+|follow.?ups?|suggest\w*|quer(y|ies)|emoji)\b", re.I),
     re.compile(r"\b(conversation|chat|discussion|dialog(ue)?)\b", re.I),
@@ -47,16 +54,11 @@ NOTHING = (
 
 def chore(said: Said) -> str | None:
     """The answer to a chore; None for what a person says."""
-    text = said.last.text
-    if said.last.pictures and not said.task:
+    text, system = said.last.text, said.system
+    told = text if _tells(text, None) else system if _tells(system, HEAD) else ""
+    if not told and not TASK.fullmatch(said.task):
         return None
-    tells = any(
-        BEGINS.match(t) or all(sign.search(t) for sign in SIGNS) or TOOL_CHOICE in t
-        for t in (text, said.system[:HEAD])
-    )
-    if not (said.task or tells or "<chat_history>" in text):
-        return None
-    asked = HISTORY.split(f"{said.task}\n{said.system[:HEAD]}\n{text}", maxsplit=1)[0]
+    asked = HISTORY.split(f"{said.task}\n{told or text}", maxsplit=1)[0]
     for pattern, name, value in KINDS:
         if re.search(pattern, asked, re.I):
             return to_json({name: value}).decode()
@@ -67,6 +69,11 @@ def chore(said: Said) -> str | None:
     if "emoji" in asked.lower():
         return "🤖"
     return "{}" if as_json else NOTHING
+
+
+def _tells(text: str, head: int | None) -> bool:
+    """Whether a text is that of a chore, by its very words or by all signs in its beginning."""
+    return bool(KNOWN.match(text)) or all(sign.search(text[:head]) for sign in SIGNS)
 
 
 def _title(said: Said) -> str:

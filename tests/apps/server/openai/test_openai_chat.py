@@ -270,6 +270,7 @@ def test_a_failure_in_the_middle_never_passes_for_the_answer(
     body["messages"][0]["content"][0]["text"] = "Surround the largest coin with 5 robots"
     with openai.chat.completions.with_streaming_response.create(**body, stream=True) as raw:
         lines = [line for line in raw.iter_lines() if line]
+    assert ": at it" in lines, "a sign of life"
     assert '"finish_reason":"length"' in lines[-2]
     assert "secret" not in "".join(lines)
     assert lines[-1] == "data: [DONE]"

@@ -21,6 +21,7 @@ ORDERS = (
     "Name the coins",
     "Suggest something",
     "Surround the tag with 5 robots",
+    "Your task is to surround the coin with 5 robots",
 )
 
 
@@ -47,14 +48,10 @@ def test_chores_leave_a_session_alone(serve: Callable[..., str], chat: Any, stor
     talk = chat(serve())
     talk.say(CAGE, "us_coins.jpg")
     for record in RECORDED:
-        told(
-            talk.client,
-            {
-                **record["body"],
-                "messages": [*talk.messages, record["body"]["messages"][-1]],
-                "metadata": {"task": "x", "chat_id": "c"},
-            },
-        )
+        # As Open WebUI sends it, with the whole history and without saying that it is a chore.
+        messages = [*talk.messages, *record["body"]["messages"][-2:]]
+        body = {k: v for k, v in record["body"].items() if k != "metadata"}
+        told(talk.client, {**body, "messages": messages})
     (facts,) = store.sessions()
     assert facts.turns == 1
     assert "certified" in talk.say("a bit further out")
@@ -69,5 +66,6 @@ def test_what_a_person_says_is_no_chore(
         messages: list[Any] = [{"role": "user", "content": words}]
         if system:
             messages.insert(0, {"role": "system", "content": system})
-        answer = told(openai, {"model": "formup", "messages": messages})
+        named = {"task": "cage", "chat_id": ""}
+        answer = told(openai, {"model": "formup", "messages": messages, "metadata": named})
         assert "I need a picture" in answer, words
