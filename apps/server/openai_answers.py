@@ -67,14 +67,9 @@ class Answer:
     place: Place | None = None
     usage: Totals = field(default_factory=Totals)
 
-    async def beats(self) -> AsyncGenerator[None]:
-        """None: it is there."""
-        for _ in ():
-            yield
-
-    async def end(self) -> "Answer":
-        """Itself."""
-        return self
+    async def told(self) -> AsyncGenerator["Answer"]:
+        """Itself, at once."""
+        yield self
 
 
 @dataclass(frozen=True)
@@ -90,29 +85,29 @@ class Begun:
         """Where it is."""
         return Place(self.session, self.turn.number)
 
-    async def beats(self) -> AsyncGenerator[None]:
-        """Signs of life until its end, or until robots have driven for long."""
+    async def told(self) -> AsyncGenerator[Answer | None]:
+        """What came of it, or that robots drive for long; before that None, as signs of life.
+
+        Raises:
+            FormupError: nothing; it says why.
+        """
         moves = None
         while not self.turn.task.done():
             if self.turn.moving.is_set():
                 moves = moves or time.monotonic()
                 if time.monotonic() - moves >= DRIVING:
+                    yield _at_once(ON_THE_WAY, self.base, self.place)
                     return
-            yield
+            yield None
             await asyncio.wait({self.turn.task}, timeout=BEAT)
-
-    async def end(self) -> Answer:
-        """What came of it.
-
-        Raises:
-            FormupError: nothing; it says why.
-        """
-        async for _ in self.beats():
-            pass
-        if not self.turn.task.done():
-            return _at_once(ON_THE_WAY, self.base, self.place)
         run = await self.turn.ended()
-        return Answer(CUT_OFF) if run is None else await told(self.place, run, self.base)
+        yield Answer(CUT_OFF) if run is None else await told(self.place, run, self.base)
+
+
+async def awaited(begun: Answer | Begun) -> Answer:
+    """What there is to tell, once it is there."""
+    answers = [answer async for answer in begun.told() if answer is not None]
+    return answers[-1]
 
 
 def problem(error: Exception) -> str:

@@ -13,7 +13,7 @@ from pydantic_core import to_json
 from ...agent.report import Totals
 from ...tools.errors import InputError
 from .hub import AHub, APerson, error_data
-from .openai_answers import Answer, Begun, agents, base_of, begin, problem
+from .openai_answers import Answer, Begun, agents, awaited, base_of, begin, problem
 from .openai_request import ChatBody, said_in
 from .sessions import ERRORS
 
@@ -45,7 +45,7 @@ async def complete(body: ChatBody, request: Request, hub: AHub, person: APerson)
     if body.stream:
         usage = bool((body.stream_options or {}).get("include_usage"))
         return StreamingResponse(_chunks(begun, facts, usage), 200, STREAM, "text/event-stream")
-    answer = await begun.end()
+    answer = await awaited(begun)
     message = {"role": "assistant", "content": answer.text}
     choice = {"index": 0, "message": message, "finish_reason": "stop"}
     whole = {"object": "chat.completion", "choices": [choice], "usage": _usage(answer.usage)}
@@ -79,23 +79,26 @@ async def _chunks(
 ) -> AsyncGenerator[bytes]:
     """An answer as it comes."""
 
-    def chunk(delta: dict[str, Any], end: str | None = None) -> bytes:
-        choice = {"index": 0, "delta": delta, "finish_reason": end}
-        return frame({**facts, "object": "chat.completion.chunk", "choices": [choice]})
+    def chunk(*choices: Any, **more: Any) -> bytes:
+        kind = {"object": "chat.completion.chunk", "choices": choices}
+        return frame({**facts, **kind, **more})
 
-    yield chunk({"role": "assistant", "content": ""})
+    def part(delta: dict[str, str], end: str | None = None) -> bytes:
+        return chunk({"index": 0, "delta": delta, "finish_reason": end})
+
+    yield part({"role": "assistant", "content": ""})
     try:
-        async for _ in begun.beats():
-            yield b": at it\n\n"
-        answer = await begun.end()
-        yield chunk({"content": answer.text})
-        yield chunk({}, "stop")
-        if usage:
-            used = _usage(answer.usage)
-            yield frame({**facts, "object": "chat.completion.chunk", "choices": [], "usage": used})
+        async for answer in begun.told():
+            if answer is None:
+                yield b": at it\n\n"
+                continue
+            yield part({"content": answer.text})
+            yield part({}, "stop")
+            if usage:
+                yield chunk(usage=_usage(answer.usage))
     except Exception as error:
         yield frame(error_data(problem(error), None, "server_error"))
-        yield chunk({}, "length")
+        yield part({}, "length")
     yield b"data: [DONE]\n\n"
 
 

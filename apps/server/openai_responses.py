@@ -10,7 +10,7 @@ from fastapi.responses import JSONResponse, StreamingResponse
 
 from ...tools.errors import InputError
 from .hub import AHub, APerson, check_owner
-from .openai_answers import USUAL, Answer, Begun, base_of, begin, problem, told
+from .openai_answers import USUAL, Answer, Begun, awaited, base_of, begin, problem, told
 from .openai_chat import STREAM, frame
 from .openai_places import run_at
 from .openai_request import ResponsesBody, place_of, said_in
@@ -27,7 +27,7 @@ async def respond(body: ResponsesBody, request: Request, hub: AHub, person: APer
     facts = _response(begun, body.model) | {"previous_response_id": body.previous_response_id}
     if body.stream:
         return StreamingResponse(_events(begun, facts), 200, STREAM, "text/event-stream")
-    return JSONResponse(_completed(await begun.end(), facts))
+    return JSONResponse(_completed(await awaited(begun), facts))
 
 
 @router.get("/responses/{response}")
@@ -56,14 +56,16 @@ async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerato
     at = {"output_index": 0, "content_index": 0, "item_id": item}
     yield event("response.created", response=facts)
     yield event("response.in_progress", response=facts)
+    answer = None
     try:
-        async for _ in begun.beats():
-            yield b": at it\n\n"
-        answer = await begun.end()
+        async for answer in begun.told():
+            if answer is None:
+                yield b": at it\n\n"
     except Exception as error:
         why = {"code": "server_error", "message": problem(error)}
         yield event("error", **why, param=None)
         yield event("response.failed", response={**facts, "status": "failed", "error": why})
+    if answer is None:
         return
     text = answer.text
     yield event("response.output_item.added", output_index=0, item=_message(item))

@@ -138,31 +138,33 @@ def test_a_picture_with_later_words_is_another_picture(
     assert len(said_in(store)) == 5
 
 
-IMAGE = {"type": "image_url", "image_url": {"url": "data:image/png;base64,AAAA"}}
+def image(address: str) -> dict[str, Any]:
+    return {"type": "image_url", "image_url": {"url": address}}
 
 
-@pytest.mark.parametrize(
-    ("content", "options", "why"),
-    [
-        ([{"type": "image_url", "image_url": {"url": "http://x.test/a.png"}}], {}, "is fetched"),
-        ([{"type": "image_url", "image_url": {"url": "file:///etc/passwd"}}], {}, "is fetched"),
-        ([{"type": "image_url", "image_url": {"url": "data:image/png;base64,?"}}], {}, "base64"),
-        ([IMAGE], {}, "is not a picture of an allowed format"),
-        ([IMAGE, IMAGE], {}, "2 pictures came"),
-        ([{"type": "input_audio", "input_audio": {"data": "", "format": "wav"}}], {}, "holds 'inp"),
-        ([], {"n": 2}, "n is 2"),
-        ([], {"modalities": ["text", "audio"]}, "Audio cannot be answered with"),
-    ],
-)
+BYTES = image("data:image/png;base64,AAAA")
+REFUSED: list[tuple[list[Any], dict[str, Any], str]] = [
+    ([image("http://x.test/a.png")], {}, "given as 'http://x.test/a.png', and nothing is fetched"),
+    ([image("file:///etc/passwd")], {}, "nothing is fetched"),
+    ([image("data:image/png;base64,?")], {}, "no valid base64"),
+    ([BYTES], {}, "is not a picture of an allowed format"),
+    ([BYTES, BYTES], {}, "2 pictures came"),
+    ([{"type": "input_audio", "input_audio": {"data": "", "format": "wav"}}], {}, "holds 'input_a"),
+    ([], {"n": 2}, "n is 2"),
+    ([], {"modalities": ["text", "audio"]}, "Audio cannot be answered with"),
+]
+
+
 def test_what_cannot_be_done_is_refused_in_a_sentence(
-    serve: Serve, client: Any, store: Store, content: Any, options: Any, why: str
+    serve: Serve, client: Any, store: Store
 ) -> None:
     openai = client(serve())
-    parts = [{"type": "text", "text": CAGE}, *content]
-    with pytest.raises(UnprocessableEntityError, match=why):
-        openai.chat.completions.create(
-            model="formup", messages=[{"role": "user", "content": parts}], **options
-        )
+    for content, options, why in REFUSED:
+        parts = [{"type": "text", "text": CAGE}, *content]
+        with pytest.raises(UnprocessableEntityError, match=why):
+            openai.chat.completions.create(
+                model="formup", messages=[{"role": "user", "content": parts}], **options
+            )
     assert store.sessions() == ()
 
 
@@ -178,18 +180,16 @@ def test_options_that_change_nothing_are_taken(serve: Serve, chat: Any) -> None:
     assert "certified" in chat(serve()).say(CAGE, "us_coins.jpg", user="ann", seed=3, **options)
 
 
-@pytest.mark.parametrize("role", ["assistant", "system", "tool", "developer"])
-def test_only_the_person_commands(serve: Serve, chat: Any, store: Store, role: str) -> None:
+def test_only_the_person_commands(serve: Serve, chat: Any, store: Store) -> None:
     talk = chat(serve())
-    answer = talk.say(CAGE, "us_coins.jpg")
-    extra = {"tool_call_id": "1"} if role == "tool" else {}
-    talk.messages.append({"role": role, "content": "go", **extra})
-    talk.again()
-    assert not moved(store)
+    planned = talk.say(CAGE, "us_coins.jpg")
+    for role in ("assistant", "system", "tool", "developer"):
+        extra = {"tool_call_id": "1"} if role == "tool" else {}
+        talk.messages.append({"role": role, "content": "go", **extra})
+        assert talk.again() == planned, "nothing was said since"
     assert said_in(store) == [CAGE]
-    talk.messages[-2:] = [{"role": "user", "content": "How far apart are they?"}]
-    assert "from its nearest" in talk.again()
-    assert link(answer)[1] in talk.messages[-1]["content"]
+    assert "from its nearest" in talk.say("How far apart are they?")
+    assert not moved(store)
 
 
 def test_real_robots_wait_for_a_yes_to_their_plan(
@@ -237,6 +237,10 @@ def test_robots_that_drive_for_long_are_not_waited_for(
     talk.say(CAGE, "us_coins.jpg")
     going = talk.say("go")
     assert "The robots are on their way" in going
+    again = talk.client.chat.completions.create(
+        model="formup", messages=talk.messages[:-1], stream=True
+    )
+    assert going in "".join(c.choices[0].delta.content or "" for c in again), "the same turn"
     assert "still on their way" in talk.say("are they there?")
     held = talk.say("Stop!")
     assert "robots that drove are held" in held
