@@ -5,12 +5,15 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .agent.agent import Agent
+    from .agent.conversation import is_stop
     from .agent.limits import Limits
     from .agent.messages import Call, Reply, Result, User
     from .agent.outcomes import Answered, Cancelled, Paused, Stopped
     from .agent.policy import Policy
     from .agent.report import Report
+    from .agent.service import Service
     from .agent.session import Run, load_run
+    from .agent.store.places import store_at
     from .agent.wrappers.doubles import FunctionModel, ScriptedModel
     from .tools.builtin import TOOLS
     from .tools.context import Context, Settings
@@ -28,20 +31,23 @@ if TYPE_CHECKING:
     from .tools.formation.contract import Contract, Group
     from .tools.formation.plan import Formation, Plan, make_plan
     from .tools.geometry.outline import Outline, make_outline
-    from .tools.perception.image import Picture, load_picture
+    from .tools.perception.image import Picture, load_picture, picture_from_bytes
     from .tools.perception.target_prompt import TargetPrompt
     from .tools.tool import Tool, ToolResult, tool
     from .tools.world import Target, World
 
 _HOMES = {
     "agent.agent": ("Agent",),
+    "agent.conversation": ("is_stop",),
     "agent.limits": ("Limits",),
     "agent.messages": ("Call", "Reply", "Result", "User"),
     "agent.wrappers.doubles": ("FunctionModel", "ScriptedModel"),
     "agent.outcomes": ("Answered", "Cancelled", "Paused", "Stopped"),
     "agent.policy": ("Policy",),
     "agent.report": ("Report",),
+    "agent.service": ("Service",),
     "agent.session": ("Run", "load_run"),
+    "agent.store.places": ("store_at",),
     "tools.builtin": ("TOOLS",),
     "tools.context": ("Context", "Settings"),
     "tools.errors": (
@@ -58,7 +64,7 @@ _HOMES = {
     "tools.formation.plan": ("Formation", "Plan", "make_plan"),
     "tools.formation.checking.verdict": ("Finding", "Verdict"),
     "tools.geometry.outline": ("Outline", "make_outline"),
-    "tools.perception.image": ("Picture", "load_picture"),
+    "tools.perception.image": ("Picture", "load_picture", "picture_from_bytes"),
     "tools.perception.target_prompt": ("TargetPrompt",),
     "tools.tool": ("Tool", "ToolResult", "tool"),
     "tools.world": ("Target", "World"),
@@ -93,6 +99,7 @@ __all__ = [
     "Result",
     "Run",
     "ScriptedModel",
+    "Service",
     "Settings",
     "Stopped",
     "TOOLS",
@@ -105,10 +112,13 @@ __all__ = [
     "Verdict",
     "World",
     "certify",
+    "is_stop",
     "load_picture",
     "load_run",
     "make_outline",
     "make_plan",
+    "picture_from_bytes",
+    "store_at",
     "tool",
 ]
 

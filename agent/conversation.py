@@ -99,7 +99,7 @@ class Session:
         Raises:
             InputError: something given cannot be used.
         """
-        if words.strip(" .!").lower() in STOP:
+        if is_stop(words):
             return await self.astop()
         show, pointed = options.get("show"), (*self.pointed, *options.get("pointed", ()))
         run, said = self.run, words
@@ -329,6 +329,11 @@ class Session:
             if self.run is not None:
                 await self.run.context.services.close_fleets()
             await self.agent.aclose()
+
+
+def is_stop(words: str) -> bool:
+    """Whether words, typed while a turn runs too, say to hold the robots at once."""
+    return words.strip(" ./!").lower() in STOP
 
 
 def in_own_loop(work: Coroutine[Any, Any, Any]) -> Any:

@@ -9,7 +9,7 @@ from typing import Any, cast
 from ..tools.context import Context
 from ..tools.draw import draw_view, view_scale
 from ..tools.errors import InputError, ToolError
-from ..tools.formation.contract import MAX_ROBOTS
+from ..tools.formation.contract import MAX_ROBOTS, Group
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.world import Target, World, to_json_values
@@ -19,6 +19,8 @@ MOST_NUMBERED = 40
 """Candidates in the first picture."""
 
 
+MOST_PAST = 12
+"""Plans to go back to that a turn is told of."""
 MAX_TEXT = 4_000
 """Characters of what a person says; longer texts are no instruction, and cost their reader."""
 
@@ -108,9 +110,24 @@ def standing(context: Context) -> dict[str, Any] | None:
             {"id": t.id, "label": t.label, "centre": [round(v) for v in t.outline.centre]}
             for t in world.targets
         ],
+        "past": _past(context, back),
         "undo": max(back, 0),
         "redo": world.undone,
     }
+
+
+def _past(context: Context, back: int) -> list[tuple[list[str], int]]:
+    """Of the plans that undo goes back to, latest first: arrangements, and how many robots."""
+    steps = context.steps[max(back - MOST_PAST, 0) : max(back, 0)]
+    names = [step.current for step in reversed(steps)]
+    contracts = [context.world.plans[n].plan.formation.contract for n in names if n]
+    return [([_form(g) for g in c.groups], sum(g.robots for g in c.groups)) for c in contracts]
+
+
+def _form(group: Group) -> str:
+    """What a group is called: a drawn circle stands around its thing as well."""
+    circle = group.shape is not None and group.shape.kind == "circle"
+    return "around" if circle else group.relation
 
 
 def _rounded(value: Any) -> Any:

@@ -15,8 +15,9 @@ from typing import Any, TypedDict
 from pydantic import ValidationError
 
 from ..tools.context import Artefacts, Context, Services, Settings
-from ..tools.draw import draw_plan
+from ..tools.draw import draw_plan, draw_view
 from ..tools.errors import InputError, StorageError
+from ..tools.formation.plan import Plan
 from ..tools.perception.image import Picture, load_picture, picture_file, picture_from_file
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.world import Step, Target, World
@@ -96,12 +97,28 @@ class Run:
 
     def _repr_png_(self) -> bytes | None:
         """The plan that stands, for notebooks."""
-        node, file = self.world.plans.get(self.report.plan_id or ""), io.BytesIO()
-        if node is None or self.world.is_void(node.plan):
+        plan, file = self._plan, io.BytesIO()
+        if plan is None:
             return None
         title = self.report.instruction
-        draw_plan(self.context.picture, self.world, node.plan, title).save(file, "PNG")
+        draw_plan(self.context.picture, self.world, plan, title).save(file, "PNG")
         return file.getvalue()
+
+    def view(self) -> bytes | None:
+        """A JPEG file, 1,024 px long or little more, of what a question offers, else of the plan
+        that stands."""
+        picture, world, plan = self.context.picture, self.world, self._plan
+        if asked := [choice["id"] for choice in self.report.candidates or ()]:
+            targets = tuple(t for t in world.targets if t.id in asked)
+            others = [self.context.candidate(n) for n in asked if n not in {t.id for t in targets}]
+            return draw_view(picture, world.having(targets=targets), candidates=others)
+        return None if plan is None else draw_view(picture, world, plan=plan)
+
+    @property
+    def _plan(self) -> Plan | None:
+        """The plan that is reported, unless it is void."""
+        node = self.world.plans.get(self.report.plan_id or "")
+        return None if node is None or self.world.is_void(node.plan) else node.plan
 
     @property
     def steps(self) -> tuple[Step, ...]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..agent.agent import Agent
-from ..agent.conversation import STOP
+from ..agent.conversation import is_stop
 from ..agent.outcomes import Answered
 from ..agent.report import Report, Totals
 from ..agent.service import Service
@@ -104,8 +104,7 @@ class Talk:
 
     def is_stop(self, text: str) -> bool:
         """Whether a line, typed while a turn runs, says to stop."""
-        words = text.lower().strip(" .!")
-        return words == "/stop" or words in STOP
+        return is_stop(text)
 
     def failed(self, text: str, message: str) -> Shown:
         """What there is to show of a line that could not be done."""

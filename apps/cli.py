@@ -15,7 +15,7 @@ from ..prompts import PromptLibrary
 from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
-from . import arguments, chat, deploy, evaluate, prompts, serve, sessions, tools, trace
+from . import arguments, chat, deploy, doctor, evaluate, prompts, serve, sessions, tools, trace
 from . import options as o
 from .agents import agent_of, tracer_of_environment
 from .run_files import Folder, write_files
@@ -154,6 +154,12 @@ app.command(name="serve")(serve.serve)
 app.add_typer(serve.tokens, name="tokens")
 app.command(name="deploy")(deploy.deploy)
 app.command(name="trace")(trace.show_trace)
+
+
+@app.command(name="doctor")
+def look_around(as_json: o.Json = False) -> None:
+    """Say what is installed and within reach, for a report of a bug; nothing secret is shown."""
+    say(doctor.told(as_json=as_json))
 
 
 def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:

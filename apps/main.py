@@ -7,6 +7,8 @@ import sys
 import threading
 from contextlib import suppress
 
+from ..tools.visible import visible
+
 INTERRUPTED = 130
 WINDING_UP = 0.2
 """Seconds for the thread of a tool that is done to end."""
@@ -43,14 +45,28 @@ def _leave(code: int) -> None:
     os._exit(code)
 
 
+def _say_broken(error: Exception) -> int:
+    """What to do about an installation that is broken, by the standard library alone."""
+    from . import doctor
+
+    if sys.argv[1:2] == ["doctor"]:
+        print(visible(doctor.told(as_json="--json" in sys.argv)))  # noqa: T201
+        return 0
+    advice = "formup doctor says what is broken; install that anew."
+    print(f"formup: {visible(str(error))}; {advice}", file=sys.stderr)  # noqa: T201
+    return 2
+
+
 def _run() -> int:
-    import typer
+    try:
+        import typer
 
-    from ..prompts import PromptError
-    from ..tools.errors import FleetError, FormupError, ModelError
-    from .cli import app
-    from .run_display import say_failed
-
+        from ..prompts import PromptError
+        from ..tools.errors import FleetError, FormupError, ModelError
+        from .cli import app
+        from .run_display import say_failed
+    except Exception as error:  # whatever a library that is broken raises as it is loaded
+        sys.exit(_say_broken(error))
     try:
         code = app(standalone_mode=False) or 0
         if code == INTERRUPTED:  # typer turns Ctrl-C into an exit code
@@ -64,6 +80,8 @@ def _run() -> int:
     except (FormupError, PromptError) as error:
         say_failed(str(error))
         return 4 if isinstance(error, (ModelError, FleetError)) else 2
+    except ImportError as error:  # of what is loaded where it is needed
+        return _say_broken(error)
     except BrokenPipeError:
         sys.stderr.close()  # the reader has gone; there is nobody to tell
         return 0

@@ -37,7 +37,8 @@ HEAVY = {
     "scipy",
 }
 SOURCES = sorted(p for room in ROOMS for p in (ROOT / room).rglob("*.py"))
-EVERYTHING = [*SOURCES, *ROOT.glob("*.py"), *(ROOT / "tests").rglob("*.py")]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+EVERYTHING = [*SOURCES, *EXAMPLES, *ROOT.glob("*.py"), *(ROOT / "tests").rglob("*.py")]
 
 
 def names(paths: list[Path]) -> list[str]:
@@ -139,6 +140,12 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     known |= {parts[:-1]: p for parts, p in known.items() if parts[-1] == "__init__"}
     graph = {path: modules_imported(path, known) for path in SOURCES}
     assert list(TopologicalSorter(graph).static_order())  # raises CycleError, which names them
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=names(EXAMPLES))
+def test_examples_use_the_public_face_and_fit_on_a_screen_or_two(path: Path) -> None:
+    assert not [m for level, m in imports(path) if level or m.startswith("formup.")]
+    assert len(path.read_text(encoding="utf-8").splitlines()) < 100
 
 
 def test_private_helpers_of_one_name_are_two_at_most() -> None:

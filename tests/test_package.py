@@ -73,6 +73,7 @@ def test_wheel_holds_every_package_and_data_file_and_no_tests(tmp_path: Path) ->
     assert not missing
     assert {"formup/py.typed", "formup/__init__.py", "formup/__main__.py"} <= inside
     assert not [n for n in inside if "test" in n.split("/")[1]]
+    assert not [n for n in inside if n.startswith(("formup/benchmarks/", "formup/examples/"))]
 
 
 def test_every_package_is_listed() -> None:

@@ -113,6 +113,19 @@ def arrived(data: Mapping[str, Any], scale: float | None) -> str:
     return f"Robot {data['worst_robot']} stopped {worst} after {data['corrections']} corrections."
 
 
+def said_of_heading(standing: Standing) -> str:
+    """Which way robots look, as the plan that stands has it."""
+    told: list[str] = []
+    for group in standing.groups:
+        to = group.get("heading")
+        ways = {"towards": "at", "away": "away from"}
+        at = f"{ways[to]} {listed(group['targets'])}" if to in ways else f"at {to}"
+        turned = f"{to} degrees, clockwise from the right of the picture"
+        way = turned if isinstance(to, int | float) else at if to else "no way that was asked for"
+        told.append(f"{group['robots']} robots look {way}")
+    return f"{'; '.join(told)}."
+
+
 def said_of_query(query: Mapping[str, Any], data: Mapping[str, Any], scale: float | None) -> str:
     """The answer to a question about the plan, of what was measured."""
     if "nearest_px" in data:
@@ -178,7 +191,7 @@ def _closed(
         widest = f"the widest opening, between robots {listed(group['between'])}, is {width}"
         needed = "" if group["closed"] or group["opened"] else f"; {_enough(group)}"
         told.append(f"{'Yes, closed' if group['closed'] else 'No, not closed'}: {widest}{needed}.")
-    return " ".join(told) or "They stand in no ring, so nothing is closed."
+    return " ".join(told) or f"They stand in no ring. {_spacing(query, data, rows, scale)}"
 
 
 def _needed(

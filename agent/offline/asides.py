@@ -5,7 +5,7 @@ They are taken out only where the rest is understood without them, and are quote
 
 import re
 
-from .followup_words import chunks_of
+from .followup_words import chunks_of, word_set
 from .standing import Standing
 
 PART = re.compile(r"[^.,;:!?]+[.,;:!?]*\s*|[.,;:!?]+\s*")
@@ -17,55 +17,20 @@ TELLING = re.compile(
     r"i'?ve|i'?d (?:say|forgotten)|we (?:are|have|had|were)|we'?re|we'?ve|"
     r"my|because|since|as (?:i|we|it|they|my|the|there)|cause|cos|for (?:my|our) |"
     r"never ?mind|isn'?t|aren'?t|don'?t worry|no worries|no problem|"
-    r"(?:the|our|his|her) \w+ (?:is|are|was|were|will|has|have|says|said|wants|likes|just))\b",
+    r"(?:the|our|his|her) \w+ (?:is|are|was|were|will|has|have|had|says|said|wants?|"
+    r"likes?|needs?|gets?|got|comes?|goes|can'?t|cannot|might|must|may|just))\b",
     re.IGNORECASE,
 )
 """How a part begins that tells something."""
-DEMANDING = frozenset(
-    (
-        "robots",
-        "num",
-        "px",
-        "m",
-        "angle",
-        "share",
-        "point",
-        "dir",
-        "side",
-        "flank",
-        "radial",
-        "spin",
-        "apart",
-        "scale",
-        "ratio",
-        "relation",
-        "gap",
-        "stay",
-        "swap",
-        "leave",
-        "remove",
-        "add",
-        "hold",
-        "never",
-        "neg",
-        "clear",
-        "close",
-        "only",
-        "except",
-        "toofar",
-        "toomany",
-        "turn",
-        "mirror",
-        "face",
-        "merge",
-        "split",
-        "escape",
-        "open",
-        "wide",
-        "resize",
-        "current",
-    )
+COMPLAINT = re.compile(
+    r"\b(?:(?:that|it|this|they|these|those)(?:'?s| is| are|'?re| looks?| seems?)) (?:\w+ )?"
+    r"(?:a bit|a little|too|rather|quite|very|so|pretty|awfully|way too) "
+    r"(?:close|near|far|tight|wide|big|small|large|crowded|cramped|dense|sparse|loose|many|few)\b"
+    r"(?! and\b)",
+    re.IGNORECASE,
 )
+"""What is wrong; how it should be is said beside it."""
+DEMANDING = word_set("demanding")
 """Kinds of phrases that demand something, or change what does."""
 
 
@@ -81,4 +46,6 @@ def _tells(part: str, standing: Standing) -> bool:
     """Whether a part tells something and demands nothing."""
     if TELLING.search(part) is None or part.rstrip().endswith("?"):
         return False
+    if COMPLAINT.search(part):
+        return True
     return not any(DEMANDING & set(c.kinds) for c in chunks_of(part, standing))

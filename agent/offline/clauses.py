@@ -6,8 +6,9 @@ A clause may be completed by the one before: "left. no wait, right", "and robot 
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
-from . import followup_edits, followup_sides, followup_teams, followup_turns
+from . import followup_edits, followup_parts, followup_sides, followup_teams, followup_turns
 from .followup_edits import Effect, Effects, Said, ask
 from .followup_frames import Frame, Slots, frames
 from .followup_things import resolved
@@ -35,14 +36,10 @@ LEADING = frozenset(
     ("no", "neg", "correction", "yes", "filler", "sep", "thanks", "hello", "instead", "certq")
 )
 PURE = frozenset(("filler", "sep", "yes", "thanks", "hello", "correction"))
-SLIGHT = (
-    PURE
-    | {"move", "make", "it", "team", "leavegap", "about", "towards", "side_of"}
-    | {
-        "instead",
-        "robotword",
-    }
-)
+SLIGHT = PURE | {
+    *("move", "make", "it", "team", "leavegap", "about", "towards", "side_of"),
+    *("instead", "robotword"),
+}
 """Kinds of phrases that say nothing by themselves."""
 OPENERS = r"^(?:(?:so|and|ok|okay|hm+|but|now|well|please|hey|hi|no|yes|then)\b[ ,.]*)+"
 
@@ -75,8 +72,9 @@ class Line:
         self.words, self.standing = spelled(words), standing
         self.led = self.asking = ""
         self.excepted: tuple[int, ...] = ()
-        found = [resolved(c, self.words, standing) for c in chunks_of(self.words, standing)]
-        while len(found) > 1 and ("correction" in found[-1].kinds or is_empty(found[-1])):
+        chunks = _commanding(chunks_of(self.words, standing))
+        found = [resolved(c, self.words, standing) for c in chunks]
+        while len(found) > 1 and (_is_pure(found[-1]) or is_empty(found[-1])):
             found.pop()  # "the lower one, i mean"
         if any({"stay", "except"} & set(c.kinds) for c in found) and not self._leaving(found):
             found = [_as_team(c) if "rest" in c.kinds else c for c in found]
@@ -87,6 +85,11 @@ class Line:
         at = [k for k, c in enumerate(chunks) if "rest" in c.kinds]
         stays = any("stay" in c.kinds for k in at for c in chunks[k + 1 : k + 3])
         return stays or any({"leave", "remove"} & set(c.kinds) for c in chunks)
+
+    @property
+    def adds(self) -> bool:
+        """Whether it goes on from the last change, even after a "no": "no, further still"."""
+        return re.search(r"\b(?:still|even|yet)\b", self.words, re.IGNORECASE) is not None
 
     @property
     def denies(self) -> bool:
@@ -136,7 +139,9 @@ class Line:
             marks = [m for m in ("no", "correction", "yes", "thanks", "hello") if m in chunk.kinds]
             leads = {"no", "correction", "yes", "sep", "filler"} & set(chunk.kinds)
             text = self.words[chunk.start : chunk.end].lower()
-            if not (leads and set(chunk.kinds) <= LEADING) or text == "also":
+            named = "yes " in self.led and "there" in chunk.kinds and not self.standing.pointed
+            agreed = named and "sep" in chunks[min(k + 1, len(chunks) - 1)].kinds
+            if not (agreed or (leads and set(chunk.kinds) <= LEADING)) or text == "also":
                 return list(chunks[k:])
             self.led += "".join(f"{m} " for m in (*marks, text))
         return []
@@ -172,18 +177,21 @@ class Line:
         """Whether it may be a question, and whether it can be nothing else."""
         words = self.asking or self.words
         text = re.sub(OPENERS, "", words.lower().lstrip("\"' "))
+        telling = next((t for t in rules()["telling"] if re.match(rf"{t}\b", text)), "")
+        text = text[len(telling) :].lstrip(" ,:")
         word = next(iter(re.findall(r"^[a-z']+", text)), "")
         polite = any(re.match(rf"{p}\b", text) for p in rules()["polite"])
         leads = word in rules()["questions"] and not polite
         marked = words.rstrip().endswith("?")
         either = word in ("can", "could", "would", "will", "may")
         either = either or (not marked and word in ("have", "do", "is", "are", "any"))
-        return leads or marked, leads and not either
+        open_ = re.match(r"(?:can|could) (?:it|they|any|some)", text) is not None
+        return leads or marked or open_, leads and not either
 
     def _of_team(self, effect: Effect, chunks: Sequence[Chunk], words: str) -> Effect:
         """The edit for the group whose thing is named; which one is asked where it has to be."""
         kind, groups = effect["kind"], self.standing.groups
-        if len(groups) < 2:
+        if len(groups) < 2 or "group" in effect:
             return effect
         named = [str(c.kinds["current"]) for c in chunks if "current" in c.kinds]
         found = [k for k, g in enumerate(groups, 1) if named and named[-1] in g.get("targets", ())]
@@ -212,9 +220,6 @@ class Line:
         robots = bool(after) and all({"robots", "stay"} & set(c.kinds) for c in after)
         if robots and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
-        swapping = self._answering(after)
-        if swapping is not None:
-            return swapping
         amounts = bool(after) and all({"px", "angle"} & set(c.kinds) for c in after)
         if amounts and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
@@ -222,15 +227,7 @@ class Line:
             return None
         if robots and not self.denies:
             return self._for_robots(after) or self._of_words(self.standing.words, after)
-        return self._instead(self._of_words(self.standing.words, after))
-
-    def _answering(self, after: Sequence[Chunk]) -> list[Clause] | None:
-        """Two numbers alone as robots to swap, where the words before were to swap some."""
-        if len(after) != 2 or not all("num" in c.kinds for c in after):
-            return None
-        before = chunks_of(spelled(self.standing.said), self.standing)
-        clause = self._framed([*[c for c in before if "swap" in c.kinds][:1], *after], ())
-        return [clause] if clause is not None and clause.frame == "swap" else None
+        return None if self.adds else self._instead(self._of_words(self.standing.words, after))
 
     def _of_words(self, words: str, after: Sequence[Chunk]) -> list[Clause] | None:
         """What was said before, with phrases of this line put in."""
@@ -276,6 +273,18 @@ class Line:
         return None
 
 
+def _commanding(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """The phrases, where "go" is no filler if nothing but fillers stands beside it."""
+    ends = [k for k, c in enumerate(chunks) if "sep" in c.kinds]
+    found = list(chunks)
+    for first, last in pairwise([-1, *ends, len(chunks)]):
+        told = [k for k in range(first + 1, last) if {*chunks[k].kinds} - {"filler"}]
+        for k in told if all({"go", "only"} & {*chunks[k].kinds} for k in told) else ():
+            kinds = {name: v for name, v in chunks[k].kinds.items() if name != "filler"}
+            found[k] = replace(chunks[k], kinds=kinds) if "go" in kinds else chunks[k]
+    return found
+
+
 def _as_team(chunk: Chunk) -> Chunk:
     """A phrase for the others as one for all that are not said to stay."""
     return replace(chunk, kinds={"team": ""})
@@ -292,7 +301,7 @@ def _is_kind(chunk: Chunk) -> bool:
 
 
 def _is_pure(chunk: Chunk) -> bool:
-    return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= PURE
+    return bool({"filler", "sep", "correction"} & set(chunk.kinds)) and set(chunk.kinds) <= PURE
 
 
 def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
@@ -326,7 +335,7 @@ def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
         return followup_turns.asked(slots, said, frame.name.removeprefix("ask_"))
     if frame.name in TALK:
         return [{"kind": "talk", "about": frame.name}]
-    modules = (followup_edits, followup_sides, followup_teams, followup_turns)
+    modules = (followup_edits, followup_parts, followup_sides, followup_teams, followup_turns)
     build: Callable[[Slots, Said], Effects] = next(
         getattr(module, frame.name) for module in modules if hasattr(module, frame.name)
     )

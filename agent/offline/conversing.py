@@ -14,7 +14,7 @@ from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User
 from .accounting import read_instruction
 from .amending import amended
-from .answering import arrived, said_of_edit, said_of_query, said_of_undo, talk
+from .answering import arrived, said_of_edit, said_of_heading, said_of_query, said_of_undo, talk
 from .choosing import Step, agrees, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup_things import UNNAMED
@@ -23,8 +23,18 @@ from .spelling import spelled
 from .standing import Standing
 
 DEICTIC = re.compile(
-    r"\b(?:over there|there|this one|that one|the other one|that|this)\b", re.IGNORECASE
+    r"\b(?:(?:that|this|the|a|an)(?: one| other)? (?:robot|bot|drone|rover)|"
+    r"one of (?:the robots|them)|over there|there|this one|that one|the other one|that|this)\b",
+    re.IGNORECASE,
 )
+ROBOT = re.compile(r"robot|bot|drone|rover|them", re.IGNORECASE)
+BESIDES = re.compile(
+    r"^\W*(?:(?:sorry|oh|ah|well|um|uh|i mean(?:t)?|that would be|"
+    r"that is|it'?s|let'?s say|say)\b[ ,.]*)+"
+    r"|[ ,.]+(?:i mean(?:t)?|sorry|please|then|i think|i guess|of course)(?=\W*$)",
+    re.IGNORECASE,
+)
+"""What stands before or after an answer."""
 FEW = 3
 """Robots of which it is measured exactly which is the nearest."""
 LEAST_WAY = 0.02
@@ -112,7 +122,10 @@ def _words_meant(words: str, followup: Followup, answer: str, standing: Standing
         return followup.options[int(number[1]) - 1]
     if len(followup.options) == 1 and agrees(answer):
         return followup.options[0]
-    joined = [DEICTIC.sub(answer, words, count=1)] if DEICTIC.search(words) else []
+    answer = BESIDES.sub("", answer) or answer
+    shown = DEICTIC.search(words)
+    named = f"robot {number[1]}" if number and shown and ROBOT.search(shown[0]) else answer
+    joined = [DEICTIC.sub(named, words, count=1)] if shown else []
     for attempt in (*joined, f"{words} {answer}", f"{answer} {words}"):
         if read_followup(attempt, standing).kind not in ("ask", "refuse", "instruction"):
             return attempt
@@ -155,6 +168,8 @@ class _Steps:
         """Measure what is asked, then say it."""
         query: dict[str, Any] = dict(self.followup.query or {})
         results = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"]
+        if query["about"] == "heading":
+            return Reply(text=said_of_heading(standing))
         measured, scale = results[0] if results else None, self.task.metres_per_pixel
         robots, thing = query.get("robots", []), str(query.get("thing", ""))
         unnamed = all(label.startswith(UNNAMED) for _, label in standing.things)

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...tools.formation.number_words import SMALL
 from .followup_frames import Slots
 from .standing import Standing
 
@@ -27,25 +28,19 @@ TEAM = re.compile(
 )
 ADDED_LENGTH = re.compile(r"[,;:]\s*[\w.]+ ?(?:px|pix|m\b|met|cm)\w*\W*$", re.IGNORECASE)
 """A length said after the change, "further out, 6 m": so far it is then."""
+STEP = re.compile(r"\b(?:position|place|spot|slot|step|seat)s?\b", re.IGNORECASE)
+"""Of a ring: from one robot to the next."""
+EXACT = re.compile(
+    rf"\bto (?:exactly |about |just |only |some )?(?:[0-9]|(?:{'|'.join(SMALL)})\b)", re.IGNORECASE
+)
+"""The whole of it, not a change: "increase it to 60 px"."""
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
-SIDE_OF = {
-    "left": "left",
-    "right": "right",
-    "up": "top",
-    "down": "bottom",
-    "top": "top",
-    "bottom": "bottom",
-}
-OPPOSITE = {
-    "left": "right",
-    "right": "left",
-    "top": "bottom",
-    "bottom": "top",
-    "long": "long",
-    "short": "short",
-}
+SIDE_OF = {side: side for side in ("left", "right", "top", "bottom")}
+SIDE_OF |= {"up": "top", "down": "bottom"}
+OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
+OPPOSITE |= {"long": "long", "short": "short"}
 DEGREES = {"right": 0, "down": 90, "bottom": 90, "left": 180, "up": 270, "top": 270}
 RINGS = ("around", "cage")
 ROWS = ("along", "between")
@@ -126,7 +121,7 @@ def offset(slots: Slots, said: Said) -> Effects:
         return None
     kind = ways.pop()
     if length is not None:
-        exact = ADDED_LENGTH.search(said.words)
+        exact = ADDED_LENGTH.search(said.words) or EXACT.search(said.words)
         return [{"kind": "distance" if exact else kind, "px": length}]
     if kind == "in" and "share" in slots:
         share = float(slots["share"][0])
@@ -152,7 +147,8 @@ def ratio(slots: Slots, said: Said) -> Effects:
 def distance(slots: Slots, said: Said) -> Effects:
     """Exactly so far from the thing; at least, or at most, is so far too."""
     slots.has("bound")
-    return [{"kind": "distance", "px": float(slots["px"][0])}]
+    length = float(slots["px"][0]) if "px" in slots else bare_length(slots)
+    return None if length is None else [{"kind": "distance", "px": length}]
 
 
 def spacing(slots: Slots, said: Said) -> Effects:
@@ -180,13 +176,15 @@ def rotate(slots: Slots, said: Said) -> Effects:
     if len(directions) > 1 or directions - {"cw", "ccw"}:
         return None
     degrees = TURN[much_of(slots)]
-    for name in ("angle", "num", "turned"):
+    for name in ("angle", "num"):
         if name in slots:
             degrees = float(slots[name][0])
+    if "num" in slots and STEP.search(said.words):
+        degrees *= 360 / said.count  # "one place clockwise"
     sign = -1 if "ccw" in directions else 1
     last = _of_kind(said.last, "rotate")
     if "otherway" in slots or "back" in slots:
-        if not any(name in slots for name in ("angle", "num", "turned", "much")) and last:
+        if not any(name in slots for name in ("angle", "num", "much")) and last:
             twice = 2 if "otherway" in slots else 1  # what was turned back, and as far again
             return [{**last, "degrees": -twice * last["degrees"]}]
         sign = -1 if last is None or last["degrees"] > 0 else 1
@@ -333,8 +331,8 @@ def _some_way(way: str, slots: Slots, said: Said) -> dict[str, float]:
 def heading(slots: Slots, said: Said) -> Effects:
     """Which way robots look."""
     slots.has("turn", "where")
-    if "unface" in slots:
-        return [{"kind": "heading", "to": None}]
+    if "unface" in slots or "current" in slots:
+        return [{"kind": "heading", "to": "towards" if "current" in slots else None}]
     if "there" in slots or "other" in slots or "thing" in slots:
         to = where(slots, said, "face {}")
         return to if isinstance(to, list) else [{"kind": "heading", "to": to}]

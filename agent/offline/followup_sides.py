@@ -1,5 +1,7 @@
 """From a frame to edits of which sides robots stand on, and of gaps in their ring."""
 
+import re
+
 from .followup_edits import (
     OPPOSITE,
     RINGS,
@@ -15,11 +17,16 @@ from .followup_edits import (
 )
 from .followup_frames import Slots
 
+PUSHING = re.compile(r"\b(?:move|shift|nudge|push|pull|slide|drag)\b", re.IGNORECASE)
+"""With these "all right" is a way to go, no side to be on."""
+
 
 def sides(slots: Slots, said: Said) -> Effects:
     """Only on one side, or one side left free."""
     named = [SIDE_OF.get(s, s) for s in (*slots.get("flank", ()), *slots.get("side", ()))]
     without = "neg" in slots or "free" in slots
+    if "flank" not in slots and PUSHING.search(said.words):
+        return None
     if not named or len(set(named)) < len(named) or ("only" in slots and without):
         return None
     if said.standing.relation in RINGS and not {"long", "short"} & {*named}:
@@ -80,7 +87,8 @@ def gap(slots: Slots, said: Said) -> Effects:
     if facing:
         opening["towards"] = facing[0]
     stands = said.standing.groups[0].get("opening") is not None
-    change = {"bigger": "wider", "smaller": "narrower"}.get(*[slots.get("scale", [""])[0]] * 2)
+    ways = {"bigger": "wider", "smaller": "narrower", "up": "wider", "down": "narrower"}
+    change = ways.get([*slots.get("scale", ()), *slots.get("grow", ()), ""][0])
     change = slots.get("wide", [change])[0] if "wide" in slots else change
     change = "wider" if "more" in slots and not change and not facing else change
     change = "narrower" if "less" in slots else change
@@ -142,8 +150,11 @@ def wider(slots: Slots, said: Said) -> Effects:
 
 
 def close(slots: Slots, said: Said) -> Effects:
-    """The whole ring again, without an opening."""
-    slots.has("relation", "back", "undo")
+    """The whole ring again, without an opening; "no gap, back" takes the last one back."""
+    slots.has("relation")
+    if slots.has("back", "undo") and said.standing.changes:
+        opened = [e["kind"] for e in said.standing.edits] == ["opening"]
+        return [{"kind": "undo", "steps": 1}] if opened else [{"kind": "close"}]
     return [{"kind": "close"}]
 
 

@@ -16,12 +16,14 @@ from .followup_edits import (
     where,
 )
 from .followup_frames import Slots
+from .followup_words import chunks_of
 
 PLACING = re.compile(
     r"(?=.*\b(?:robot|bot|drone|rover)s?\b).*\b(?:put|place|surround|position|station|arrange)\b",
     re.IGNORECASE | re.DOTALL,
 )
 """Robots, a number of them, a thing and such a word make a new instruction."""
+EACH_CORNER = re.compile(r"\b(?:each|every)\b.*\bcorner", re.IGNORECASE)
 SHARES = {"half": 2, "third": 3, "quarter": 4}
 LIKE_A_RING = ("around", "cage", "corners", "shape")
 """Arrangements about a thing, which "around" the next one keeps."""
@@ -94,12 +96,13 @@ def count(slots: Slots, said: Said) -> Effects:
 
 def needed(slots: Slots, said: Said) -> Effects:
     """As many as close the ring."""
+    slots.has("add", "close", "closeq")
     return [{"kind": "count", "robots": "needed"}]
 
 
 def fit(slots: Slots, said: Said) -> Effects:
     """As many as there is room for."""
-    slots.has("apart", "spacing")
+    slots.has("apart", "spacing", "add")
     spaced: list[Effect] = (
         [{"kind": "spacing", "px": float(slots["px"][0])}] if "px" in slots else []
     )
@@ -180,19 +183,6 @@ def not_this(slots: Slots, said: Said) -> Effects:
         return None
     to = where(Slots({"there": [""]}), said)
     return to if isinstance(to, list) else [{"kind": "target", "to": to}]
-
-
-def remain(slots: Slots, said: Said) -> Effects:
-    """So many where they are: beside others that go somewhere else."""
-    going = [e for e in said.before if e["kind"] == "target" and isinstance(e.get("robots"), int)]
-    n = whole(slots)
-    slots.has("here", "current", "stay")
-    if len(said.standing.groups) > 1 or n is None or len(going) != 1:
-        return None
-    some = going[0]["robots"]
-    if some + n != said.count:
-        return ask(f"There are {said.count} robots, not {some} and {n}. How many go, and where?")
-    return [{"kind": "talk", "about": "already"}]
 
 
 def split(slots: Slots, said: Said) -> Effects:
@@ -278,9 +268,10 @@ def few_away(slots: Slots, said: Said) -> Effects:
 
 
 def swap_again(slots: Slots, said: Said) -> Effects:
-    """Two more robots, after others were swapped."""
+    """Two more robots, after others were swapped, or where it was asked which are to."""
+    asked = [k for c in chunks_of(said.standing.said, said.standing) for k in c.kinds]
     swapped = said.last and said.last[-1]["kind"] == "swap"
-    return swap(slots, said) if swapped else None
+    return swap(slots, said) if swapped or "swap" in asked else None
 
 
 def add_one(slots: Slots, said: Said) -> Effects:
@@ -322,6 +313,8 @@ def arrange(slots: Slots, said: Said) -> Effects:
 def arranged(slots: Slots, said: Said) -> Effects:
     """Another arrangement, of so many robots."""
     n = whole(slots)
+    if n is not None and EACH_CORNER.search(said.words):
+        n *= 4
     if n is None or n > MAX_ROBOTS:
         return None
     given = Slots({k: v for k, v in slots.items() if k not in ("num", "lone")})
@@ -335,7 +328,9 @@ def arranged(slots: Slots, said: Said) -> Effects:
 
 
 def _group(relation: str, slots: Slots) -> Effect:
-    """The fields of the group of an arrangement."""
+    """The fields of the group of an arrangement; a circle, about a thing of any shape, is drawn."""
+    if relation == "circle":
+        return {"relation": "shape", "shape": {"kind": "circle", "where": "around"}}
     group: Effect = {"relation": relation}
     if relation == "along":
         slots.has("onword", "only")

@@ -23,19 +23,13 @@ from .followup_edits import (
 from .followup_frames import Slots
 
 RELATIVE = (
-    "out",
-    "in",
-    "rotate",
-    "shift",
-    "scale",
-    "spacing",
-    "place",
-    "add",
-    "remove",
-    "mirror",
-    "swap",
+    *("out", "in", "rotate", "shift", "scale", "spacing", "place", "add", "remove"),
+    *("mirror", "swap"),
 )
 """Kinds that are done again on top of themselves."""
+BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
+STATED = 2.0
+"""Widest range, px, of a distance that was stated."""
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
@@ -59,6 +53,17 @@ def undo(slots: Slots, said: Said) -> Effects:
         )
         return refuse(f"{why}: there is no plan before that. Say what to change instead.")
     return [{"kind": "undo", "steps": steps}]
+
+
+def returned(slots: Slots, said: Said) -> Effects:
+    """Back to the last plan with an arrangement or a number of robots: "back to the circle"."""
+    named = {"around" if r == "circle" else r for r in slots.get("relation", ())}
+    numbers = [int(n) for n in (*slots.get("num", ()), *(1 for _ in slots.get("lone", ())))]
+    slots.has("undo", "back", "first", "again")
+    for steps, (relations, robots) in enumerate(said.standing.past, 1):
+        if named <= {*relations} and numbers in ([], [robots]) and BACK_TO.search(said.words):
+            return [{"kind": "undo", "steps": steps}]
+    return None
 
 
 def dont(slots: Slots, said: Said) -> Effects:
@@ -326,6 +331,8 @@ def toofar(slots: Slots, said: Said) -> Effects:
 
 def bare(slots: Slots, said: Said) -> Effects:
     """An amount alone: what it is of is asked."""
+    if "px" in slots and slots["px"][0] > 0 and _is_at_length(said):
+        return [{"kind": "distance", "px": float(slots["px"][0])}]
     if "px" in slots:
         px = f"{slots['px'][0]:g} px"
         moves = (f"{px} further out", f"{px} closer") if slots["px"][0] > 0 else ()
@@ -337,6 +344,13 @@ def bare(slots: Slots, said: Said) -> Effects:
         n = f"{slots['num'][0]:g}"
         return ask(f"{n} of what?", f"make it {n} in all", f"{n} more", f"turn it {n} degrees")
     return ask(f'What should change, in "{said.words}"?', *MOVES[1:])
+
+
+def _is_at_length(said: Said) -> bool:
+    """Whether robots keep a distance that was stated, and nothing else was said since."""
+    bounds = [g.get("clearance") or (0, 0) for g in said.standing.groups]
+    others = {e["kind"] for e in said.last} - {"distance", "count", "add", "remove"}
+    return not others and all(high > 0 and high - low <= STATED for low, high in bounds)
 
 
 def refuse_checks(slots: Slots, said: Said) -> Effects:

@@ -23,30 +23,14 @@ from .standing import Standing
 
 WORD = re.compile(r"[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[0-9]+(?:[.,][0-9]+)*|[^\w\s]")
 POINT = re.compile(
-    r"\(?\b(-?[0-9]+(?:\.[0-9]+)?) ?[,/] ?(-?[0-9]+(?:\.[0-9]+)?)\)?(?![0-9.%]| ?px)"
+    r"\(?\b(-?[0-9]+(?:\.[0-9]+)?) ?[,/] ?(-?[0-9]+(?:\.[0-9]+)?)\)?(?![0-9%]|\.[0-9]| ?px)"
 )
 NAMED = re.compile(r"\b[tc][0-9]{1,4}\b")
 NUMBERED = re.compile(
     r"#? ?([0-9]{1,5})\b(?! ?(?:px|pix|m\b|met|cm|mm|%|per|deg|\u00b0|ft|feet|inch))"
 )
 ARTICLES = frozenset(("the", "a", "an"))
-BEFORE_THINGS = frozenset(
-    (
-        "around",
-        "round",
-        "about",
-        "towards",
-        "toward",
-        "at",
-        "to",
-        "from",
-        "of",
-        "inside",
-        "along",
-        "by",
-        "near",
-    )
-)
+NOT_PLACING = frozenset(("to", "of", "about", "each", "every"))
 PRONOUNS = frozenset(("them", "it", "they", "us", "you"))
 SIDE_WORDS = ("left", "right", "top", "bottom", "upper", "lower", "leftmost", "rightmost", "middle")
 
@@ -165,18 +149,26 @@ class _Reader:
         place, things = table_of("ordinals").get(self.plain[start]), self.standing.things
         named = self.plain[start + 1 : start + 2]
         end = start + 1 + (named in (["one"], ["thing"], ["object"]))
-        plain = end == start + 1 and (start == at or (named[:1] and named[0][0].isalpha()))
+        led = (
+            at > 0 and self.plain[at - 1] in word_set("before_things") - NOT_PLACING
+        )  # "at the first"
+        after = {*lexicon().get(tuple(named), ())}
+        idle = not named or not named[0][0].isalpha() or {"filler", "sep"} & after
+        plain = end == start + 1 and (start == at or not idle)
         first = self.plain[start] == "first" and named not in (["thing"], ["object"])
+        first = first and not led and bool(self.standing.plan)  # else there is no first plan
         if place is None or first or plain or not 1 < len(things) >= place:
             return None
         return {"thing": things[place - 1 if place > 0 else -1][0]}, end
 
     def _robots(self, at: int) -> tuple[dict[str, Any], int] | None:
         """Robot 3; robots 3, 4 and 5; r7; the third robot."""
-        place = table_of("ordinals").get(self.plain[at])
         after = self.plain[at + 1] if at + 1 < len(self.plain) else ""
+        place = table_of("ordinals").get(self.plain[at])
         if place is not None and after in word_set("robots"):
             return {"robots": (place if place > 0 else len(self.standing.robots),)}, at + 2
+        if self.plain[at] == "the" and after in (*table_of("ordinals"), *word_set("robots")):
+            return self._robots(at + 1)
         if self.plain[at] not in word_set("robots"):
             return None
         numbers: list[int] = []
@@ -245,11 +237,11 @@ class _Reader:
             return None
         description = Description(self.plain, start)
         end = description.at
-        led = at > 0 and self.plain[at - 1] in (*BEFORE_THINGS, *ARTICLES)
+        led = at > 0 and self.plain[at - 1] in (*word_set("before_things"), *ARTICLES)
         strange = any(map(_tells_otherwise, self.plain[start:end]))
         if description.thing.noun and not description.thing.plural and not strange:
             heads = [w for w in self.plain[start:end] if w in word_set("formation_nouns")]
-            if heads and not (at > 0 and self.plain[at - 1] in BEFORE_THINGS):
+            if heads and not (at > 0 and self.plain[at - 1] in word_set("before_things")):
                 return None
             if not _is_headed(self.plain[start:end]) or (
                 end - start == 1 and self.plain[start] in ("one", "thing", "object")
@@ -264,7 +256,7 @@ class _Reader:
 
     def _may_open(self, at: int) -> bool:
         """Whether a phrase for a thing may begin here without an article: "left tree"."""
-        if at > 0 and self.plain[at - 1] in BEFORE_THINGS:
+        if at > 0 and self.plain[at - 1] in word_set("before_things"):
             return True
         found = thing_phrase(self.plain, at)
         after = thing_phrase(self.plain, at + 1) if at + 1 < len(self.plain) else None

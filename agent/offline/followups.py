@@ -40,8 +40,15 @@ PLAIN = (
 NO_PLAN = "No plan stands yet. Say what to do, such as: surround the coin with 6 robots."
 NOTHING = Standing("", {"groups": [{"relation": "around", "targets": [], "robots": 0}]}, ())
 SEQUENCE = re.compile(
-    r"^\W*first\b[ ,:]*(?P<now>.+?)[,;.]?\s+(?:and )?then\b,?\s*(?P<rest>.+)$", re.IGNORECASE
+    r"^\W*(?:please )?"
+    r"(?:(?:first(?:ly| of all)?|to (?:start|begin) with|step (?:1|one)|1[.)])\b[ ,:]*(?P<now>.+?)"
+    r"[,;.]?\s+(?:(?:and )?(?:then|after that|afterwards|next|second(?:ly)?)|step (?:2|two)|2[.)])"
+    r"|(?:start (?:with|by) )?(?P<lead>.+?)(?: first\b[,;.]?(?: and)? then|"
+    r"[,;.]? (?:and |then )?(?:after that|afterwards|(?:once|when) that'?s done|only then)))"
+    r"(?<=[a-z0-9.)])\b[ ,:.]*(?P<rest>.+)$",
+    re.IGNORECASE,
 )
+"""One thing now, the other once it is confirmed."""
 ASIDE = re.compile(
     r"^\W*(?:(?:no|now|ok|okay|and|then|hm+|rather|actually|please)\b[ ,.]*)+"
     r"|[ ,]+(?:instead|rather|now|please)(?=[.!?]*$)",
@@ -108,7 +115,7 @@ def _read(words: str, standing: Standing | None) -> Followup:
     """What is meant by all of the words."""
     sequence = SEQUENCE.match(spelled(words)) if standing else None
     if sequence:
-        now = read_followup(sequence["now"], standing)
+        now = read_followup(sequence["now"] or sequence["lead"], standing)
         later = read_followup(sequence["rest"], standing)
         unclear = (f for f in (now, later) if f.kind in ("ask", "refuse", "instruction"))
         return next(unclear, replace(now, rest=sequence["rest"]))
@@ -183,7 +190,9 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
     if question is not None:
         return question
     undo = sum(e.get("steps", 0) for e in effects if e["kind"] == "undo")
-    if "no " in line.led and edits and not undo and clauses[0].frame not in ADDING:
+    edits.sort(key=lambda e: e["kind"] == "escape-proof")  # with as many as there are then
+    added = line.adds or clauses[0].frame in ADDING
+    if "no " in line.led and edits and not undo and not added:
         last = [dict(e) for e in line.standing.edits]
         kind = last[0]["kind"] if len(last) == 1 else ""
         alike = edits[0]["kind"] == kind or {edits[0]["kind"], kind} <= {"out", "in"}
@@ -255,7 +264,7 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
         to=to,
         edits=tuple(edits),
         stay=tuple(stays),
-        go="go" in kinds,
+        go="go" in kinds and not edits,  # what is new is looked at first
         hold="hold" in kinds,
         query=query and {k: v for k, v in query.items() if k != "kind"},
         about=_about([e["about"] for e in effects if e["kind"] == "talk"]),

@@ -9,11 +9,11 @@ import re
 from dataclasses import replace
 from typing import Any
 
-from ...tools.formation.units import length_text
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
+from .answering import arrived
 from .choosing import Found, Step, agrees, calls_in, find, located_reasons, prompts_of
 from .conversing import conversed
 from .descriptions import Reference
@@ -21,8 +21,18 @@ from .drafting import contract_of, place_of, question_of, things_needed, would_d
 from .pointed import narrowed
 from .reading import Reading
 from .references import described
+from .spelling import spelled
 
 MAX_LABEL = 100
+EACH = re.compile(
+    r"(?P<shared>,? ?\b(?:half|evenly|equally|split|shared|divided|as many)\b"
+    r"[a-z ]*? )?"
+    r"\b(?P<at>a?round|about|at|inside|in|on|by|near|to|over|within) (?:each|every)\b"
+    r"(?: (?:one|single|thing|object|of (?:them|these|those|(?:the|these|those) [a-z]+)))*"
+    r"(?: (?!(?:and|at|with|all|in|on|to|from|please|facing|then|but|of)\b)[a-z]+)?(?! ?corners?)",
+    re.IGNORECASE,
+)
+"""What says that each of several things is meant: "half round each", "inside each court"."""
 READING = "The rules account for every word; the rest of them says which thing is meant."
 """Answers a doubt, which comes of single words."""
 
@@ -67,6 +77,9 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if isinstance(chosen, Reply):
         return chosen
     shown, task = task.pointed, chosen
+    shared = _about_each(task, history)
+    if shared is not None:
+        return shared
     reading = read_instruction(task.instruction, task.metres_per_pixel)
     wording = reading.robots or (reading.form.robots if reading.form else None)
     robots = task.robots or wording or _number_answered(history) or _standing_count(task)
@@ -94,6 +107,29 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if _was_doubted(history):
         contract["reading"] = READING
     return _call("propose_formation", {"contract": contract, "targets": prompts})
+
+
+def _about_each(task: Task, history: History) -> Reply | None:
+    """As many robots about each of several things that were pointed at, or what to ask first."""
+    each, ids = EACH.search(task.instruction), _target_ids(task)
+    if each is None or len(ids) < 2 or task.standing:
+        return None
+    at = task.instruction[: each.start()], task.instruction[each.end() :]
+    one = replace(task, instruction=f"{at[0]} {each['at']} it{at[1]}", pointed=task.pointed[:1])
+    reading = read_instruction(one.instruction, task.metres_per_pixel)
+    robots = task.robots or reading.robots or _number_answered(history)
+    question = question_of(one, reading, robots)
+    if question or robots is None:
+        return _call("ask_user", {"question": question or "How many robots?"})
+    whole, rest = divmod(robots, len(ids)) if each["shared"] else (robots, 0)
+    if whole < 1:
+        few = f"{robots} robots are too few for {len(ids)} things. How many robots?"
+        return _call("ask_user", {"question": few})
+    group = contract_of(reading, whole, [], [])["groups"][0]
+    groups = [group | {"targets": [t], "robots": whole + (k < rest)} for k, t in enumerate(ids)]
+    contract = _in_unit(task, {"groups": groups})
+    contract |= {"reading": READING} if _was_doubted(history) else {}
+    return _call("propose_formation", {"contract": contract, "targets": list(task.pointed)})
 
 
 def _found(
@@ -175,30 +211,32 @@ def _left_off(result: Result, history: History) -> str:
 def _said(task: Task, history: History) -> str:
     """The instruction with the answers to questions about it, which stand for what was unread."""
     text = task.instruction
-    offered = {c.id for c in calls_in(history) if c.arguments.get("candidates")}
-    for answer in history:
-        if (
-            isinstance(answer, Result)
-            and answer.name == "ask_user"
-            and answer.call_id not in offered
-        ):
-            if answer.text.strip().isdecimal():
-                continue  # how many robots
-            alone = read_instruction(answer.text, task.metres_per_pixel)
-            odd = alone.unscaled or [q for q in alone.unread if re.search("[0-9]", q)]
-            unread = read_instruction(text, task.metres_per_pixel).unread
-            for quote in () if odd else unread:  # an answer counts where it is wholly read
-                text = text.replace(quote, " ", 1)
-            text = f"{text} . {answer.text}"
+    said = _answered(history)
+    for k, answer in enumerate(said):
+        if answer.isdecimal():
+            continue  # how many robots
+        alone = read_instruction(answer, task.metres_per_pixel)
+        read = alone.robots or alone.group or alone.things or alone.sure
+        if alone.unread and not read and k < len(said) - 1:
+            continue  # nothing of it was understood, and it was said in another way since
+        odd = alone.unscaled or [q for q in alone.unread if re.search("[0-9]", q)]
+        unread = read_instruction(text, task.metres_per_pixel).unread
+        for quote in () if odd else unread:  # an answer counts where it is wholly read
+            text = text.replace(quote, " ", 1)
+        text = f"{text} . {answer}"
     return text
+
+
+def _answered(history: History) -> list[str]:
+    """What the person answered to questions that offered no candidates."""
+    offered = {c.id for c in calls_in(history) if c.arguments.get("candidates")}
+    asked = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
+    return [spelled(m.text.strip()) for m in asked if m.call_id not in offered]
 
 
 def _number_answered(history: History) -> int | None:
     """The number of robots that an answer gives alone."""
-    offered = {c.id for c in calls_in(history) if c.arguments.get("candidates")}
-    asked = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
-    plain = [m.text.strip() for m in asked if m.call_id not in offered]
-    return next((int(t) for t in plain if t.isascii() and t.isdecimal()), None)
+    return next((int(t) for t in _answered(history) if t.isascii() and t.isdecimal()), None)
 
 
 def _standing_count(task: Task) -> int | None:
@@ -255,14 +293,7 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
     planned = _planned(task, json.loads(proposal.text), history)
     if result.error:
         return f"{planned} {result.text}"
-    arrival = json.loads(result.text)
-    worst = length_text(arrival["worst_residual_px"], task.metres_per_pixel)
-    off = f"{worst} from its place"
-    wording = f"All arrived; the furthest is {off}."
-    if not arrival["arrived"]:
-        corrected = f"after {arrival['corrections']} corrections"
-        wording = f"Robot {arrival['worst_robot']} stopped {off} {corrected}."
-    return f"{planned} {wording}"
+    return f"{planned} {arrived(json.loads(result.text), task.metres_per_pixel)}"
 
 
 def _planned(task: Task, plan: dict[str, Any], history: History) -> str:

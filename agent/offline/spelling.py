@@ -1,9 +1,12 @@
-"""Slips of the fingers in what is typed, put right where only one known word can be meant."""
+"""What is typed, put as the vocabularies know it: slips of the fingers, and ways to write a thing.
+
+A slip is put right where only one known word can be meant.
+"""
 
 import re
 from functools import cache
 
-from .followup_words import known_words, lexicon
+from .followup_words import known_words, lexicon, rules
 from .lexicon import fillers
 from .phrases import phrase, table
 
@@ -23,8 +26,21 @@ UNITS = ("degrees", "pixels", "metres", "meters")
 
 
 def spelled(text: str) -> str:
-    """The text with words that are one slip away from a known one put right."""
+    """The text as the vocabularies have it, words one slip away from a known one put right."""
+    for pattern, put in _rewritten():
+        text = pattern.sub(put, text)
     return re.sub(r"[^\W\d_]+", lambda m: _meant(m[0].lower()) or m[0], text)
+
+
+@cache
+def _rewritten() -> list[tuple[re.Pattern[str], str]]:
+    """Patterns of followups.yaml, and what each becomes."""
+    turn = r"(?: of)?(?: an?| the)? (?:turn|way|rotation|revolution)\b(?: a?round)?"
+    parts = [
+        [rf"(?i)\b(?:(?:an?|one) )?{part}{turn}", f"turn {degrees} degrees"]
+        for part, degrees in rules()["parts"].items()
+    ]
+    return [(re.compile(p), put) for p, put in [*rules()["rewritten"], *parts]]
 
 
 @cache
@@ -33,6 +49,9 @@ def _meant(word: str) -> str | None:
     if word in SHORT:
         return SHORT[word]
     known = known_words() | fillers() | {*table()["follow"], *UNITS}
+    drawn = [re.sub(r"(.)\1{2,}", put, word) for put in (r"\1", r"\1\1")]  # "sooo"
+    if word not in drawn:
+        return next((w for w in drawn if w in known), None)
     if len(word) < LEAST_CORRECTED or word in known or phrase([word], 0) is not None:
         return None
     near = [w for w in _telling_words() if len(w) >= LEAST_CORRECTED and _is_slip(word, w)]

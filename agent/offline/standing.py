@@ -17,6 +17,7 @@ class Standing:
         said: words of the turn before, whatever came of them.
         words, edits: what was said last that changed the plan, and the changes; none at first.
         things: ids and labels of what was measured.
+        past: of the plans that undo goes back to, latest first: arrangements, and how many robots.
         steps, redo: how many changes can be taken back, and how many made again.
         centre: of each thing, px.
         pointed: ids of what this turn points at; `place`: the point, where it is one.
@@ -31,6 +32,7 @@ class Standing:
     words: str = ""
     edits: tuple[Mapping[str, Any], ...] = ()
     things: tuple[tuple[str, str], ...] = ()
+    past: tuple[tuple[tuple[str, ...], int], ...] = ()
     steps: int = 0
     redo: int = 0
     centre: Mapping[str, tuple[float, float]] | None = None
@@ -52,6 +54,7 @@ class Standing:
             words=last.get("words", ""),
             edits=tuple(last.get("edits") or ()),
             things=tuple((t["id"], t.get("label", "")) for t in facts.get("things", ())),
+            past=tuple((tuple(names), robots) for names, robots in facts.get("past", ())),
             steps=facts.get("undo", 0),
             redo=facts.get("redo", 0),
             centre={

@@ -56,7 +56,10 @@ _PROVIDERS = {
     ),
     "ollama": _Provider(OpenAIChat, "http://127.0.0.1:11434/v1", "OLLAMA_BASE_URL", (), "ollama"),
 }
-
+VARIABLES = tuple(
+    dict.fromkeys(n for p in _PROVIDERS.values() for n in (*p.variables, p.elsewhere))
+)
+"""What the environment may hold for them: keys, and base URLs."""
 
 _VERSION_AT_START, _VERSION_AT_END = re.compile(r"\A/v\d\w*"), re.compile(r"/v\d\w*\Z")
 """Of an interface: people write it at the end of a base URL, or leave it out."""

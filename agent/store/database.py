@@ -50,7 +50,8 @@ class DatabaseStore:
 
     def __init__(self, url: str) -> None:
         self._engine = engine_of(url)
-        self.label = self._engine.url.render_as_string(hide_password=True)
+        address = self._engine.url.set(query={})  # which may hold a password
+        self.label = address.render_as_string(hide_password=True)
         try:
             with self._as_storage_errors():
                 prepare(self._engine, self.label)

@@ -64,7 +64,7 @@ class FolderStore:
     """Folders in a folder, which is made where it is not there."""
 
     def __init__(self, root: Path) -> None:
-        self.root = root
+        self.root, self.label = root, str(root)
 
     def create(
         self,

@@ -20,12 +20,17 @@ def store_at(address: str | Path | None = None) -> Store:
         StorageError: it cannot be used.
     """
     if address is None:
-        address = f"sqlite:///{data_folder() / 'sessions.db'}"
+        address = default_store()
     if "://" not in str(address):
         return FolderStore(Path(address))
     from .database import DatabaseStore  # its library takes a while to load
 
     return DatabaseStore(str(address))
+
+
+def default_store() -> str:
+    """The address of the database in the user's data folder."""
+    return f"sqlite:///{data_folder() / 'sessions.db'}"
 
 
 def data_folder() -> Path:

@@ -139,6 +139,11 @@ class SessionFacts:
 class Store(Protocol):
     """Many sessions; safe for several processes at once."""
 
+    @property
+    def label(self) -> str:
+        """What errors call it: its address without secrets."""
+        ...
+
     def create(
         self,
         name: str = "",

@@ -5,7 +5,7 @@ import logging
 import time
 from typing import Any
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
 
 from ...agent.turns import Turn
 
@@ -27,6 +27,7 @@ class Metrics:
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
+        ProcessCollector(registry=self.registry)  # CPU and memory, where the system tells them
         here, by = self.registry, ["status"]
         self.turns = Counter("formup_turns", "Turns by what came of them.", by, registry=here)
         self.seconds = Histogram(

@@ -54,6 +54,7 @@ def run(service: Service, settings: ServerSettings) -> int:
         lifespan="on",
         log_config=None,
         server_header=False,
+        timeout_keep_alive=65,
         timeout_graceful_shutdown=round(settings.shutdown_seconds),
         limit_concurrency=settings.streams + BACKLOG,
     )

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncGenerator
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from formup.tools.fleet.protocol import Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.perception.image import Picture, picture_from_array
 from formup.tools.perception.target_prompt import TargetPrompt
+from PIL import Image
 
 RED, BLUE = (150, 130, 220, 190), (380, 150, 440, 210)
 
@@ -38,6 +40,14 @@ def session(picture: Picture) -> Session:
     made = Agent().start(picture, pointed=[TargetPrompt(box=RED)], settings=Settings(robots=8))
     assert made.say("Surround it").report.status == "planned"
     return made
+
+
+def test_a_small_picture_shows_the_plan_that_stands(session: Session, picture: Picture) -> None:
+    assert session.run is not None
+    seen = Image.open(BytesIO(session.run.view() or b""))
+    assert (seen.format, max(seen.size) < 1100) == ("JPEG", True)
+    other = session.image(picture_from_array(picture.pixels[::-1]))
+    assert other.view() is None, "its plans are void"
 
 
 def distance(run: Run) -> float:
@@ -252,7 +262,8 @@ class TestService:
             with pytest.raises(InputError, match="under way") as busy:
                 await service.say(name, "and now?")
             assert busy.value.kind == "busy"
-            stopped = await service.stop(name)
+            stopped, again = await asyncio.gather(service.stop(name), service.stop(name))
+            assert again is stopped
             return await turn, stopped
 
         run, stopped = asyncio.run(talk())

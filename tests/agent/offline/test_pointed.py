@@ -28,9 +28,18 @@ def said_of_both_courts(words: str) -> Run:
     [
         "Would you put two robots inside each court, please?",
         "put two robots inside every court",
-        "4 robots inside both of the courts",
+        "4 robots, half inside each",
     ],
 )
+def test_what_is_said_of_each_is_done_for_each(words: str) -> None:
+    run = said_of_both_courts(words)
+    assert run.report.status == "planned"
+    assert run.report.contract is not None
+    told = [(g.relation, g.targets, g.robots) for g in run.report.contract.groups]
+    assert told == [("inside", ("t1",), 2), ("inside", ("t2",), 2)]
+
+
+@pytest.mark.parametrize("words", ["4 robots inside both of the courts", "1 robot, half in each"])
 def test_what_is_said_of_each_is_not_done_for_one(words: str) -> None:
     run = said_of_both_courts(words)
     assert run.report.status == "question"
