@@ -89,7 +89,7 @@ class Begun:
         """What came of it, or that robots drive for long; before that None, as signs of life.
 
         Raises:
-            FormupError: nothing; it says why.
+            FormupError: it came to nothing.
         """
         moves = None
         while not self.turn.task.done():

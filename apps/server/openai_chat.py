@@ -63,7 +63,9 @@ async def picture(
     sha256: Annotated[str, Path(pattern="^[0-9a-f]{64}$")],
     hub: AHub,
 ) -> Response:
-    """The picture of an answer, for whoever was given its address: its hash is the secret."""
+    """The picture of an answer, without a token: whoever knows its hash was given the address, or
+    has the picture.
+    """
     try:
         files = hub.service.store.open(session).artefacts
         data = await asyncio.to_thread(files.get, sha256)

@@ -177,7 +177,10 @@ def test_large_pictures_are_refused_by_their_headers(serve: Serve, chat: Any) ->
 def test_options_that_change_nothing_are_taken(serve: Serve, chat: Any) -> None:
     tool = {"type": "function", "function": {"name": "move", "parameters": {"type": "object"}}}
     options: dict[str, Any] = {"tools": [tool], "tool_choice": "required", "temperature": 0.3}
-    assert "certified" in chat(serve()).say(CAGE, "us_coins.jpg", user="ann", seed=3, **options)
+    options |= {"response_format": {"type": "json_object"}, "user": "ann", "seed": 3}
+    talk = chat(serve())
+    assert "How many robots?" in talk.say("Cage the largest coin", "us_coins.jpg", **options)
+    assert "8 robots have certified places" in talk.say("8", **options)
 
 
 def test_only_the_person_commands(serve: Serve, chat: Any, store: Store) -> None:
