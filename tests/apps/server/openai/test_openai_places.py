@@ -188,6 +188,8 @@ def test_a_turn_goes_on_when_its_client_has_gone(
     next(iter(stream))
     assert asked.wait(10)
     stream.close()
+    impatient = chat(url, messages=talk.messages)
+    assert "I am still at what you said before" in impatient.say("and now?")
     answered.set()
     assert "Nothing to do." in chat(url, messages=talk.messages).again()
     assert [*turns(store).values()] == [[CAGE]]
