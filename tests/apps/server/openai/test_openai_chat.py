@@ -340,3 +340,13 @@ def test_pictures_alone_are_given_without_a_token(serve: Serve, chat: Any, store
             urlopen(f"{base}/{name}")
         assert error.value.code in (404, 422)
         error.value.close()
+
+
+def test_the_model_that_is_chosen_first_decides(
+    serve: Serve, client: Any, sent: Any, store: Store
+) -> None:
+    openai = client(serve({"offline": Agent(), "second": Agent()}))
+    assert [model.id for model in openai.models.list().data] == ["formup", "second"]
+    openai.chat.completions.create(model="second", messages=[sent(CAGE, "us_coins.jpg")])
+    (facts,) = store.sessions()
+    assert store.open(facts.id).events()[0].data["opening"]["agent"] == "second"
