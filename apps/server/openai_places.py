@@ -55,9 +55,8 @@ async def find(
     if place.turn == 0:
         return place.session, key
     if said.place is not None:
-        turns = _turns(events)
         for message in said.since[:-1]:  # those whose answers the client has lost
-            place = Place(place.session, turns.get(_key(place, message), place.turn))
+            place, events = await _answered(hub, person, place, message, events)
         key = _key(place, said.last)
     assert key is not None, "a history that is remembered has more than one message"
     return place.session if here else await _in_session(hub, person, said, place, key, events), key
@@ -115,12 +114,29 @@ async def _in_session(
     later = [e for e in events[place.turn :] if e.kind in STAMPED]
     if not later or later[0].data.get("key") in (key, key + PICTURE):
         return place.session
-    for facts in await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]"):
-        return facts.id
+    if (fork := await _fork_for(hub, person, key)) is not None:
+        return fork
     await asyncio.to_thread(check_room, hub, person)
     kept, store = _until(events, place.turn), hub.service.store
     files = files_named(kept, store.open(place.session).artefacts)
     return store.create(name_of(said, key), kept, files, person.name).id
+
+
+async def _answered(
+    hub: Hub, person: Person, place: Place, message: Message, events: Sequence[Event]
+) -> tuple[Place, Sequence[Event]]:
+    """Where a message led that was said at a place, with the events there; else the same place."""
+    key = _key(place, message)
+    fork = None if key in _turns(events) else await _fork_for(hub, person, key)
+    there = events if fork is None else await _events(hub, fork)
+    turn = _turns(there).get(key)
+    return (place, events) if turn is None else (Place(fork or place.session, turn), there)
+
+
+async def _fork_for(hub: Hub, person: Person, key: str) -> str | None:
+    """The session that was made for a message."""
+    found = await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]")
+    return found[0].id if found else None
 
 
 def _until(events: Sequence[Event], turn: int) -> tuple[Event, ...]:
