@@ -35,6 +35,9 @@ class ServerSettings(BaseModel):
         "", description="other origins whose pages may call it, as https://HOST, split by commas"
     )
     hosts: str = Field("", description="other names of this server, split by commas")
+    public_url: str = Field(
+        "", description="address that browsers reach it by, where it is not the one it is called by"
+    )
     upload_bytes: int = Field(32_000_000, ge=1_000, description="most bytes of a request")
     pixels: int = Field(40_000_000, ge=100, description="most pixels of a picture")
     sessions: int = Field(1_000, ge=1, description="most sessions of one token")

@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -150,6 +150,34 @@ def litellm(
     path = "/health/liveliness"
     with _running([str(program), *command], port, path, folder, more, pytestconfig) as url:
         yield Server(url, key)
+
+
+@pytest.fixture(scope="session")
+def served(
+    environments: Path, tmp_path_factory: pytest.TempPathFactory, pytestconfig: pytest.Config
+) -> Iterator[str]:
+    """formup's own server, for clients that others wrote; its URL."""
+    port, folder = _free_port(), tmp_path_factory.mktemp("formup")
+    command = [sys.executable, "-m", "formup", "serve", f"--port={port}", "--store=sessions"]
+    more = {"PYTHONPATH": os.environ.get("PYTHONPATH", "")}
+    with _running(command, port, "/health/live", folder, more, pytestconfig) as url:
+        yield url
+
+
+@pytest.fixture
+def python(environments: Path) -> Callable[[str, str, str], str]:
+    """Runs code in one of the environments: its name, the code, its input; what it prints."""
+
+    def run(name: str, code: str, given: str) -> str:
+        command = [str(environments / name / "bin/python"), "-c", code]
+        environment = {"PATH": os.environ["PATH"]} | QUIET
+        done = subprocess.run(
+            command, input=given, env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
 
 
 @pytest.fixture(params=PLACES)

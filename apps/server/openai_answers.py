@@ -1,0 +1,301 @@
+"""What a chat client is answered: a turn is begun, awaited, and told in Markdown with its picture.
+
+A turn goes on when its client has gone, and the same request sent again finds it.
+"""
+
+import asyncio
+import base64
+import hashlib
+import io
+import logging
+import re
+import time
+from collections.abc import AsyncGenerator
+from dataclasses import dataclass, field
+
+from fastapi import Request
+
+from ...agent.conversation import STOP
+from ...agent.outcomes import Cancelled, Paused
+from ...agent.report import Totals
+from ...agent.session import Run
+from ...agent.turns import Turn
+from ...tools.context import Settings
+from ...tools.draw import draw_plan
+from ...tools.errors import FormupError, InputError
+from ..run_display import choice_words
+from ..run_files import draw_choices
+from .hub import Hub, asked_by, check_owner, need
+from .openai_chores import chore
+from .openai_places import PICTURE, alone, begun_before, find, name_of, run_at
+from .openai_request import Message, Place, Said, digest
+from .sessions import check_room, checked_picture
+from .tokens import Person
+
+USUAL = "formup"
+"""What the usual agent is called."""
+BEAT, DRIVING = 5.0, 20.0
+"""Seconds between signs of life, and for which robots that drive are waited for."""
+NEEDED = (
+    "I need a picture of the place, and what the robots should do there: attach one picture, and "
+    "say for example *Surround the largest coin with 6 robots*."
+)
+EMPTY = "Say what to do, such as *a bit further out*, *undo* or *go*."
+BUSY = "I am still at what you said before. Wait a moment and say it again, or say **stop**."
+ON_THE_WAY = (
+    "The robots are on their way, and it takes a while. Say **stop** to hold them where they are; "
+    "*are they there?* tells how far they are."
+)
+DRIVES = "The robots are still on their way. Wait for them, or say **stop** to hold them."
+CUT_OFF = "That was stopped before it began; nothing was done."
+BROKEN_OFF = "That was broken off before its end; robots that drove are held. Say what to do next."
+NOTHING_MOVES = "No robots move here; there is nothing to stop."
+DATA = re.compile(r"data:image/[\w.+-]+;base64,", re.I)
+UNSAFE = re.compile(r"\](?=[(\[:])|<(?=[a-z/!?])", re.I)
+"""What would make a link, a picture or HTML of words that a model may have read in a picture."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a client is told.
+
+    Attributes:
+        place: the turn that it came of; None for none.
+    """
+
+    text: str
+    place: Place | None = None
+    usage: Totals = field(default_factory=Totals)
+
+    async def told(self) -> AsyncGenerator["Answer"]:
+        """Itself, at once."""
+        yield self
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A turn on its way."""
+
+    base: str
+    session: str
+    turn: Turn
+
+    @property
+    def place(self) -> Place:
+        """Where it is."""
+        return Place(self.session, self.turn.number)
+
+    async def told(self) -> AsyncGenerator[Answer | None]:
+        """What came of it, or that robots drive for long; before that None, as signs of life.
+
+        Raises:
+            FormupError: it came to nothing.
+        """
+        moves = None
+        while not self.turn.task.done():
+            if self.turn.moving.is_set():
+                moves = moves or time.monotonic()
+                if time.monotonic() - moves >= DRIVING:
+                    yield _at_once(ON_THE_WAY, self.base, self.place)
+                    return
+            yield None
+            await asyncio.wait({self.turn.task}, timeout=BEAT)
+        run = await self.turn.ended()
+        yield Answer(CUT_OFF) if run is None else await told(self.place, run, self.base)
+
+
+async def awaited(begun: Answer | Begun) -> Answer:
+    """What there is to tell, once it is there."""
+    answers = [answer async for answer in begun.told() if answer is not None]
+    return answers[-1]
+
+
+def problem(error: Exception) -> str:
+    """What a client is told of an error; only the log has what is our own."""
+    if isinstance(error, FormupError):
+        return str(error)
+    logging.getLogger("formup").error("a turn broke", exc_info=error)
+    return "The server failed at this; its log says why."
+
+
+def base_of(request: Request, hub: Hub) -> str:
+    """The address of this server, as browsers reach it."""
+    return (hub.settings.public_url or str(request.base_url)).rstrip("/")
+
+
+def agents(hub: Hub) -> dict[str, str]:
+    """Names of agents by what clients call them; the usual one first."""
+    usual, *others = hub.service.agents
+    return {USUAL: usual, **{name: name for name in others}}
+
+
+async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Begun:
+    """Do what a request says, as far as its beginning.
+
+    Args:
+        base: the address of this server.
+
+    Raises:
+        InputError: it cannot be done.
+    """
+    if said.model not in agents(hub):
+        there = ", ".join(agents(hub))
+        raise InputError(
+            f"There is no model {said.model[:80]!r} here; there is {there}.", "missing"
+        )
+    if (answer := chore(said)) is not None:
+        return Answer(answer)
+    if said.place is not None and not said.since:  # nothing has been said since our answer
+        check_owner(said.place.session, person)
+        return await told(said.place, await run_at(hub, said.place), base)
+    _check(said.last)
+    if said.last.text.strip(" .!").lower() in STOP:
+        return await _hold(hub, person, said, base)
+    need(person, "plan")
+    async with alone(hub, person):
+        found = await find(hub, person, said) or await _open_session(hub, person, said)
+    if found is None:
+        return Answer(NEEDED)
+    session, key = found
+    try:
+        turn = await _turn(hub, person, said, session, key)
+        if turn is None:
+            return _at_once(EMPTY, base, said.place)
+        await turn.begin()
+        return Begun(base, session, turn)
+    except InputError as error:
+        if error.kind == "repeated":
+            place = Place(session, error.facts["turn"])
+            return await told(place, await run_at(hub, place), base)
+        if error.kind != "busy":
+            raise
+    now = hub.service.turn(session)
+    place = Place(session, now.number) if now and now.number else said.place
+    return _at_once(DRIVES if now and now.moving.is_set() else BUSY, base, place)
+
+
+async def told(place: Place, run: Run, base: str) -> Answer:
+    """What came of a turn, with its picture, which lies in its session."""
+    report, choices = run.report, run.report.candidates or ()
+    message = BROKEN_OFF if isinstance(run.outcome, Cancelled) else report.message
+    lines = [message]
+    if choices:
+        lines.append("\n".join(f"- {choice_words(choice)}" for choice in choices))
+    if isinstance(run.outcome, Paused) and run.outcome.plan_id is not None:
+        lines.append(f"Say **yes** to move them to plan {run.outcome.plan_id}, or **no**.")
+    elif report.status == "planned":
+        lines.append("Say **go** to move them there, or what to change.")
+    text = UNSAFE.sub(r"\\\g<0>", "\n\n".join(lines))
+    png = await asyncio.to_thread(_picture, run)
+    if png is None or run.stored is None:
+        return _at_once(text, base, place, report.usage)
+    sha256 = await asyncio.to_thread(run.stored.artefacts.put, png)
+    shows = "The choices" if choices else f"Plan {report.plan_id}"
+    text += f"\n\n![{shows}]({base}{place.path}/{sha256}.png)"
+    return Answer(text, place, report.usage)
+
+
+async def _turn(hub: Hub, person: Person, said: Said, session: str, key: str | None) -> Turn | None:
+    """The turn that a request begins; None where it says nothing new.
+
+    Raises:
+        InputError: it cannot begin, or was there before.
+    """
+    held, turn, words = await hub.service.fresh(session), None, said.last.text
+    if held.run is None and not words:  # they came before the picture
+        words = next((m.text for m in reversed(said.users) if m.text), "")
+    for address in said.last.pictures:
+        data = _data(address)
+        if hashlib.sha256(data).hexdigest() != held.picture.sha256:
+            picture = await asyncio.to_thread(checked_picture, data, "picture", hub)
+            turn = hub.service.image(session, picture, asked_by(person, key and key + PICTURE))
+    if words:
+        try:
+            if turn is not None:
+                await turn
+        except InputError as error:
+            if error.kind != "repeated":
+                raise
+        turn = hub.service.say(session, words, asked_by(person, key))
+    return turn
+
+
+async def _open_session(hub: Hub, person: Person, said: Said) -> tuple[str, str] | None:
+    """A new session, or the one that the same message began just now; None without a picture."""
+    pictured = [m for m in said.users if m.pictures]
+    if not pictured or not any(m.text for m in said.users):
+        return None
+    key = digest(said.who, *said.users)
+    if (before := await begun_before(hub, person, key)) is not None:
+        return before, key
+    await asyncio.to_thread(check_room, hub, person)
+    _check(pictured[-1])
+    data = _data(pictured[-1].pictures[0])
+    made = hub.service.open(
+        await asyncio.to_thread(checked_picture, data, "picture", hub),
+        settings=Settings(fleet=hub.settings.fleet),
+        name=name_of(said, key),
+        agent=agents(hub)[said.model],
+        owner=person.name,
+    )
+    return made, key
+
+
+async def _hold(hub: Hub, person: Person, said: Said, base: str) -> Answer:
+    """Hold the robots, whoever asks and whatever has happened since."""
+    found = await find(hub, person, said, here=True)
+    run = await hub.service.stop(found[0], asked_by(person)) if found else None
+    if found is None or run is None:
+        return _at_once(NOTHING_MOVES, base, said.place)
+    return await told(Place(found[0], hub.service.last_turn(found[0])), run, base)
+
+
+def _data(address: str) -> bytes:
+    """What a data URL holds; nothing is ever fetched.
+
+    Raises:
+        InputError: it is none of a picture.
+    """
+    head = DATA.match(address)
+    if head is None:
+        shown = address[:60] or "a file's id"
+        raise InputError(
+            f"The picture is given as {shown!r}, and nothing is fetched; attach the file itself, "
+            "as a data URL (data:image/png;base64,...)."
+        )
+    try:
+        return base64.b64decode(address[head.end() :], validate=True)
+    except ValueError:
+        raise InputError("The picture's data URL is no valid base64; attach it again.") from None
+
+
+def _check(message: Message) -> None:
+    """Refuse parts of a message that would be left out without a word."""
+    if message.others:
+        raise InputError(
+            f"A message may hold text and a picture; this one holds {message.others[0][:40]!r}."
+        )
+    if len(message.pictures) > 1:
+        raise InputError(
+            f"{len(message.pictures)} pictures came with one message; send one picture at a time."
+        )
+
+
+def _picture(run: Run) -> bytes | None:
+    """What a turn shows: choices, or the plan that it was about."""
+    report, file = run.report, io.BytesIO()
+    node = run.world.plans.get(report.plan_id or "")
+    if report.candidates:
+        drawn = draw_choices(run)
+    elif node is not None and report.status in ("planned", "deployed", "needs_approval"):
+        drawn = draw_plan(run.context.picture, run.world, node.plan, report.instruction)
+    else:
+        return None
+    drawn.save(file, "PNG")
+    return file.getvalue()
+
+
+def _at_once(text: str, base: str, place: Place | None, usage: Totals | None = None) -> Answer:
+    """An answer without a picture: a definition that Markdown does not show has its place."""
+    mark = f"\n\n[formup]: {base}{place.path}" if place else ""
+    return Answer(text + mark, place, usage or Totals())

@@ -1,0 +1,83 @@
+"""What chat programs ask of the model for themselves: titles, tags, suggestions, search queries.
+
+Taken for words of a person these would be orders to robots: they are told by several signs and
+answered here, without a turn, a tool, or a look at any session.
+"""
+
+import re
+import textwrap
+
+from pydantic_core import to_json
+
+from .openai_request import Said
+
+TASK = re.compile(r"\w+_generation|function_calling")
+"""How Open WebUI names chores, where it does."""
+KNOWN = re.compile(
+    r"\s*#+ *\**task\b|.*<chat_history>"
+    r"|.*return the correct tool\(s\) from the list of available tools"
+    r"|your task is to reflect the speaker's likely facial expression"
+    r"|you have been provided with a set of responses from various models",
+    re.I | re.S,
+)
+SIGNS = (
+    re.compile(r"\b(title|name|tags?|summar\w+|follow.?ups?|suggest\w*|quer(y|ies)|emoji)\b", re.I),
+    re.compile(r"\b(conversation|chat|discussion|dialog(ue)?)\b", re.I),
+    re.compile(
+        r"\bjson\b|\bonly (the|return|reply|respond|output)\b|\b(return|reply|output) only\b"
+        r"|\bwords?.or.(less|fewer)\b|\bno punctuation\b|\bwithout (any )?(lead-in|punct|quot)"
+        r"|\bmax(imum)?( of)? \d+",
+        re.I,
+    ),
+)
+"""What is wanted, of what, in which form: only all three make a chore."""
+HEAD = 400
+"""Characters of a system's message that tell a chore; long ones speak of everything."""
+SUGGESTIONS = ("A bit further out", "How far apart are the robots?", "Undo")
+KINDS: tuple[tuple[str, str, object], ...] = (
+    (r"tool_calls|function_calling", "tool_calls", ()),
+    (r"autocomplet", "text", ""),
+    (r"follow.?up|suggest", "follow_ups", SUGGESTIONS),
+    (r"\btags?\b|tags_", "tags", ("Robotics", "Formation")),
+    (r"search quer|query_", "queries", ()),
+    (r"\bimage generation\b|image_prompt", "prompt", ""),
+)
+"""By what each is told, and what it is given."""
+TITLE = re.compile(r"\b(title|name)\b|title_", re.I)
+SPOKEN = re.compile(r"^\W*(?:user|human)\W*?: *(\S.*)$", re.I | re.M)
+HISTORY = re.compile(r"<chat_history>|^\W*(?:user|human)\W*?:", re.I | re.M)
+NOTHING = (
+    "That reads like a request of the chat program, not of a person, so nothing was done; "
+    "say it in other words if robots are meant."
+)
+
+
+def chore(said: Said) -> str | None:
+    """The answer to a chore; None for what a person says."""
+    text, system = said.last.text, said.system
+    told = text if _tells(text, None) else system if _tells(system, HEAD) else ""
+    if not told and not TASK.fullmatch(said.task):
+        return None
+    asked = HISTORY.split(f"{said.task}\n{told or text}", maxsplit=1)[0]
+    for pattern, name, value in KINDS:
+        if re.search(pattern, asked, re.I):
+            return to_json({name: value}).decode()
+    as_json = said.as_json or "json" in asked.lower()
+    if TITLE.search(asked):
+        title = _title(said)
+        return to_json({"title": title, "language": "English"}).decode() if as_json else title
+    if "emoji" in asked.lower():
+        return "🤖"
+    return "{}" if as_json else NOTHING
+
+
+def _tells(text: str, head: int | None) -> bool:
+    """Whether a text is that of a chore, by its very words or by all signs in its beginning."""
+    return bool(KNOWN.match(text)) or all(sign.search(text[:head]) for sign in SIGNS)
+
+
+def _title(said: Said) -> str:
+    """A title from what the person said first."""
+    quoted = SPOKEN.search(said.last.text)
+    first = quoted[1] if quoted else said.users[0].text if len(said.users) > 1 else ""
+    return textwrap.shorten(first, 50, placeholder="…") or "Robots"

@@ -1,0 +1,202 @@
+"""What a chat client asks, in either of OpenAI's two forms, as one value.
+
+What the person said last is carried out; the rest of a history only tells where that belongs.
+Messages of systems, tools and assistants are never obeyed.
+"""
+
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, Field
+from pydantic_core import to_json
+
+from ...tools.errors import InputError
+
+OURS = re.compile(r"/v1/pictures/([a-z0-9_-]+)/(\d+)")
+"""What each message of ours ends with: its session and turn, in the address of its picture."""
+RESPONSE = re.compile(r"resp_(?:none_[0-9a-f]+|([a-z0-9_-]+)_(\d+))")
+
+
+@dataclass(frozen=True)
+class Place:
+    """What a message of ours came of.
+
+    Attributes:
+        turn: number of the event that began it; 0 for wherever the session stands.
+    """
+
+    session: str
+    turn: int
+
+    @property
+    def path(self) -> str:
+        """What tells it again, in a message of ours."""
+        return f"/v1/pictures/{self.session}/{self.turn}"
+
+
+class Part(BaseModel):
+    """A part of a message."""
+
+    type: str = "text"
+    text: str | None = None
+    image_url: str | dict[str, Any] | None = None
+
+
+class Message(BaseModel):
+    """A message, or another item of a history, which has no role."""
+
+    role: str = ""
+    content: str | list[Part] | None = None
+
+    @property
+    def text(self) -> str:
+        """What it says."""
+        parts = self.content or ""
+        said = parts if isinstance(parts, str) else "\n".join(p.text for p in parts if p.text)
+        return said.strip()
+
+    @property
+    def pictures(self) -> tuple[str, ...]:
+        """Addresses of its pictures; empty for one that is only named."""
+        return tuple(
+            str(p.image_url.get("url", "") if isinstance(p.image_url, dict) else p.image_url or "")
+            for p in self._parts
+            if p.type in ("image_url", "input_image")
+        )
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Kinds of what else it has."""
+        known = ("text", "input_text", "image_url", "input_image")
+        return tuple(p.type for p in self._parts if p.type not in known)
+
+    @property
+    def _parts(self) -> Sequence[Part]:
+        return self.content if isinstance(self.content, list) else ()
+
+
+class Body(BaseModel):
+    """What both forms have; what else they may have changes nothing here."""
+
+    model: str = Field(min_length=1, max_length=200)
+    stream: bool | None = None
+    n: int | None = None
+    modalities: list[str] | None = None
+    audio: dict[str, Any] | None = None
+    metadata: dict[str, Any] | None = None
+    response_format: dict[str, Any] | None = None
+    user: str | None = None
+
+
+class ChatBody(Body):
+    """The body of a chat completion."""
+
+    messages: list[Message] = Field(min_length=1)
+    stream_options: dict[str, Any] | None = None
+
+
+class ResponsesBody(Body):
+    """The body of a response."""
+
+    input: str | list[Message]
+    previous_response_id: str | None = None
+
+    @property
+    def messages(self) -> list[Message]:
+        """Its input, as messages."""
+        said = self.input
+        return [Message(role="user", content=said)] if isinstance(said, str) else said
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a person said, where.
+
+    Attributes:
+        model: who is to decide.
+        users: the person's messages, the last one last.
+        since: those after `place`.
+        place: of the last message of ours in the history, or that the client names.
+        chat: the client's name for the conversation; empty if it gives none.
+        who: what tells apart the people behind one token.
+        system: the first of the client's own instructions, which tell its chores.
+        task: the chore, where the client names it.
+        as_json: whether JSON is wanted.
+    """
+
+    model: str
+    users: tuple[Message, ...]
+    since: tuple[Message, ...]
+    place: Place | None
+    chat: str
+    who: str
+    system: str
+    task: str
+    as_json: bool
+
+    @property
+    def last(self) -> Message:
+        """What is carried out."""
+        return self.users[-1]
+
+
+def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
+    """What a request says.
+
+    Raises:
+        InputError: something in it cannot be done.
+    """
+    _check(body)
+    messages, place, after = body.messages, None, 0
+    for number, message in enumerate(messages):
+        if message.role == "assistant" and (found := OURS.findall(message.text)):
+            place, after = Place(found[-1][0], int(found[-1][1])), number
+    if isinstance(body, ResponsesBody) and body.previous_response_id is not None:
+        place, after = place_of(body.previous_response_id), 0
+    if place is None and (session := headers.get("x-formup-session")):
+        place = Place(session, 0)
+    users = tuple(m for m in messages if m.role == "user")
+    if not users:
+        raise InputError("The request holds no message of role user; give what the person says.")
+    facts = {k: str(v) for k, v in (body.metadata or {}).items()}
+    chat = facts.get("chat_id") or facts.get("conversation_id")
+    return Said(
+        model=body.model,
+        users=users,
+        since=tuple(m for m in messages[after:] if m.role == "user"),
+        place=place,
+        chat=chat or headers.get("x-openwebui-chat-id", ""),
+        who=f"{body.user or ''} {headers.get('x-openwebui-user-id', '')}",
+        system="\n".join(m.text for m in messages if m.role in ("system", "developer")),
+        task=facts.get("task", ""),
+        as_json="json" in str((body.response_format or {}).get("type")),
+    )
+
+
+def place_of(response: str) -> Place | None:
+    """The place of a response; None for one that came of no turn.
+
+    Raises:
+        InputError: it is none of ours (`missing`).
+    """
+    found = RESPONSE.fullmatch(response)
+    if found is None:
+        raise InputError(f"There is no response {response[:80]!r}.", "missing")
+    return None if found[1] is None else Place(found[1], int(found[2]))
+
+
+def digest(*parts: object) -> str:
+    """A hash by which the same request is known again."""
+    given = [p.model_dump() if isinstance(p, Message) else p for p in parts]
+    return hashlib.sha256(to_json(given)).hexdigest()[:32]
+
+
+def _check(body: Body) -> None:
+    """Refuse what would be left out without a word."""
+    if (body.n or 1) > 1:
+        raise InputError(f"n is {body.n}; there is one answer to a message: leave n out, or 1.")
+    if body.audio or "audio" in (body.modalities or ()):
+        raise InputError("Audio cannot be answered with; ask for text alone.")
