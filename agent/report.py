@@ -281,7 +281,7 @@ def _last_words(outcome: Outcome) -> str:
     if isinstance(outcome, Stopped):
         return outcome.reason
     if isinstance(outcome, Cancelled):
-        return "The run was cancelled."
+        return "It was stopped before its end; robots are held where they are."
     return outcome.text
 
 

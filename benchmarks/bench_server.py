@@ -6,6 +6,7 @@ memory after many turns, and how many follow one deployment.
 """
 
 import asyncio
+import json
 import os
 import re
 import subprocess
@@ -17,17 +18,18 @@ from pathlib import Path
 from statistics import quantiles
 from tempfile import TemporaryDirectory
 
-import httpx
-
 from ..agent.agent import Agent
 from ..agent.service import Service
 from ..agent.store.places import store_at
 from ..tools.context import Settings
 from ..tools.perception.image import load_picture
+from .growth import show
 
 PHOTO = Path(__file__).parents[1] / "evals/photos/images/us_coins.jpg"
 WORDS = ("Cage the largest coin", "a bit further out", "turn it 10 degrees", "how far is robot 4?")
 SESSIONS, TURNS, SUBSCRIBERS = 200, (1_000, 10_000), 1_000
+LINE = 2**24
+"""Most bytes of an event."""
 Say = Callable[[str, str], Awaitable[None]]
 
 
@@ -64,9 +66,52 @@ async def _in_process(store: str) -> tuple[list[float], float, float]:
     return firsts, wall, spent
 
 
+class Client:
+    """A client of a server, one connection a request.
+
+    Args:
+        address: HOST:PORT.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._host, _, self._port = address.partition(":")
+
+    async def opened(self, method: str, path: str, body: bytes = b"") -> asyncio.StreamReader:
+        """The response to a request, as it comes."""
+        reader, writer = await asyncio.open_connection(self._host, int(self._port), limit=LINE)
+        kind = "application/json" if body[:1] == b"{" else "image/jpeg"
+        head = f"{method} {path} HTTP/1.1\r\nHost: {self._host}\r\nConnection: close\r\n"
+        head += f"Content-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
+        writer.write(head.encode() + body)
+        await writer.drain()
+        return reader
+
+    async def asked(self, method: str, path: str, body: bytes = b"") -> str:
+        """The whole response."""
+        text = (await (await self.opened(method, path, body)).read()).decode()
+        assert text.startswith("HTTP/1.1 2"), text[:500]
+        return text
+
+    async def begin(self, data: bytes) -> str:
+        """A session about a picture; its path."""
+        made = await self.asked("POST", "/api/sessions?robots=8", data)
+        return f"/api/sessions/{json.loads(made[made.index('{') :])['id']}"
+
+    async def say(self, session: str, words: str) -> None:
+        """A turn, to its end."""
+        said = json.dumps({"words": words}).encode()
+        await self.asked("POST", f"{session}/messages?wait=60", said)
+
+    async def figure(self, name: str) -> float:
+        """One of the server's figures."""
+        found = re.search(rf"^{name} (\S+)$", await self.asked("GET", "/metrics"), re.M)
+        assert found is not None
+        return float(found[1])
+
+
 @asynccontextmanager
-async def _server(store: str) -> AsyncGenerator[httpx.AsyncClient]:
-    """A server in a process of its own, and a client of it."""
+async def _server(store: str) -> AsyncGenerator[Client]:
+    """A server in a process of its own."""
     environment = os.environ | {
         "FORMUP_REQUESTS_PER_MINUTE": "1000000",
         "FORMUP_REQUESTS": "5000",
@@ -75,49 +120,23 @@ async def _server(store: str) -> AsyncGenerator[httpx.AsyncClient]:
     command = [sys.executable, "-m", "formup", "serve", "--port", "0", "--store", store]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stderr is not None
-        while not (found := re.search(r"http://\S+:\d+", process.stderr.readline())):
+        while not (found := re.search(r"http://(\S+:\d+)", process.stderr.readline())):
             pass
         drain = asyncio.get_running_loop().run_in_executor(None, process.stderr.read)
-        limits = httpx.Limits(max_connections=None, keepalive_expiry=2)
         try:
-            async with httpx.AsyncClient(
-                base_url=found[0].rstrip(";"), timeout=600, limits=limits, trust_env=False
-            ) as client:
-                yield client
+            yield Client(found[1])
         finally:
             process.terminate()
             await drain
 
 
-async def _figure(client: httpx.AsyncClient, name: str) -> float:
-    found = re.search(rf"^{name} (\S+)$", (await client.get("/metrics")).text, re.M)
-    assert found is not None
-    return float(found[1])
-
-
-async def _begin(client: httpx.AsyncClient, data: bytes) -> str:
-    made = await client.post("/api/sessions", params={"robots": 8}, content=data)
-    return made.raise_for_status().json()["id"]
-
-
-async def _say(client: httpx.AsyncClient, session: str, words: str) -> None:
-    said = await client.post(
-        f"/api/sessions/{session}/messages", params={"wait": 60}, json={"words": words}
-    )
-    said.raise_for_status()
-
-
 async def _over_http(store: str) -> tuple[list[float], float, float]:
     data = PHOTO.read_bytes()
     async with _server(store) as client:
-        cpu = await _figure(client, "process_cpu_seconds_total")
-
-        async def say(session: str, words: str) -> None:
-            await _say(client, session, words)
-
-        firsts, wall = await _talks(lambda: _begin(client, data), say)
-        spent = await _figure(client, "process_cpu_seconds_total") - cpu
-        planned = await _figure(client, 'formup_turns_total{status="planned"}')
+        cpu = await client.figure("process_cpu_seconds_total")
+        firsts, wall = await _talks(lambda: client.begin(data), client.say)
+        spent = await client.figure("process_cpu_seconds_total") - cpu
+        planned = await client.figure('formup_turns_total{status="planned"}')
         assert planned == 3 * SESSIONS, f"{planned:g} planned of {3 * SESSIONS}: some were lost"
     return firsts, wall, spent
 
@@ -133,37 +152,35 @@ async def _memory(store: str) -> None:
     async with _server(store) as client:
         for until in TURNS:
             while done < until:
-                session = await _begin(client, data)
+                session = await client.begin(data)
                 for words in WORDS:
-                    await _say(client, session, words)
+                    await client.say(session, words)
                 done += len(WORDS)
-            held = await _figure(client, "process_resident_memory_bytes")
-            print(f"  {until:>6} turns: {held / 2**20:6.1f} MiB", flush=True)  # noqa: T201
+            held = await client.figure("process_resident_memory_bytes")
+            show([f"  {until:>6} turns: {held / 2**20:6.1f} MiB"])
 
 
 async def _followers(store: str) -> None:
     """Many follow one deployment; each has to hear its end."""
     async with _server(store) as client:
-        session = await _begin(client, PHOTO.read_bytes())
-        await _say(client, session, WORDS[0])
+        session = await client.begin(PHOTO.read_bytes())
+        await client.say(session, WORDS[0])
 
         async def follow() -> float:
-            path = f"/api/sessions/{session}/events"
-            async with client.stream("GET", path) as told:
-                async for line in told.aiter_lines():
-                    if '"status": "deployed"' in line or '"status":"deployed"' in line:
-                        return time.perf_counter()
+            reader = await client.opened("GET", f"{session}/events")
+            while line := await reader.readline():
+                if b"RUN_FINISHED" in line and b'"deployed"' in line:
+                    return time.perf_counter()
             raise AssertionError("a stream ended before the deployment did")
 
         following = [asyncio.create_task(follow()) for _ in range(SUBSCRIBERS)]
-        while await _figure(client, "formup_event_streams") < SUBSCRIBERS:
+        while await client.figure("formup_event_streams") < SUBSCRIBERS:
             await asyncio.sleep(0.2)
         began = time.perf_counter()
-        await _say(client, session, "go")
-        ends = [end - began for end in await asyncio.gather(*following)]
-        print(  # noqa: T201
-            f"  {SUBSCRIBERS} subscribers heard of the end of one deployment, the last after "
-            f"{max(ends):.1f} s"
+        await client.say(session, "go")
+        last = max(await asyncio.gather(*following)) - began
+        show(
+            [f"  {SUBSCRIBERS} followed one deployment; the last heard its end after {last:.1f} s"]
         )
 
 
@@ -175,14 +192,17 @@ def main() -> None:
             "in process": asyncio.run(_in_process(stores[0])),
             "over HTTP": asyncio.run(_over_http(stores[1])),
         }
-        print(f"{SESSIONS} conversations of {len(WORDS)} turns at once")  # noqa: T201
-        for name, row in rows.items():
-            print(_row(name, *row))  # noqa: T201
         ratio = rows["over HTTP"][2] / rows["in process"][2]
-        print(f"  CPU of the server to that of the bare service: {ratio:.2f}")  # noqa: T201
+        show(
+            [
+                f"{SESSIONS} conversations of {len(WORDS)} turns at once",
+                *(_row(name, *row) for name, row in rows.items()),
+                f"  CPU of the server to that of the bare service: {ratio:.2f}",
+            ]
+        )
         asyncio.run(_followers(stores[2]))
         if "--memory" in sys.argv:
-            print("memory of the server, conversations one after another")  # noqa: T201
+            show(["memory of the server, conversations one after another"])
             asyncio.run(_memory(stores[3]))
 
 

@@ -28,10 +28,15 @@ def blocks(language: str) -> list[tuple[str, str]]:
     ]
 
 
+ELSEWHERE = {
+    "prompts.md": "tests/apps/test_prompts.py",
+    "serving.md": "tests/apps/server/test_docs.py",
+}
+"""Pages whose commands other tests run: servers do not end by themselves."""
 COMMANDS = [
     [line.removeprefix("$ ") for line in block.splitlines() if line.startswith("$ formup")]
     for page, block in blocks("console")
-    if page != "prompts.md"  # tests/apps/test_prompts.py runs those
+    if page not in ELSEWHERE
 ]
 """Commands by the block they stand in: a later one may go on where an earlier one ended."""
 

@@ -5,7 +5,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import httpx
 import pytest
 from formup.agent.session import load_run
 from formup.agent.store.places import store_at
+from formup.agent.store.protocol import Event
 
 PHOTO = Path(__file__).parents[3] / "evals/photos/images/us_coins.jpg"
 JSON = {"Content-Type": "application/json"}
@@ -60,52 +61,60 @@ def begun(client: httpx.Client) -> str:
     return session
 
 
+def request_of(round: int, session: str, client: httpx.Client) -> dict[str, Any]:
+    """A deployment, or a turn, under a key of its own."""
+    headers = {"Idempotency-Key": f"k{round}"}
+    if round % 2:
+        plan = client.get(session).json()["current"]
+        deployment = {"url": f"{session}/deployments", "json": {"plan_id": plan}}
+        return {**deployment, "headers": headers}
+    said = {"url": f"{session}/messages", "json": {"words": "a bit further out"}}
+    return {**said, "headers": headers}
+
+
+def killed(pid: int, client: httpx.Client, request: dict[str, Any], after: float) -> None:
+    """Send a request and kill the server so many seconds later."""
+
+    def ask() -> None:
+        with suppress(httpx.HTTPError):
+            client.post(**request)
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    time.sleep(after)
+    os.kill(pid, signal.SIGKILL)
+    asking.join(20)
+
+
+def moves(events: Sequence[Event]) -> int:
+    return len([event for event in events if event.kind == "moving"])
+
+
 def test_kills_in_the_middle_of_turns_and_deployments(start: Start, tmp_path: Path) -> None:
     dice, store = random.Random(4), store_at(f"sqlite:///{tmp_path}/s.db")
     pid, client = start()
-    session = begun(client)
+    session, interrupted = begun(client), 0
     name = session.rpartition("/")[2]
-    interrupted = 0
     for round in range(KILLS):
-        plan = client.get(session).json()["current"]
-        key = f"k{round}"
-        send: dict[str, Any] = (
-            {"url": f"{session}/deployments", "json": {"plan_id": plan}}
-            if round % 2
-            else {"url": f"{session}/messages", "json": {"words": "a bit further out"}}
-        )
-        send["headers"] = {"Idempotency-Key": key}
-
-        def ask(client: httpx.Client = client, send: dict[str, Any] = send) -> None:
-            with suppress(httpx.HTTPError):
-                client.post(**send)
-
-        asking = threading.Thread(target=ask)
-        asking.start()
-        time.sleep(dice.uniform(0.0, 0.5))
-        os.kill(pid, signal.SIGKILL)
-        asking.join(20)
-
+        request = request_of(round, session, client)
+        killed(pid, client, request, dice.uniform(0.0, 0.5))
         pid, client = start()
-        run = load_run(store.open(name))
-        assert run.world.robots is not None, "the session is whole"
+        load_run(store.open(name))  # the session is whole
         events = store.open(name).events()
-        keyed = [e for e in events if e.data.get("key") == key]
+        keyed = [e for e in events if e.data.get("key") == f"k{round}"]
         assert len(keyed) <= 1
         for event in keyed:
             state = client.get(f"{session}/turns/{event.number}").json()
             ended = next((e for e in events[event.number :] if e.kind == "end"), None)
             assert state["status"] == ("interrupted" if ended is None else ended.data["status"])
             interrupted += ended is None
-        moved = len([e for e in events if e.kind == "moving"])
-        again = client.post(**send)
+        again = client.post(**request)
         assert again.status_code in (200, 202), again.text
         if keyed:
             assert again.json()["turn"] == keyed[0].number, "it is not done again"
-            after = [e for e in store.open(name).events() if e.kind == "moving"]
-            assert len(after) == moved, "no robot moves twice"
-        number = again.json()["turn"]
-        if not keyed:
+            assert moves(store.open(name).events()) == moves(events), "no robot moves twice"
+        else:
+            number = again.json()["turn"]
             done = client.get(f"{session}/turns/{number}", params={"wait": 30}).json()
             assert done["status"] in ("deployed", "planned", "impossible", "answered")
         if round % 5 == 4:  # start over, before there is no more room

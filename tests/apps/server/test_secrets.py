@@ -11,7 +11,6 @@ from pathlib import Path
 
 import httpx
 import pytest
-
 from formup.apps.server.tokens import Tokens
 
 from .conftest import PHOTOS
