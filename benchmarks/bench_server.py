@@ -76,7 +76,10 @@ class Client:
     def __init__(self, address: str) -> None:
         self._host, _, self._port = address.partition(":")
 
-    async def opened(self, method: str, path: str, body: bytes = b"") -> asyncio.StreamReader:
+    @asynccontextmanager
+    async def opened(
+        self, method: str, path: str, body: bytes = b""
+    ) -> AsyncGenerator[asyncio.StreamReader]:
         """The response to a request, as it comes."""
         reader, writer = await asyncio.open_connection(self._host, int(self._port), limit=LINE)
         kind = "application/json" if body[:1] == b"{" else "image/jpeg"
@@ -84,11 +87,13 @@ class Client:
         head += f"Content-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
         writer.write(head.encode() + body)
         await writer.drain()
-        return reader
+        yield reader
+        writer.close()
 
     async def asked(self, method: str, path: str, body: bytes = b"") -> str:
         """The whole response."""
-        text = (await (await self.opened(method, path, body)).read()).decode()
+        async with self.opened(method, path, body) as reader:
+            text = (await reader.read()).decode()
         assert text.startswith("HTTP/1.1 2"), text[:500]
         return text
 
@@ -167,10 +172,10 @@ async def _followers(store: str) -> None:
         await client.say(session, WORDS[0])
 
         async def follow() -> float:
-            reader = await client.opened("GET", f"{session}/events")
-            while line := await reader.readline():
-                if b"RUN_FINISHED" in line and b'"deployed"' in line:
-                    return time.perf_counter()
+            async with client.opened("GET", f"{session}/events") as reader:
+                while line := await reader.readline():
+                    if b"RUN_FINISHED" in line and b'"deployed"' in line:
+                        return time.perf_counter()
             raise AssertionError("a stream ended before the deployment did")
 
         following = [asyncio.create_task(follow()) for _ in range(SUBSCRIBERS)]

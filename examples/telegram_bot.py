@@ -32,7 +32,8 @@ class Team:
             mine = query.from_user.id == owner
             await query.answer(None if mine else "Only the one whose photo it is can approve this.")
             if mine:
-                await self._answer(chat, self.service.approve(session, str(query.data)))
+                plan, _, nonce = str(query.data).partition(" ")
+                await self._answer(chat, self.service.approve(session, plan, nonce))
 
     async def _turn(self, message: Message, user: int) -> formup.Run | str:
         chat, words = message.chat_id, message.text or message.caption or ""
@@ -66,11 +67,12 @@ class Team:
             done = str(failed)
         text, button = str(done), None
         if isinstance(done, formup.Run):
-            text, status, plan = done.report.message, done.report.status, done.report.plan_id
+            text, status = done.report.message, done.report.status
             if status != "answered" and (picture := await asyncio.to_thread(done.view)):
                 await chat.send_photo(picture)
-            if status == "needs_approval" and plan:
-                button = InlineKeyboardMarkup([[InlineKeyboardButton("Go", callback_data=plan)]])
+            if waits := await self.service.waits(self.talks[chat.id][0]):
+                yes = f"{waits.plan_id} {waits.nonce}"
+                button = InlineKeyboardMarkup([[InlineKeyboardButton("Go", callback_data=yes)]])
         for start in range(0, len(text), 2048):  # of 4,096, of which some characters take two
             await chat.send_message(text[start : start + 2048], reply_markup=button)
 

@@ -37,10 +37,10 @@ EXACT = re.compile(
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
-SIDE_OF = {side: side for side in ("left", "right", "top", "bottom")}
-SIDE_OF |= {"up": "top", "down": "bottom"}
-OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
-OPPOSITE |= {"long": "long", "short": "short"}
+SIDES = ("left", "right", "top", "bottom")
+SIDE_OF = {"up": "top", "down": "bottom", **dict(zip(SIDES, SIDES, strict=True))}
+ALIKE = {"long": "long", "short": "short"}
+OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top", **ALIKE}
 DEGREES = {"right": 0, "down": 90, "bottom": 90, "left": 180, "up": 270, "top": 270}
 RINGS = ("around", "cage")
 ROWS = ("along", "between")

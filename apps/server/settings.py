@@ -18,34 +18,51 @@ class ServerSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     host: str = Field(
-        "127.0.0.1", description="address to listen on; beyond loopback it wants tokens"
+        default="127.0.0.1", description="address to listen on; beyond loopback it wants tokens"
     )
-    port: int = Field(8734, ge=0, le=65535, description="port to listen on; 0 takes a free one")
+    port: int = Field(
+        default=8734, ge=0, le=65535, description="port to listen on; 0 takes a free one"
+    )
     store: str | None = Field(
-        None, description="where sessions are kept: a folder, sqlite:///FILE or postgresql://..."
+        default=None,
+        description="where sessions are kept: a folder, sqlite:///FILE or postgresql://...",
     )
     tokens_file: Path | None = Field(
-        None, description="file with hashed tokens, as `formup tokens` writes it"
+        default=None, description="file with hashed tokens, as `formup tokens` writes it"
     )
     model: str = Field(
-        "offline", description="who decides, as PROVIDER:NAME; several split by commas"
+        default="offline", description="who decides, as PROVIDER:NAME; several split by commas"
     )
-    fleet: str = Field("simulated", description="the robots of new sessions: a fleet's name")
+    fleet: str = Field(
+        default="simulated", description="the robots of new sessions: a fleet's name"
+    )
     origins: str = Field(
-        "", description="other origins whose pages may call it, as https://HOST, split by commas"
+        default="",
+        description="other origins whose pages may call it, as https://HOST, split by commas",
     )
-    hosts: str = Field("", description="other names of this server, split by commas")
+    hosts: str = Field(default="", description="other names of this server, split by commas")
     public_url: str = Field(
-        "", description="address that browsers reach it by, where it is not the one it is called by"
+        default="",
+        description="address that browsers reach it by, where it is not the one it is called by",
     )
-    upload_bytes: int = Field(32_000_000, ge=1_000, description="most bytes of a request")
-    pixels: int = Field(40_000_000, ge=100, description="most pixels of a picture")
-    sessions: int = Field(1_000, ge=1, description="most sessions of one token")
-    requests: int = Field(256, ge=1, description="most requests of one token at the same time")
-    requests_per_minute: int = Field(1_200, ge=1, description="most of one token in a minute")
-    streams: int = Field(1_200, ge=1, description="most event streams open at the same time")
-    body_seconds: float = Field(30, gt=0, description="longest that a request may take to arrive")
-    shutdown_seconds: float = Field(3, gt=0, description="longest that requests have at the end")
+    upload_bytes: int = Field(default=32_000_000, ge=1_000, description="most bytes of a request")
+    pixels: int = Field(default=40_000_000, ge=100, description="most pixels of a picture")
+    sessions: int = Field(default=1_000, ge=1, description="most sessions of one token")
+    requests: int = Field(
+        default=256, ge=1, description="most requests of one token at the same time"
+    )
+    requests_per_minute: int = Field(
+        default=1_200, ge=1, description="most of one token in a minute"
+    )
+    streams: int = Field(
+        default=1_200, ge=1, description="most event streams open at the same time"
+    )
+    body_seconds: float = Field(
+        default=30, gt=0, description="longest that a request may take to arrive"
+    )
+    shutdown_seconds: float = Field(
+        default=3, gt=0, description="longest that requests have at the end"
+    )
 
     @classmethod
     def of(cls, environment: Mapping[str, str] = os.environ, **given: object) -> Self:

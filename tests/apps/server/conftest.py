@@ -29,11 +29,11 @@ class Running:
     service: Service
     client: httpx.Client
 
-    def begin(self, photo: str = "us_coins.jpg", robots: int = 8, **headers: str) -> str:
+    def begin(self, photo: str = "us_coins.jpg", robots: int = 8, headers: Any = None) -> str:
         """A session about a photograph; the path of its routes."""
         data = (PHOTOS / photo).read_bytes()
         made = self.client.post(
-            "/api/sessions", content=data, params={"robots": robots}, headers=JPEG | headers
+            "/api/sessions", content=data, params={"robots": robots}, headers=JPEG | (headers or {})
         )
         assert made.status_code == 201, made.text
         return f"/api/sessions/{made.json()['id']}"

@@ -155,9 +155,9 @@ def test_tokens_keep_sessions_apart_and_scopes_hold(
     assert wrong.status_code == 401
     assert wrong.headers["www-authenticate"] == "Bearer"
     assert server.client.get("/health/live").status_code == 200
-    session = server.begin(**by["plan"])
-    said = {"json": {"words": "Cage the largest coin"}, "headers": by["plan"]}
-    planned = server.client.post(f"{session}/messages", **said).json()
+    session = server.begin(headers=by["plan"])
+    said = {"words": "Cage the largest coin"}
+    planned = server.client.post(f"{session}/messages", json=said, headers=by["plan"]).json()
     plan = planned["report"]["plan_id"]
     for other in ("read", "move"):
         for path in ("", "/events", f"/plans/{plan}", "/turns/2"):
@@ -170,8 +170,7 @@ def test_tokens_keep_sessions_apart_and_scopes_hold(
         headers=by["plan"] | {"Idempotency-Key": "1"},
     )
     assert deploy.status_code == 403
-    read = {"content": b"", "headers": by["read"]}
-    assert server.client.post("/api/sessions", **read).status_code == 403
+    assert server.client.post("/api/sessions", headers=by["read"]).status_code == 403
     assert server.client.post(f"{session}/stop", headers=by["plan"]).status_code == 200
     text = file.read_text()
     assert not any(token in text for token in made.values()), "tokens are hashed at rest"

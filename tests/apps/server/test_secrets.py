@@ -30,11 +30,8 @@ def test_no_secret_leaves_the_process(tmp_path: Path) -> None:
     seen: list[str] = []
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stderr is not None
-        for line in process.stderr:
-            seen.append(line)
-            if found := re.search(r"http://\S+:\d+", line):
-                break
-        assert found is not None
+        while not (found := re.search(r"http://\S+:\d+", "".join(seen))):
+            seen.append(process.stderr.readline())
         log = process.stderr
         draining = threading.Thread(target=lambda: seen.extend(log))
         draining.start()

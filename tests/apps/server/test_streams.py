@@ -111,7 +111,7 @@ def test_who_follows_sees_poses_and_the_end(server: Running) -> None:
     server.say(session, "go")
     reader.join(30)
     assert not reader.is_alive()
-    poses = [d["value"] for i, d in found if d.get("name") == "poses"]
+    poses = [d["value"] for _, d in found if d.get("name") == "poses"]
     assert all(i is None for i, d in found if d.get("name") == "poses"), "they are not resumed"
     if poses:  # the latest alone are told, perhaps none before the end
         assert {p["id"] for p in poses[-1]["poses"]} >= {str(n) for n in range(1, 31)}
