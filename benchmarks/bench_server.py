@@ -105,7 +105,10 @@ class Client:
     async def say(self, session: str, words: str) -> None:
         """A turn, to its end."""
         said = json.dumps({"words": words}).encode()
-        await self.asked("POST", f"{session}/messages?wait=60", said)
+        told = await self.asked("POST", f"{session}/messages?wait=60", said)
+        while told.startswith("HTTP/1.1 202"):
+            number = json.loads(told[told.index("{") :])["turn"]
+            told = await self.asked("GET", f"{session}/turns/{number}?wait=60")
 
     async def figure(self, name: str) -> float:
         """One of the server's figures."""
