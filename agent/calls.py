@@ -5,13 +5,20 @@ interrupted has changed nothing but what it had observed by then.
 """
 
 import asyncio
+import os
 import traceback
+from contextlib import AbstractAsyncContextManager, nullcontext
+from weakref import WeakKeyDictionary
 
 from ..tools.context import Context
 from ..tools.errors import ArgumentsError, FormupError, ToolError
 from ..tools.tool import Tool
 from ..tools.world import World
 from .messages import Call, ErrorKind, Result
+
+SLOTS = max(8, 2 * (os.cpu_count() or 1))
+"""Tools that work at a time: more at once are no faster, but take memory and each other's time."""
+_slots: WeakKeyDictionary[asyncio.AbstractEventLoop, asyncio.Semaphore] = WeakKeyDictionary()
 
 
 class BrokenToolError(Exception):
@@ -45,9 +52,11 @@ async def answer(
     if tool is None:
         known = ", ".join(t.name for t in tools)
         return failed(call, "unknown_tool", f"Unknown tool {call.name!r}. Available: {known}.")
-    clock = asyncio.timeout(None if tool.kind == "actuate" else seconds)
+    clock = asyncio.timeout(None)
     try:
-        async with clock:
+        async with _slot(tool), clock:
+            if seconds is not None and tool.kind != "actuate":
+                clock.reschedule(asyncio.get_running_loop().time() + seconds)
             result = await tool.call(context, call.arguments)
             text = result.text
     except ArgumentsError as error:
@@ -73,6 +82,13 @@ async def answer(
         images=result.images,
         message=result.message,
     )
+
+
+def _slot(tool: Tool) -> AbstractAsyncContextManager[None]:
+    """Waits for a place among the tools that work; robots that drive want none."""
+    if tool.kind in ("actuate", "ask"):
+        return nullcontext()
+    return _slots.setdefault(asyncio.get_running_loop(), asyncio.Semaphore(SLOTS))
 
 
 def _plan_made(before: World, after: World) -> str | None:

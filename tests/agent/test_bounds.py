@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from formup.agent.agent import Agent
+from formup.agent.calls import SLOTS, answer
 from formup.agent.limits import Limits
 from formup.agent.loop import Recorder, run
 from formup.agent.messages import Call, History, Reply, Result, Usage, User
@@ -200,3 +201,26 @@ def test_the_clock_goes_on_when_they_have_driven(red_box: Picture) -> None:
     assert isinstance(outcome, Stopped)
     assert (outcome.kind, "0.2 s" in outcome.reason) == ("limit", True)
     assert len(results(outcome)) == 1
+
+
+def test_tools_of_many_conversations_wait_for_a_place(red_box: Picture) -> None:
+    at_work, most = 0, 0
+
+    @tool("read")
+    async def work(context: Context) -> ToolResult:
+        """Count who works at the same time."""
+        nonlocal at_work, most
+        at_work += 1
+        most = max(most, at_work)
+        await asyncio.sleep(0.1)
+        at_work -= 1
+        return ToolResult({})
+
+    async def many() -> list[Result]:
+        call, context = Call(id="1", name="work", arguments={}), Context.of(red_box)
+        calls = (answer((work,), context, call, 0.5) for _ in range(10 * SLOTS))
+        return await asyncio.gather(*calls)
+
+    results = asyncio.run(many())
+    assert most == SLOTS
+    assert not any(result.error for result in results), "waiting is not working: no time runs"
