@@ -255,7 +255,7 @@ def _says_little(thing: Reference, clear: bool) -> bool:
 
 def _ask(question: str, matches: Sequence[dict[str, Any]]) -> Step:
     ids = [m["id"] for m in matches[:MOST_ASKED]]
-    hint = f"Answer with its number, or --target {ids[0]}" if ids else POINT.capitalize()
+    hint = f"Answer with its number, such as {ids[0]}" if ids else POINT.capitalize()
     return Step("ask_user", {"question": f"{question} {hint}.", "candidates": ids})
 
 

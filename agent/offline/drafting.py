@@ -192,7 +192,7 @@ def _how_many(reading: Reading, robots: int | None) -> str | None:
         return (
             f"{form.wording} takes {form.robots} robots, {robots} were named. Which?".capitalize()
         )
-    return None if robots else "How many robots? Say it in the words or with -n."
+    return None if robots else "How many robots? Say a number."
 
 
 def _which_things(task: Task, reading: Reading) -> str | None:
