@@ -22,7 +22,7 @@ MOST_ASKED = 24
 """Candidates that one question offers: more cannot be told apart on a picture."""
 MOST_QUOTED = 40
 """Characters of an answer that a question repeats."""
-POINT = "point at it with --point X,Y, --box X0,Y0,X1,Y1 or --outline X1,Y1,X2,Y2,..."
+POINT = "point at it, with a point, a box or a rough outline"
 
 
 @dataclass(frozen=True)

@@ -203,7 +203,7 @@ def _which_things(task: Task, reading: Reading) -> str | None:
     if reading.faced and len(pointed) == needed + 1:
         return None
     if len(pointed) == 1 and needed == 2:
-        return "Which two things? Point at both: --point X,Y --point X,Y."
+        return "Which two things? Point at both."
     if len(pointed) > needed:
         named = ", ".join(pointed)
         return (
