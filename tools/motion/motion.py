@@ -34,6 +34,8 @@ ROUND_SEGMENTS = 16
 """Segments of a quarter circle where distances are to be exact."""
 ROUND_DIP = math.cos(math.pi / 4 / ROUND_SEGMENTS)
 """How near the middle of such a segment comes, as a share of the radius."""
+SPARE = 1.02
+"""Share of a body that is left free where robots leave obstacles, so that all of it is kept off."""
 NOBODY = np.empty((0, 2))
 
 Bodies = NDArray[np.object_]
@@ -83,8 +85,8 @@ def routes(
     """
     ground = _Ground(solid, radius, frame)
     ends = np.concatenate([starts, goals])
-    exits = ground.exits(starts, goals, _bodies(idle, ends, radius))
-    entries = ground.exits(goals, goals, _bodies(idle, ends, radius))
+    wider = _bodies(idle, ends, SPARE * radius)
+    exits, entries = ground.exits(starts, goals, wider), ground.exits(goals, goals, wider)
     bodies = _bodies(idle, np.concatenate([ends, exits, entries]), radius)
     paths = ground.paths(exits, entries, bodies)
     leaving = np.flatnonzero((exits != starts).any(axis=1))
@@ -101,7 +103,8 @@ def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
     if not len(idle):
         return np.empty(0, dtype=object)
     nearest = np.linalg.norm(idle[:, None] - ends, axis=2).min(axis=1)
-    reach = np.minimum(max(2 * radius, MIN_SPACING), 0.99 * nearest) / ROUND_DIP
+    body = max(2 * radius, MIN_SPACING)
+    reach = np.where(nearest > body / ROUND_DIP, body, np.minimum(body, 0.99 * nearest)) / ROUND_DIP
     discs = shapely.buffer(shapely.points(idle), reach, quad_segs=ROUND_SEGMENTS)
     return np.asarray(discs, dtype=object)
 

@@ -8,7 +8,7 @@ from formup.tools.formation.placement.place import Site
 from formup.tools.geometry.curves import Frame
 from formup.tools.geometry.outline import FloatArray, distances, make_outline
 from formup.tools.motion.motion import NoRouteError, along, obstacles, routes
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
@@ -145,6 +145,7 @@ def test_who_stands_on_a_target_leaves_it_by_the_shortest_way_and_stays_off(
 
 @settings(max_examples=60)
 @given(st.sampled_from(["none", *sorted(SOLIDS)]), RADII, st.integers(1, 40), SEEDS)
+@example("needle", 9, 11, 501)
 def test_idle_robots_are_driven_around(name: str, radius: float, count: int, seed: int) -> None:
     solid, rng = SOLIDS.get(name, Polygon()), np.random.default_rng(seed)
     if name == "none":
