@@ -27,6 +27,8 @@ from .growth import show
 
 PHOTO = Path(__file__).parents[1] / "evals/photos/images/us_coins.jpg"
 WORDS = ("Cage the largest coin", "a bit further out", "turn it 10 degrees", "how far is robot 4?")
+COIN = {"id": "t1", "outline": [[246, 32], [311, 97], [246, 156], [181, 95]]}
+"""What is pointed at where turns are to be quick: nothing is looked for."""
 SESSIONS, TURNS, SUBSCRIBERS = 200, (1_000, 10_000), 1_000
 LINE = 2**24
 """Most bytes of an event."""
@@ -102,9 +104,9 @@ class Client:
         made = await self.asked("POST", "/api/sessions?robots=8", data)
         return f"/api/sessions/{json.loads(made[made.index('{') :])['id']}"
 
-    async def say(self, session: str, words: str) -> None:
+    async def say(self, session: str, words: str, **more: object) -> None:
         """A turn, to its end."""
-        said = json.dumps({"words": words}).encode()
+        said = json.dumps({"words": words, **more}).encode()
         told = await self.asked("POST", f"{session}/messages?wait=60", said)
         while told.startswith("HTTP/1.1 202"):
             number = json.loads(told[told.index("{") :])["turn"]
@@ -161,7 +163,8 @@ async def _memory(store: str) -> None:
         for until in TURNS:
             while done < until:
                 session = await client.begin(data)
-                for words in WORDS:
+                await client.say(session, "Surround it", pointed=[COIN])
+                for words in WORDS[1:]:
                     await client.say(session, words)
                 done += len(WORDS)
             held = await client.figure("process_resident_memory_bytes")

@@ -31,9 +31,8 @@ class Team:
             session, owner = self.talks.get(chat.id, ("", None))
             mine = query.from_user.id == owner
             await query.answer(None if mine else "Only the one whose photo it is can approve this.")
-            if mine:
-                plan, _, nonce = str(query.data).partition(" ")
-                await self._answer(chat, self.service.approve(session, plan, nonce))
+            if mine and (yes := str(query.data).split()):
+                await self._answer(chat, self.service.approve(session, yes[0], yes[1]))
 
     async def _turn(self, message: Message, user: int) -> formup.Run | str:
         chat, words = message.chat_id, message.text or message.caption or ""
@@ -65,14 +64,13 @@ class Team:
             done = await work
         except (formup.FormupError, error.TelegramError) as failed:
             done = str(failed)
-        text, button = str(done), None
+        text, button = done if isinstance(done, str) else done.report.message, None
         if isinstance(done, formup.Run):
-            text, status = done.report.message, done.report.status
-            if status != "answered" and (picture := await asyncio.to_thread(done.view)):
+            if done.report.status != "answered" and (picture := await asyncio.to_thread(done.view)):
                 await chat.send_photo(picture)
             if waits := await self.service.waits(self.talks[chat.id][0]):
-                yes = f"{waits.plan_id} {waits.nonce}"
-                button = InlineKeyboardMarkup([[InlineKeyboardButton("Go", callback_data=yes)]])
+                go = InlineKeyboardButton("Go", callback_data=f"{waits.plan_id} {waits.nonce}")
+                button = InlineKeyboardMarkup([[go]])
         for start in range(0, len(text), 2048):  # of 4,096, of which some characters take two
             await chat.send_message(text[start : start + 2048], reply_markup=button)
 
