@@ -6,13 +6,15 @@ here and nowhere else, for every model alike.
 
 import asyncio
 import copy
-from collections.abc import Awaitable, Callable, Coroutine, Sequence
+import re
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, Unpack
 
 from ..tools.context import Services, Settings
 from ..tools.errors import InputError
+from ..tools.fleet.protocol import Fleet
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from .first_message import standing
@@ -29,8 +31,16 @@ HELD = "The robots are held where they are. Say what to change, or go to drive o
 MAY_NOT_MOVE = (
     "You may plan here but not move robots: nothing moves; somebody who may has to say go."
 )
-STOP = frozenset({"stop", "halt", "freeze", "stop now", "stop it", "emergency stop"})
-"""Words that hold the robots at once, whoever else would have read them."""
+STOPS = re.compile(r"\b(?:stop|halt|freeze)\b")
+STOP = re.compile(
+    r"(?:\W*(?:stop|halt|freeze|please|now|it|the|robots?|all|them|every\w*|team|"
+    r"immediately|at|once|emergency|right|just|quick|oh|no|hey|ok|moving|driving|this|that)\b)+\W*"
+)
+"""A sentence that holds the robots at once, whoever else would have read it."""
+STOP_DRIVING = re.compile(r"\b(?:stop+|halt|freeze|hold|wait|abort|cancel|don'?t|whoa|enough)\b")
+"""Words that do so in a short sentence while they drive: to stop once too often costs little."""
+SHORT = 8
+"""Words of a sentence that is short."""
 YES, NO = frozenset({"y", "yes", "approve", "approved"}), frozenset({"n", "no", "nope"})
 DROPS = frozenset({"query", "talk", "undo", "hold", "go"})
 """Kinds of what is said that are no answer to a question, which is dropped for them."""
@@ -211,8 +221,7 @@ class Session:
         if self.run is not None:
             services = self.run.context.services
             services.stopped.add(self.run.context.settings.fleet)
-            for fleet in services.fleets.values():
-                await fleet.stop()
+            await stop_all(services.fleets.values())
 
     def at(self, run: Run) -> "Session":
         """The same conversation at a turn of it, to go on differently; it is written nowhere."""
@@ -334,9 +343,29 @@ class Session:
             await self.agent.aclose()
 
 
-def is_stop(words: str) -> bool:
-    """Whether words, typed while a turn runs too, say to hold the robots at once."""
-    return words.strip(" ./!").lower() in STOP
+async def stop_all(fleets: Iterable[Fleet]) -> None:
+    """Stop each fleet, also where another cannot be.
+
+    Raises:
+        FleetError: the first that could not be.
+    """
+    ends = await asyncio.gather(*(fleet.stop() for fleet in fleets), return_exceptions=True)
+    for problem in ends:
+        if isinstance(problem, BaseException):
+            raise problem
+
+
+def is_stop(words: str, *, driving: bool = False) -> bool:
+    """Whether words say to hold the robots at once.
+
+    Args:
+        driving: whether a turn is under way, which may drive them.
+    """
+    said = words.lower()
+    if driving:
+        return len(said.split()) <= SHORT and STOP_DRIVING.search(said) is not None
+    found = STOP.fullmatch(said)
+    return found is not None and STOPS.search(said) is not None
 
 
 def in_own_loop(work: Coroutine[Any, Any, Any]) -> Any:

@@ -3,6 +3,7 @@
 from contextlib import ExitStack
 
 from ..tools.fleet.protocol import Fleet, FleetBusyError
+from .conversation import stop_all
 from .store.protocol import Store
 
 
@@ -34,6 +35,10 @@ class FleetOwner:
         elif self._fleets[fleet.name] is not fleet:
             await fleet.close()
         return self._fleets[fleet.name]
+
+    async def hold(self) -> None:
+        """Hold all robots, whoever drives them."""
+        await stop_all(self._fleets.values())
 
     async def close(self) -> None:
         """Hold the robots and let go of them."""

@@ -6,27 +6,27 @@ parse, nothing else.
 
 import asyncio
 from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from typing import Any, Unpack
 
-from ..tools.context import Services, Settings
-from ..tools.errors import InputError, StorageError
+from ..tools.context import Settings
+from ..tools.errors import FleetError, FormupError, InputError, StorageError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from .agent import Agent
 from .approvals import Waiting, check_nonce, waiting
-from .conversation import Session
-from .feed import FedSession, Feed, Poses
+from .conversation import NOTHING_SAID, Session, is_stop
+from .feed import Poses
 from .fleet_owner import FleetOwner
-from .reading import read_conversation
+from .open_sessions import OpenSessions
 from .session import Run, SayOptions, Show
 from .session_start import Opening
 from .store.copies import fork
 from .store.protocol import Event, Store
-from .turns import PATIENCE, Asked, Turn, check_key, digest_of, is_noted, stop_note
+from .turns import PATIENCE, Asked, Turn, check_key, digest_of, is_noted, note_stop
 
-MOST_OPEN = 256
-"""Conversations kept in memory; others are read from the store when they go on."""
+HOLDING = 2.0
+"""Longest that a fleet may take to say that its robots are held, s."""
 ANYONE = Asked()
 
 
@@ -46,12 +46,12 @@ class Service:
         self, agents: Agent | Mapping[str, Agent], store: Store, *, auto: bool = False
     ) -> None:
         self.agents = {"": agents} if isinstance(agents, Agent) else dict(agents)
-        self.store, self.auto = store, auto
+        self.store = store
         self.ended: Callable[[Turn], None] = lambda turn: None
         self._owner = FleetOwner(store)
-        self._sessions: dict[str, Session] = {}
-        self._feeds: dict[str, Feed] = {}
         self._turns: dict[str, Turn] = {}
+        self._open = OpenSessions(store, self.agents, self._owner, self._turns, auto=auto)
+        self._sessions, self._feeds = self._open.sessions, self._open.feeds
         self._waiting: dict[str, tuple[int | None, Waiting | None]] = {}
         self._watcher: asyncio.Task[None] | None = None
 
@@ -103,7 +103,7 @@ class Service:
             InputError: there is none, it is damaged, or the picture is another.
         """
         if session not in self._sessions:
-            self._open(session, picture)
+            self._open.keep(session, *self._open.load(session, picture))
         return self._sessions[session]
 
     def session(self, session: str) -> Session:
@@ -134,7 +134,7 @@ class Service:
             InputError: there is none, or it is damaged.
         """
         held = self._sessions.get(session)
-        return held if held and session in self._turns else await self._current(session)
+        return held if held and session in self._turns else await self._open.current(session)
 
     def say(
         self, session: str, words: str, asked: Asked = ANYONE, **options: Unpack[SayOptions]
@@ -145,7 +145,17 @@ class Service:
             InputError: a turn of it is under way (`busy`). When it is awaited: something given
                 cannot be used, or was done before under that key (`key`, `repeated`).
         """
+        if is_stop(words, driving=session in self._turns):
+            turn = Turn(asked, "", "stop")
+            turn.task = asyncio.ensure_future(self._stopped(session, asked))
+            return turn
         return self._begin(session, asked, "say", words, **options)
+
+    async def _stopped(self, session: str, asked: Asked) -> Run:
+        run = await self.stop(session, asked)
+        if run is None:
+            raise InputError(NOTHING_SAID)
+        return run
 
     def edit(self, session: str, *edits: dict[str, Any], asked: Asked = ANYONE) -> Turn:
         """Change the plan that stands, by edits as `edit_formation` takes them."""
@@ -204,26 +214,55 @@ class Service:
         Returns:
             That turn, or one that says that they are held; None before anything was said.
         """
-        turn = self._turns.get(session)
-        if turn is not None:
-            if session in self._sessions:
-                await self._sessions[session].ahold()
-            turn.cancel()
-            return await turn.ended()
         while True:
+            if (turn := self._turns.get(session)) is not None:
+                if (cut := await self._cut(session, turn)) is not None:
+                    return cut
+                continue  # it had not begun
             held = await self.fresh(session)
-            await held.ahold()
+            problem = await self._held(held)
+            if session in self._turns:
+                continue
+            if problem is not None:
+                raise problem
             if held.run is None:
                 return None
             try:
-                return await self._begin(session, asked, "stop")
-            except StorageError as error:
+                return await self._begin(session, asked, "stop").ended()
+            except InputError as error:
                 if error.kind not in ("busy", "gone_on"):
                     raise
-            stored = self._feeds[session].stored
-            begun = [e.number for e in stored.events() if e.kind in ("turn", "resume")]
-            stored.artefacts.put(stop_note(stored.id, begun[-1]))
-            await asyncio.sleep(PATIENCE / 3)
+            if session not in self._turns:
+                await asyncio.to_thread(note_stop, self._feeds[session].stored)
+                await asyncio.sleep(PATIENCE / 3)
+
+    async def _cut(self, session: str, turn: Turn) -> Run | None:
+        """End a turn that runs here, with its robots held; also where a fleet cannot be told."""
+        if turn.name == "stop":
+            return await turn.ended()
+        problem = await self._held(self._sessions.get(session))
+        turn.cancel()
+        run = await turn.ended()
+        if problem is not None:
+            raise problem
+        return run
+
+    async def _held(self, held: Session | None) -> FleetError | None:
+        """Hold all robots there are, within a time; what went wrong with it."""
+        try:
+            async with asyncio.timeout(HOLDING):
+                await self.hold()
+                if held is not None:
+                    await held.ahold()
+        except FleetError as error:
+            return error
+        except TimeoutError:
+            return FleetError(f"The robots did not say within {HOLDING:g} s that they are held.")
+        return None
+
+    async def hold(self) -> None:
+        """Hold the real robots of this process, whoever drives them."""
+        await self._owner.hold()
 
     def point(self, session: str, *prompts: TargetPrompt) -> None:
         """What the person points at with their next words."""
@@ -238,6 +277,10 @@ class Service:
         """The number of the event that began the last turn in this process; 0 where none did."""
         feed = self._feeds.get(session)
         return feed.turn.number if feed and feed.turn else 0
+
+    def was_asked(self, session: str, key: str) -> bool:
+        """Whether a turn of a conversation in memory was asked for under a key."""
+        return key in self._feeds[session].keys
 
     def is_written(self, session: str) -> bool:
         """Whether a turn of it is under way, here or in another process."""
@@ -279,11 +322,9 @@ class Service:
         """Stop a conversation and delete it."""
         if session in self._turns:
             await self.stop(session)
-        self.store.delete(session)
-        held = self._sessions.pop(session, None)
-        self._feeds.pop(session, None)
-        if held is not None and held.run is not None:
-            await held.run.context.services.close_fleets()
+        await asyncio.to_thread(self.store.delete, session)
+        self._open.drop(session)
+        self._waiting.pop(session, None)
 
     async def leave(self) -> None:
         """Stop what runs, hold the robots, and end what is followed."""
@@ -304,48 +345,6 @@ class Service:
             await agent.aclose()
         self.store.close()
 
-    async def _current(self, session: str) -> Session:
-        held = self._sessions.pop(session, None)
-        if held is not None:
-            self._sessions[session] = held  # used last
-            last = held.begun if held.run is None else held.run.events
-            stored = self._feeds[session].stored
-            if last is not None and not await asyncio.to_thread(stored.events, last):
-                return held
-        if held is self._sessions.get(session):  # not read meanwhile
-            self._open(session, None)
-        return self._sessions[session]
-
-    def _open(self, session: str, picture: Picture | None) -> None:
-        """Read a conversation, and forget others that were not used for long."""
-        stored = self.store.open(session)
-        events = stored.events()
-        feed = self._feeds.setdefault(session, Feed(stored, ()))
-        for event in events[feed.last :]:
-            feed.publish(event)
-        old = self._sessions.get(session)
-        services = Services(claim=self._owner.claim, watch=feed.moved)
-        if old is not None and old.services is not None:
-            services.stopped |= old.services.stopped
-        fed = FedSession(stored, feed)
-        made = read_conversation(fed, events, self.agents, picture, services)
-        made.auto = self.auto
-        self._sessions[session] = made
-        for name in list(self._sessions)[: len(self._sessions) - MOST_OPEN]:
-            self._forget(name)
-
-    def _forget(self, session: str) -> None:
-        """Let go of a conversation that can be read again, unless it holds robots."""
-        held, feed = self._sessions[session], self._feeds[session]
-        services = held.services
-        holds = services is not None and services.is_stopped
-        if session in self._turns or holds or held.stored is None:
-            return
-        del self._sessions[session]
-        self._waiting.pop(session, None)
-        if not feed.followers:
-            del self._feeds[session]
-
     def _begin(
         self,
         session: str,
@@ -356,7 +355,7 @@ class Service:
         **options: Any,
     ) -> Turn:
         """Begin a turn, or go on with the one that was begun under the same key."""
-        turn, now = Turn(asked, digest_of(name, arguments, options)), self._turns.get(session)
+        turn, now = Turn(asked, digest_of(name, arguments, options), name), self._turns.get(session)
         if now is not None:
             if asked.key is not None and now.asked.key == asked.key:
                 check_key(turn, {asked.key: (now.digest, now.number)}, again=True)
@@ -364,8 +363,8 @@ class Service:
             raise InputError("A turn is under way; wait for it, or stop it.", "busy")
 
         async def work() -> Run:
-            held = await self._current(session)
-            feed = self._feeds[session]
+            held = await self._open.current(session)
+            turn.acting, feed = True, self._feeds[session]
             check_key(turn, feed.keys)
             if check is not None:
                 check(held)
@@ -394,5 +393,6 @@ class Service:
                 stored = self._feeds[session].stored if session in self._feeds else None
                 if stored is None or not turn.number:
                     continue
-                if await asyncio.to_thread(is_noted, stored, turn.number):
-                    await self.stop(session)
+                with suppress(FormupError):  # a store that fails now is asked again
+                    if await asyncio.to_thread(is_noted, stored, turn.number):
+                        await self.stop(session)

@@ -7,7 +7,7 @@ from collections.abc import Coroutine, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydantic_core import to_json
+from pydantic_core import PydanticSerializationError, to_json
 
 from ..tools.errors import InputError
 from ..tools.perception.image import Picture
@@ -38,6 +38,8 @@ class Turn:
     """A turn on its way; awaiting it gives its run.
 
     Attributes:
+        name: of the command.
+        acting: whether it has the conversation that it changes.
         digest: of what was asked, to tell whether the same key means the same.
         number: of the event that began it; 0 before that is written.
         since: when it was asked for, by the monotonic clock.
@@ -46,6 +48,8 @@ class Turn:
 
     asked: Asked
     digest: str
+    name: str = "say"
+    acting: bool = False
     task: "asyncio.Task[Run]" = field(init=False)
     number: int = 0
     since: float = field(default_factory=time.monotonic)
@@ -65,7 +69,7 @@ class Turn:
         """
         await self._first(self.began.wait(), None)
         if self.task.done():
-            await self.task
+            self._result()
 
     async def wait(self, seconds: float, *, moving: bool = True) -> Run | None:
         """Its run; None where it goes on after so many seconds.
@@ -78,7 +82,12 @@ class Turn:
         """
         waits = self.moving.wait() if moving else asyncio.sleep(seconds)
         await self._first(waits, seconds)
-        return await self.task if self.task.done() else None
+        return self._result() if self.task.done() else None
+
+    def _result(self) -> Run:
+        if self.task.cancelled():
+            raise InputError("That was stopped before it began; nothing was done.", "busy")
+        return self.task.result()
 
     async def _first(self, waits: Coroutine[Any, Any, object], seconds: float | None) -> None:
         """Wait for the first of its end and something else."""
@@ -146,7 +155,13 @@ def check_key(turn: Turn, before: Mapping[str, tuple[str, int]], *, again: bool 
 def digest_of(name: str, arguments: Sequence[Any], options: Mapping[str, Any]) -> str:
     """A hash of what is asked for; what is only shown does not count."""
     named = [(k, _as_json(v)) for k, v in sorted(options.items()) if k != "show"]
-    return hashlib.sha256(to_json([name, *map(_as_json, arguments), named])).hexdigest()[:32]
+    try:
+        said = to_json([name, *map(_as_json, arguments), named])
+    except PydanticSerializationError:
+        raise InputError(
+            "What was sent holds characters that are no text; leave them out."
+        ) from None
+    return hashlib.sha256(said).hexdigest()[:32]
 
 
 def _as_json(value: Any) -> Any:
@@ -154,12 +169,21 @@ def _as_json(value: Any) -> Any:
     return value.sha256 if isinstance(value, Picture) else value
 
 
-def stop_note(session: str, turn: int) -> bytes:
-    """What a process leaves beside a session so that the one which writes it stops that turn."""
+def note_stop(stored: StoredSession) -> None:
+    """Leave a file beside a session, so that the process which writes it stops its turn.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
+    begun = [event.number for event in stored.events() if event.kind in ("turn", "resume")]
+    if begun:
+        stored.artefacts.put(_note(stored.id, begun[-1]))
+
+
+def _note(session: str, turn: int) -> bytes:
     return to_json(["stop", session, turn])
 
 
 def is_noted(stored: StoredSession, turn: int) -> bool:
     """Whether another process wants a turn stopped."""
-    note = stop_note(stored.id, turn)
-    return hashlib.sha256(note).hexdigest() in stored.artefacts
+    return hashlib.sha256(_note(stored.id, turn)).hexdigest() in stored.artefacts

@@ -104,7 +104,7 @@ class Talk:
 
     def is_stop(self, text: str) -> bool:
         """Whether a line, typed while a turn runs, says to stop."""
-        return is_stop(text)
+        return is_stop(text, driving=True)
 
     def failed(self, text: str, message: str) -> Shown:
         """What there is to show of a line that could not be done."""

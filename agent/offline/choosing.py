@@ -89,7 +89,11 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
         if call.name == "ask_user" and call.arguments.get("candidates"):
             answer = next((m.text for m in history if _answers(m, call)), "").lower()
             numbers = re.findall(r"(?<![-.\w])c?([0-9]{1,4})(?!\.?[0-9])\b", answer)
-            offered = [f"c{n}" for n in numbers if f"c{n}" in call.arguments["candidates"]]
+            rest = set(re.findall(r"[a-z']+", re.sub(r"\bc[0-9]+", " ", answer)))
+            plain = rest <= SMALL | AGREEING | NUMBERING  # else the number may be of anything
+            offered = [
+                f"c{n}" for n in numbers if f"c{n}" in call.arguments["candidates"] and plain
+            ]
             if not offered:
                 offered = picked(answer, sightings(call.arguments["candidates"], history))
             named = list(dict.fromkeys([*chosen, *offered]))
@@ -101,6 +105,9 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
 AGREEING = {"yes", "yep", "yeah", "ok", "okay", "sure", "right", "correct", "exactly", "go", "do"}
 SMALL = {"the", "one", "on", "at", "in", "of", "to", "them", "it", "please", "i", "mean", "is"} | {
     "that", "a", "most", "and", "two", "ahead"
+}  # fmt: skip
+NUMBERING = {"number", "numbers", "no", "nr", "num", "candidate", "option", "choice", "thing"} | {
+    "meant", "take", "pick", "choose", "think", "would", "say", "be", "was", "for", "with", "thanks"
 }  # fmt: skip
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 EXTREMES: dict[str, tuple[str, int]] = {

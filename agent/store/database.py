@@ -104,7 +104,7 @@ class DatabaseStore:
         renamed = update(SESSIONS).where(SESSIONS.c.id == session).values(name=checked_name(name))
         with self.writing() as connection:
             if not connection.execute(renamed).rowcount:
-                raise missing(f"The session {session!r} in {self.label}")
+                raise missing(f"The session {session!r}")
 
     def delete(self, session: str) -> None:
         """See `Store.delete`."""

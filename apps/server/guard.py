@@ -5,7 +5,7 @@ import time
 from collections import defaultdict, deque
 from collections.abc import Generator
 from contextlib import contextmanager, nullcontext
-from urllib.parse import urlsplit
+from urllib.parse import SplitResult, urlsplit
 
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -38,11 +38,13 @@ class Guard:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        headers = Headers(scope=scope)
+        headers, refused = Headers(scope=scope), list[Exception]()
         begun = False
 
         async def watched(message: Message) -> None:
             nonlocal begun
+            if refused and not begun:
+                return  # told below, whatever is made of it
             begun = True
             self._hub.metrics.answered(message.get("status", 0))
             async with asyncio.timeout(STALLED):
@@ -54,21 +56,25 @@ class Guard:
             scope.setdefault("state", {})["person"] = person
             counts = nullcontext() if scope["path"].startswith(OPEN) else self._counted(person)
             with counts:
-                await self._app(scope, self._bounded(receive, headers), watched)
+                await self._app(scope, self._bounded(receive, headers, refused), watched)
+            if refused and not begun:
+                raise refused[0]
         except FormupError as error:
             if begun:
                 raise
+            refused.clear()
             await told(error)(scope, receive, watched)
-        except _RefusedError as refused:
-            response = error_response(refused.status, str(refused))
-            if refused.status == 401:
+        except _RefusedError as error:
+            refused.clear()
+            response = error_response(error.status, str(error))
+            if error.status == 401:
                 response.headers["WWW-Authenticate"] = "Bearer"
             await response(scope, receive, watched)
 
     def _check_place(self, method: str, headers: Headers) -> None:
         """Refuse names of this server that others gave it, and pages of other origins."""
         host, settings = headers.get("host", ""), self._hub.settings
-        name = urlsplit(f"//{host}").hostname or ""
+        name = _parsed_address(f"//{host}").hostname or ""
         mine = LOOPBACK | {settings.host} | set(_parts(settings.hosts))
         if name not in mine and (settings.hosts or not self._hub.tokens.needed):
             raise _RefusedError(
@@ -77,7 +83,7 @@ class Guard:
         origin = headers.get("origin")
         if origin is None and headers.get("sec-fetch-site") in (None, "same-origin", "none"):
             return
-        same = origin is not None and urlsplit(origin).netloc == host
+        same = origin is not None and _parsed_address(origin).netloc == host
         if not same and origin not in _parts(settings.origins) and method not in SAFE:
             raise _RefusedError(
                 403, f"Pages of {origin or 'another site'} may not call this; see FORMUP_ORIGINS."
@@ -89,7 +95,8 @@ class Guard:
         kind, _, token = headers.get("authorization", "").partition(" ")
         person = self._hub.tokens.person(token.strip()) if kind.lower() == "bearer" else None
         if person is None:
-            raise _RefusedError(401, "A token is needed: send Authorization: Bearer TOKEN.")
+            known = "A token is needed" if not token else "This token is not known here"
+            raise _RefusedError(401, f"{known}: send Authorization: Bearer TOKEN.")
         return person
 
     @contextmanager
@@ -112,8 +119,8 @@ class Guard:
         finally:
             running[name] -= 1
 
-    def _bounded(self, receive: Receive, headers: Headers) -> Receive:
-        """What a request sends, up to a size and within a time."""
+    def _bounded(self, receive: Receive, headers: Headers, refused: list[Exception]) -> Receive:
+        """What a request sends, up to a size and within a time; else what it is refused for."""
         most, seconds = self._hub.settings.upload_bytes, self._hub.settings.body_seconds
         large = InputError(
             f"The request is larger than the {most:,} bytes that are allowed.", "too_large"
@@ -131,12 +138,13 @@ class Guard:
                 async with asyncio.timeout(until - time.monotonic()):
                     message = await receive()
             except TimeoutError:
-                raise _RefusedError(
-                    408, f"The request did not arrive within {seconds:g} s."
-                ) from None
+                late = f"The request did not arrive within {seconds:g} s."
+                refused.append(_RefusedError(408, late))
+                raise refused[0] from None
             size += len(message.get("body", b""))
             whole = not message.get("more_body", False)
             if size > most:
+                refused.append(large)
                 raise large
             return message
 
@@ -149,6 +157,14 @@ class _RefusedError(Exception):
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
         self.status = status
+
+
+def _parsed_address(text: str) -> SplitResult:
+    """An address; an empty one where it is none."""
+    try:
+        return urlsplit(text)
+    except ValueError:
+        return urlsplit("")
 
 
 def _parts(text: str) -> tuple[str, ...]:

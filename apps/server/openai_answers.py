@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from fastapi import Request
 
-from ...agent.conversation import STOP
+from ...agent.conversation import is_stop
 from ...agent.outcomes import Cancelled, Paused
 from ...agent.report import Totals
 from ...agent.session import Run
@@ -49,7 +49,9 @@ ON_THE_WAY = (
 DRIVES = "The robots are still on their way. Wait for them, or say **stop** to hold them."
 CUT_OFF = "That was stopped before it began; nothing was done."
 BROKEN_OFF = "That was broken off before its end; robots that drove are held. Say what to do next."
-NOTHING_MOVES = "No robots move here; there is nothing to stop."
+NOTHING_MOVES = (
+    "No robots of this chat move. Real robots of this server are held, whoever drove them."
+)
 DATA = re.compile(r"data:image/[\w.+-]+;base64,", re.I)
 UNSAFE = re.compile(r"\](?=[(\[:])|<(?=[a-z/!?])", re.I)
 """What would make a link, a picture or HTML of words that a model may have read in a picture."""
@@ -149,8 +151,8 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
         check_owner(said.place.session, person)
         return await told(said.place, await run_at(hub, said.place), base)
     _check(said.last)
-    if said.last.text.strip(" .!").lower() in STOP:
-        return await _hold(hub, person, said, base)
+    if (held := await _hold(hub, person, said, base)) is not None:
+        return held
     need(person, "plan")
     async with alone(hub, person):
         found = await find(hub, person, said) or await _open_session(hub, person, said)
@@ -241,9 +243,14 @@ async def _open_session(hub: Hub, person: Person, said: Said) -> tuple[str, str]
     return made, key
 
 
-async def _hold(hub: Hub, person: Person, said: Said, base: str) -> Answer:
-    """Hold the robots, whoever asks and whatever has happened since."""
+async def _hold(hub: Hub, person: Person, said: Said, base: str) -> Answer | None:
+    """Hold the robots, whoever asks and whatever has happened since; None where nobody does."""
+    if not is_stop(said.last.text, driving=True):
+        return None
     found = await find(hub, person, said, here=True)
+    if not is_stop(said.last.text) and not (found and hub.service.turn(found[0])):
+        return None
+    await hub.service.hold()
     run = await hub.service.stop(found[0], asked_by(person)) if found else None
     if found is None or run is None:
         return _at_once(NOTHING_MOVES, base, said.place)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pydantic import BaseModel, Field
-from pydantic_core import to_json
+from pydantic_core import PydanticSerializationError, to_json
 
 from ...tools.errors import InputError
 
@@ -191,7 +191,10 @@ def place_of(response: str) -> Place | None:
 def digest(*parts: object) -> str:
     """A hash by which the same request is known again."""
     given = [p.model_dump() if isinstance(p, Message) else p for p in parts]
-    return hashlib.sha256(to_json(given)).hexdigest()[:32]
+    try:
+        return hashlib.sha256(to_json(given)).hexdigest()[:32]
+    except PydanticSerializationError:
+        raise InputError("What was sent is no text in parts; leave these out.") from None
 
 
 def _check(body: Body) -> None:

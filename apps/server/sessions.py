@@ -102,7 +102,11 @@ async def begin(
         seed=seed,
         fleet=hub.settings.fleet,
     )
-    made = hub.service.open(picture, settings=settings, name=name, agent=agent, owner=person.name)
+    made = await asyncio.to_thread(
+        lambda: hub.service.open(
+            picture, settings=settings, name=name, agent=agent, owner=person.name
+        )
+    )
     return await state_of(hub, made)
 
 
@@ -164,7 +168,8 @@ async def state_of(hub: Hub, session: str) -> SessionState:
 async def rename(session: str, to: Name, hub: AHub, person: APerson) -> SessionState:
     """Call a session otherwise."""
     need(person, "plan")
-    hub.service.store.rename(check_owner(session, person), to.name)
+    mine = check_owner(session, person)
+    await asyncio.to_thread(hub.service.store.rename, mine, to.name)
     return await state_of(hub, session)
 
 
@@ -180,7 +185,8 @@ async def fork(session: str, at: Fork, hub: AHub, person: APerson) -> SessionSta
     """A session of its own that begins as this one did."""
     need(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
-    return await state_of(hub, hub.service.fork(check_owner(session, person), at.turn))
+    mine = check_owner(session, person)
+    return await state_of(hub, await asyncio.to_thread(hub.service.fork, mine, at.turn))
 
 
 @router.get("/sessions/{session}/plans/{plan_id}")

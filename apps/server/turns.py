@@ -110,8 +110,12 @@ async def deploy(
 ) -> TurnState:
     """Drive the robots to a plan: a job, done once for a key. Real ones wait for an approval."""
     need(person, "move")
-    asked = asked_by(person, key)
-    turn = hub.service.go(check_owner(session, person), wanted.plan_id, asked=asked)
+    asked, name = asked_by(person, key), check_owner(session, person)
+    run = (await hub.service.fresh(name)).run
+    known = run is not None and wanted.plan_id in run.world.plans
+    if not known and not hub.service.was_asked(name, key):
+        raise InputError(f"There is no plan {wanted.plan_id!r} in this session.", "missing")
+    turn = hub.service.go(name, wanted.plan_id, asked=asked)
     state = await _answer(hub, session, turn, 0, response)
     response.status_code = 202
     return state
@@ -183,7 +187,8 @@ async def turn_state(hub: Hub, session: str, number: int) -> TurnState:
     last = max(e.number for e in events if e.kind in ("session", "turn", "resume"))
     if held.run is not None and number == last and state.status == held.run.report.status:
         return state.model_copy(update={"report": held.run.report})
-    if state.status == "interrupted" and hub.service.is_written(session):
+    written = state.status == "interrupted" and hub.service.is_written
+    if written and await asyncio.to_thread(written, session):
         return state.model_copy(update={"status": "running"})
     return state
 

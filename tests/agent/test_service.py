@@ -1,10 +1,12 @@
 import asyncio
 from collections.abc import AsyncGenerator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 from formup.agent.agent import Agent
+from formup.agent.conversation import is_stop
 from formup.agent.feed import Poses
 from formup.agent.service import Service
 from formup.agent.session import Run
@@ -13,7 +15,7 @@ from formup.agent.store.places import store_at
 from formup.agent.store.protocol import Event, Store
 from formup.agent.turns import Asked
 from formup.tools.context import Settings
-from formup.tools.errors import InputError
+from formup.tools.errors import FleetError, InputError
 from formup.tools.fleet.protocol import Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.perception.image import Picture, picture_from_array, picture_from_bytes
@@ -272,7 +274,7 @@ def test_who_may_only_plan_moves_nothing(
 def test_forgotten_conversations_are_read_again(
     store: Store, picture: Picture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("formup.agent.service.MOST_OPEN", 2)
+    monkeypatch.setattr("formup.agent.open_sessions.MOST_OPEN", 2)
 
     async def talk() -> None:
         service = Service(Agent(), store)
@@ -304,3 +306,109 @@ def test_a_picture_that_came_as_bytes_is_the_same_when_it_is_read_again(store: S
         assert (await there.fresh(here.fork(name))).picture.sha256 == sent.sha256
 
     asyncio.run(talk())
+
+
+@pytest.mark.usefixtures("real")
+def test_deleting_a_session_leaves_the_fleet_to_the_others(store: Store, picture: Picture) -> None:
+    async def talk() -> None:
+        service = Service(Agent(), store)
+        names = [opened(service, picture) for _ in range(2)]
+        for name in names:
+            await service.say(name, "Surround it")
+        await service.delete(names[0])
+        assert (await service.go(names[1])).report.status == "needs_approval"
+        assert (
+            await service.say(opened(service, picture), "Surround it")
+        ).report.status == "planned"
+        await service.close()
+
+    asyncio.run(talk())
+
+
+def test_stop_passes_while_a_go_begins(
+    store: Store, picture: Picture, drives: list[Motion]
+) -> None:
+    async def talk(delay: float) -> None:
+        service = Service(Agent(), store)
+        name = opened(service, picture)
+        await service.say(name, "Surround it")
+        stops = [asyncio.ensure_future(service.stop(name)) for _ in range(2)]
+        await asyncio.sleep(delay)
+        with suppress(InputError, asyncio.CancelledError):  # a stop is a turn too, or cuts it off
+            await service.go(name)
+        stopped = await asyncio.gather(*stops)
+        assert all(run is not None for run in stopped)
+        held = service.session(name).run
+        assert held is not None
+        assert held.report.arrival is None or not held.report.arrival.arrived
+        await service.close()
+
+    for delay in (0.0, 0.0005, 0.001, 0.002):
+        asyncio.run(talk(delay))
+
+
+@pytest.mark.parametrize("how", ["fails", "hangs"])
+def test_a_fleet_that_cannot_be_told_to_stop_does_not_keep_a_turn_going(
+    store: Store,
+    picture: Picture,
+    drives: list[Motion],
+    monkeypatch: pytest.MonkeyPatch,
+    how: str,
+) -> None:
+    async def stop(self: SimulatedFleet) -> None:
+        if how == "hangs":
+            await asyncio.sleep(60)
+        raise FleetError("The radio is lost.")
+
+    monkeypatch.setattr("formup.agent.service.HOLDING", 0.1)
+
+    async def talk() -> Run:
+        service = Service(Agent(), store)
+        name = opened(service, picture)
+        await service.say(name, "Surround it")
+        turn = service.go(name)
+        await turn.moving.wait()
+        with monkeypatch.context() as broken:
+            broken.setattr(SimulatedFleet, "stop", stop)
+            with pytest.raises(FleetError):
+                await service.stop(name)
+        return await turn
+
+    assert asyncio.run(talk()).report.status in ("stopped", "failed")
+
+
+def test_a_session_is_not_replaced_under_its_turn(
+    store: Store, picture: Picture, drives: list[Motion]
+) -> None:
+    async def talk() -> None:
+        service = Service(Agent(), store)
+        name = opened(service, picture)
+        await service.say(name, "Surround it")
+        turn = service.go(name)
+        seen = [await service.fresh(name) for _ in range(20)]
+        await turn
+        assert {id(held) for held in seen} == {id(service.session(name))}
+
+    asyncio.run(talk())
+
+
+@pytest.mark.parametrize(
+    ("words", "driving", "stops"),
+    [
+        ("stop", False, True),
+        ("STOP!!!", False, True),
+        ("please stop the robots now", False, True),
+        ("Stop, stop!", False, True),
+        ("no stop that", False, True),
+        ("stop 2 px before it", False, False),
+        ("do not stop there", False, False),
+        ("put them at the stop sign", False, False),
+        ("hold on!", False, False),
+        ("hold on!", True, True),
+        ("don't move", True, True),
+        ("wait", True, True),
+        ("a bit further out", True, False),
+    ],
+)
+def test_what_says_stop(words: str, driving: bool, stops: bool) -> None:
+    assert is_stop(words, driving=driving) is stops

@@ -113,6 +113,13 @@ def test_another_picture_and_a_point_that_answers(server: Running) -> None:
         ("POST", "{session}/messages", {"json": {"words": "go", "moves": True}}, 422),
         ("POST", "{session}/messages", {"content": b"{"}, 422),
         ("POST", "{session}/undo", {"json": {}}, 422),
+        ("POST", "{session}/edits", {"content": b'{"edits":[{"a":"\\ud800"}]}'}, 422),
+        (
+            "POST",
+            "{session}/deployments",
+            {"json": {"plan_id": "p-0"}, "headers": {"Idempotency-Key": "k"}},
+            404,
+        ),
         ("POST", "{session}/approvals", {"json": {"plan_id": "p", "nonce": "n"}}, 409),
         ("GET", "{session}/events", {"headers": {"Last-Event-ID": "x"}}, 422),
         ("PATCH", "{session}", {"json": {"name": "x" * 300}}, 422),
@@ -182,7 +189,12 @@ def test_what_others_may_not_send(serve: Serve) -> None:
     server = serve(upload_bytes=200_000, pixels=100_000, body_seconds=1, sessions=1)
     for headers in ({"Host": "evil.example"}, {"Host": "127.0.0.1.evil.example"}):
         assert server.client.get("/api/sessions", headers=headers).status_code == 421
-    for headers in ({"Origin": "http://evil.example"}, {"Sec-Fetch-Site": "cross-site"}):
+    assert server.client.get("/api/sessions", headers={"Host": "["}).status_code == 421
+    for headers in (
+        {"Origin": "http://["},
+        {"Origin": "http://evil.example"},
+        {"Sec-Fetch-Site": "cross-site"},
+    ):
         assert server.client.post("/api/sessions", headers=headers).status_code == 403
     same = {"Origin": server.url}
     assert server.client.post("/api/sessions", headers=same).status_code == 422
@@ -190,6 +202,10 @@ def test_what_others_may_not_send(serve: Serve) -> None:
     assert large.status_code == 413
     chunks = server.client.post("/api/sessions", content=iter([b"x" * 100_000] * 3))
     assert chunks.status_code == 413, "without a declared length too"
+    parts = iter([b'{"words": "', b"x" * 300_000])
+    json_kind = {"Content-Type": "application/json"}
+    said = server.client.post("/api/sessions/x/messages", content=parts, headers=json_kind)
+    assert said.status_code == 413, "as JSON too"
     photo = PHOTOS / "us_coins.jpg"
     with Image.open(photo) as header:
         assert header.width * header.height > 100_000
