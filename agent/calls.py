@@ -50,13 +50,11 @@ async def answer(
     """
     tool = tool_named(tools, call.name)
     if tool is None:
-        known = ", ".join(t.name for t in tools)
-        return failed(call, "unknown_tool", f"Unknown tool {call.name!r}. Available: {known}.")
+        return failed(call, "unknown_tool", _unknown(call, tools))
     clock = asyncio.timeout(None)
     try:
         async with _slot(tool), clock:
-            if seconds is not None and tool.kind != "actuate":
-                clock.reschedule(asyncio.get_running_loop().time() + seconds)
+            _start(clock, None if tool.kind == "actuate" else seconds)
             result = await tool.call(context, call.arguments)
             text = result.text
     except ArgumentsError as error:
@@ -82,6 +80,17 @@ async def answer(
         images=result.images,
         message=result.message,
     )
+
+
+def _unknown(call: Call, tools: tuple[Tool, ...]) -> str:
+    known = ", ".join(tool.name for tool in tools)
+    return f"Unknown tool {call.name!r}. Available: {known}."
+
+
+def _start(clock: asyncio.Timeout, seconds: float | None) -> None:
+    """Let a clock run from now on."""
+    if seconds is not None:
+        clock.reschedule(asyncio.get_running_loop().time() + seconds)
 
 
 def _slot(tool: Tool) -> AbstractAsyncContextManager[None]:

@@ -28,7 +28,8 @@ WITHOUT_PLAN = (
 )
 """Frames that fit when no plan stands."""
 INSTRUCTING = (
-    *("arrange", "target", "close", "cage", "count", "split", "sides", "gap", "distance"),
+    *("arrange", "arranged", "target", "close", "cage", "count", "split", "sides", "gap"),
+    *("distance", "shift"),
 )
 """Frames of what is an instruction when no plan stands."""
 ADDING = ("more", "less", "again", "toofar", "otherway", "corrected")

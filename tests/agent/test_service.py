@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formup.agent.agent import Agent
-from formup.agent.conversation import is_stop
 from formup.agent.feed import Poses
 from formup.agent.service import Service
 from formup.agent.session import Run
@@ -390,25 +389,3 @@ def test_a_session_is_not_replaced_under_its_turn(
         assert {id(held) for held in seen} == {id(service.session(name))}
 
     asyncio.run(talk())
-
-
-@pytest.mark.parametrize(
-    ("words", "driving", "stops"),
-    [
-        ("stop", False, True),
-        ("STOP!!!", False, True),
-        ("please stop the robots now", False, True),
-        ("Stop, stop!", False, True),
-        ("no stop that", False, True),
-        ("stop 2 px before it", False, False),
-        ("do not stop there", False, False),
-        ("put them at the stop sign", False, False),
-        ("hold on!", False, False),
-        ("hold on!", True, True),
-        ("don't move", True, True),
-        ("wait", True, True),
-        ("a bit further out", True, False),
-    ],
-)
-def test_what_says_stop(words: str, driving: bool, stops: bool) -> None:
-    assert is_stop(words, driving=driving) is stops

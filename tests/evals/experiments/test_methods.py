@@ -54,7 +54,7 @@ def row_of(
             raise reply
         return reply
 
-    def named(model: str, base_url: str | None = None) -> Model:
+    def named(model: str, base_url: str | None = None, *show: object) -> Model:
         return FunctionModel(says, model)
 
     monkeypatch.setattr(agent_module, "model_named", named)
