@@ -273,7 +273,7 @@ def _last_words(outcome: Outcome) -> str:
         call = outcome.call
         if call.name == "ask_user":
             return str(call.arguments["question"])
-        plan = f" It is for plan {outcome.plan_id}." if outcome.plan_id else ""
+        plan = f"plan {outcome.plan_id} before robots move" if outcome.plan_id else ""
         node = outcome.world.plans.get(outcome.plan_id or "")
         if node is not None and node.plan.partial is not None:
             plan += f" That plan is partial: {node.plan.partial.sentence}"

@@ -11,6 +11,7 @@ from ..agent.agent import Agent
 from ..agent.service import Service
 from ..agent.store.places import data_folder, store_at
 from ..tools.errors import InputError
+from ..tools.fleet.registry import FLEETS
 from . import options as o
 from .agents import agent_of
 from .terminal import say
@@ -66,6 +67,7 @@ def serve(
     if settings.tokens_file is None and usual.exists():
         settings = settings.model_copy(update={"tokens_file": usual})
     check_reach(settings)
+    FLEETS.load(settings.fleet)
     with service_of(settings, planner, base_url, prompt, prompts, limit, policy) as service:
         raise typer.Exit(run(service, settings))
 
@@ -94,6 +96,11 @@ def check_reach(settings: "ServerSettings") -> None:
         raise InputError(
             f"On {settings.host} others can reach this server, and robots with it: make a token "
             "with formup tokens add NAME, or listen on 127.0.0.1."
+        )
+    if settings.tokens_file is not None and not settings.tokens_file.is_file():
+        raise InputError(
+            f"There is no file of tokens {settings.tokens_file}, so that nobody could get in: make "
+            f"one with formup tokens add NAME --tokens {settings.tokens_file}."
         )
 
 

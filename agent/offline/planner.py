@@ -21,7 +21,7 @@ from .drafting import contract_of, place_of, question_of, things_needed, would_d
 from .pointed import narrowed
 from .reading import Reading
 from .references import described
-from .spelling import spelled
+from .spelling import instructed, spelled
 
 MAX_LABEL = 100
 EACH = re.compile(
@@ -210,7 +210,7 @@ def _left_off(result: Result, history: History) -> str:
 
 def _said(task: Task, history: History) -> str:
     """The instruction with the answers to questions about it, which stand for what was unread."""
-    text = task.instruction
+    text = instructed(task.instruction)
     said = _answered(history)
     for k, answer in enumerate(said):
         if answer.isdecimal():

@@ -13,7 +13,7 @@ from .choosing import Step
 from .finding import one_at
 from .followup_things import UNNAMED, resolved
 from .followup_words import Chunk, chunks_of
-from .references import described
+from .references import Reference, described
 from .standing import Standing
 
 ONE_SHOWN = re.compile(
@@ -68,7 +68,7 @@ def narrowed(task: Task, history: History) -> Task | Step:
         return task
     if name not in centres:
         things = described([name.removeprefix("?")])
-        looked = one_at(things[0].whole_query, centres, history) if len(things) == 1 else None
+        looked = _looked(things, centres, history)
         if isinstance(looked, Step):
             return looked
         name = looked or name
@@ -80,6 +80,18 @@ def narrowed(task: Task, history: History) -> Task | Step:
     words = f"{text[:start]}{THE_THING}{text[chunk.end :]}"
     chosen = tuple(p for p in task.pointed if p["id"] == name)
     return replace(task, instruction=words, pointed=chosen)
+
+
+def _looked(
+    things: Sequence[Reference], centres: dict[str, tuple[float, float]], history: History
+) -> str | Step | None:
+    """The one that a description fits, by its looks alone where nothing found is of its noun."""
+    found: str | Step | None = None
+    for thing in things if len(things) == 1 else ():
+        found = one_at(thing.whole_query, centres, history)
+        if found is None and thing.query and thing.query != thing.whole_query:
+            found = one_at(thing.query, centres, history)
+    return found
 
 
 def _quantity(task: Task, chunk: Chunk) -> str:

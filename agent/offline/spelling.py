@@ -32,6 +32,25 @@ def spelled(text: str) -> str:
     return re.sub(r"[^\W\d_]+", lambda m: _meant(m[0].lower()) or m[0], text)
 
 
+def instructed(text: str) -> str:
+    """A first instruction as its rules know it: short forms, and slips in words that arrange."""
+    text = re.sub(r"(?i)\bw/ ?(?=\w)", "with ", text)
+    text = re.sub(
+        r"(?i)([,;.]|\band|\bbut) (gap|opening) (?=on|at|to|towards)", r"\1 with a \2 ", text
+    )
+    return re.sub(r"[^\W\d_]+", lambda m: _arranging(m[0].lower()) or m[0], text)
+
+
+@cache
+def _arranging(word: str) -> str | None:
+    """The one word of `arranging` in followups.yaml that this is a slip away from."""
+    known = rules()["arranging"]
+    if len(word) < LEAST_ANY or word in known or word in known_words():
+        return None
+    near = [w for w in known if _is_slip(word, w)]
+    return near[0] if len(near) == 1 else None
+
+
 @cache
 def _rewritten() -> list[tuple[re.Pattern[str], str]]:
     """Patterns of followups.yaml, and what each becomes."""

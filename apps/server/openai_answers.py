@@ -169,6 +169,8 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
         if error.kind == "repeated":
             place = Place(session, error.facts["turn"])
             return await told(place, await run_at(hub, place), base)
+        if error.kind == "not_allowed":
+            return _at_once(str(error), base, said.place)
         if error.kind != "busy":
             raise
     now = hub.service.turn(session)

@@ -9,6 +9,7 @@ from typing import Any
 import uvicorn
 
 from ...agent.service import Service
+from ...tools.errors import InputError
 from ..terminal import say
 from .app import make_app
 from .hub import Hub
@@ -59,7 +60,11 @@ def run(service: Service, settings: ServerSettings) -> int:
         limit_concurrency=settings.streams + BACKLOG,
     )
     server = Server(config, app.state.hub)
-    server.run()
+    try:
+        server.run()
+    except SystemExit:  # as uvicorn ends where it cannot listen; its log says why
+        where = f"{settings.host}:{settings.port}"
+        raise InputError(f"{where} cannot be listened on: give another --port or --host.") from None
     return 0 if server.started else 4
 
 
