@@ -273,11 +273,13 @@ def _last_words(outcome: Outcome) -> str:
         call = outcome.call
         if call.name == "ask_user":
             return str(call.arguments["question"])
-        plan = f"plan {outcome.plan_id} before robots move" if outcome.plan_id else ""
-        node = outcome.world.plans.get(outcome.plan_id or "")
+        if outcome.plan_id is None:
+            return f"A person must approve {call.name} of {json.dumps(call.arguments)}."
+        asked = f"A person must approve plan {outcome.plan_id} before robots move."
+        node = outcome.world.plans.get(outcome.plan_id)
         if node is not None and node.plan.partial is not None:
-            plan += f" That plan is partial: {node.plan.partial.sentence}"
-        return f"A person must approve {call.name} of {json.dumps(call.arguments)}.{plan}"
+            asked += f" That plan is partial: {node.plan.partial.sentence}"
+        return asked
     if isinstance(outcome, Stopped):
         return outcome.reason
     if isinstance(outcome, Cancelled):

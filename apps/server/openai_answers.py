@@ -166,13 +166,22 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
         await turn.begin()
         return Begun(base, session, turn)
     except InputError as error:
-        if error.kind == "repeated":
-            place = Place(session, error.facts["turn"])
-            return await told(place, await run_at(hub, place), base)
-        if error.kind == "not_allowed":
-            return _at_once(str(error), base, said.place)
-        if error.kind != "busy":
-            raise
+        return await _instead(hub, session, said, base, error)
+
+
+async def _instead(hub: Hub, session: str, said: Said, base: str, error: InputError) -> Answer:
+    """What is told where a turn does not begin.
+
+    Raises:
+        InputError: that one, where it is no answer.
+    """
+    if error.kind == "repeated":
+        place = Place(session, error.facts["turn"])
+        return await told(place, await run_at(hub, place), base)
+    if error.kind == "not_allowed":
+        return _at_once(str(error), base, said.place)
+    if error.kind != "busy":
+        raise error
     now = hub.service.turn(session)
     place = Place(session, now.number) if now and now.number else said.place
     return _at_once(DRIVES if now and now.moving.is_set() else BUSY, base, place)

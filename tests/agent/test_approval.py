@@ -47,7 +47,7 @@ def test_real_robots_wait_for_approval_of_their_plan(
     assert waits.call == deploy("d")
     assert [waits.plan_id] == list(asked.world.plans)
     assert waits.plan_id == asked.report.plan_id
-    assert f"It is for plan {waits.plan_id}." in asked.report.message
+    assert f"approve plan {waits.plan_id} before" in asked.report.message
     assert drives == []
     assert not [e for e in read_events(tmp_path) if e.kind == "moving"]
     left = load_run(tmp_path)

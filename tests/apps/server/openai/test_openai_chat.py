@@ -292,7 +292,7 @@ def test_tokens_keep_sessions_apart(serve: Serve, chat: Any, store: Store, tmp_p
     assert session.startswith("ann-")
     with urlopen(Request(address)) as response:
         assert response.status == 200, "whoever has the address sees the picture"
-    with pytest.raises(APIError, match="A token is needed"):
+    with pytest.raises(APIError, match="token is"):
         chat(url).say("go")
     anns.say("a bit further out", extra_headers={"X-Formup-Session": "bob-0000000000"})
     bobs = chat(url, bob, anns.messages)
@@ -302,11 +302,10 @@ def test_tokens_keep_sessions_apart(serve: Serve, chat: Any, store: Store, tmp_p
     assert link(bobs.say(CAGE, "us_coins.jpg"))[1].startswith("bob-"), "the same words, not hers"
     with pytest.raises(NotFoundError, match="There is no session 'ann-"):
         chat(url, bob).say("go", extra_headers={"X-Formup-Session": session})
-    with pytest.raises(APIError, match="not move robots"):
-        bobs.say("go")
+    assert "not move robots" in bobs.say("go")
     with pytest.raises(APIError, match="scope read; this needs plan"):
         chat(url, eve).say(CAGE, "us_coins.jpg")
-    assert "nothing to stop" in chat(url, eve).say("stop")
+    assert "No robots of this chat move" in chat(url, eve).say("stop")
     assert not moved(store)
 
 
