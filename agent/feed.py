@@ -90,14 +90,11 @@ class Feed:
         self._ended = True
         self._wake()
 
-    async def subscribe(
-        self, after: int = 0, heartbeat: float = 15.0
-    ) -> AsyncGenerator[Event | Poses | None]:
+    async def subscribe(self, after: int = 0) -> AsyncGenerator[Event | Poses]:
         """What happens, from an event's number on.
 
         Args:
             after: the number of the last event that the subscriber has seen.
-            heartbeat: seconds of silence after which None is told.
 
         Raises:
             StorageError: the session cannot be read.
@@ -105,28 +102,25 @@ class Feed:
         self.followers += 1
         self.loop = asyncio.get_running_loop()
         try:
-            async for what in self._follow(after, heartbeat):
+            async for what in self._follow(after):
                 yield what
         finally:
             self.followers -= 1
 
-    async def _follow(self, after: int, heartbeat: float) -> AsyncGenerator[Event | Poses | None]:
-        seen, told = 0, time.monotonic()
+    async def _follow(self, after: int) -> AsyncGenerator[Event | Poses]:
+        seen = 0
         while True:
             changed, poses = self._changed, self._poses
             for event in await self._since(after):
                 yield event
-                after, told = event.number, time.monotonic()
+                after = event.number
             if poses.number != seen:
                 yield poses
-                seen, told = poses.number, time.monotonic()
+                seen = poses.number
             if self._ended:
                 return
-            if time.monotonic() - told >= heartbeat:
-                yield None
-                told = time.monotonic()
             try:
-                async with asyncio.timeout(min(POLL, heartbeat)):
+                async with asyncio.timeout(POLL):
                     await changed.wait()
             except TimeoutError:
                 await self._look()

@@ -310,12 +310,10 @@ class Service:
         """What happened in a conversation, from a number on."""
         return self.store.open(session).events(after)
 
-    async def follow(
-        self, session: str, after: int = 0, heartbeat: float = 15.0
-    ) -> AsyncGenerator[Event | Poses | None]:
+    async def follow(self, session: str, after: int = 0) -> AsyncGenerator[Event | Poses]:
         """What happens in a conversation, as it happens; see `Feed.subscribe`."""
         await self.fresh(session)
-        async for told in self._feeds[session].subscribe(after, heartbeat):
+        async for told in self._feeds[session].subscribe(after):
             yield told
 
     async def delete(self, session: str) -> None:

@@ -61,7 +61,7 @@ async def events(
         async for told in hub.service.follow(session, max(place.number, 0)):
             if isinstance(told, Poses):
                 yield _event(poses_data(told), None)
-            elif told is not None:
+            else:
                 run = told.number if told.kind in BEGINS else run
                 for part, data in enumerate(frames(session, told, run)):
                     if told.number != place.number + 1 or part >= place.seen:

@@ -5,12 +5,13 @@ A turn is never lost with its request: it goes on to its end, and its number fin
 
 import asyncio
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from ...agent.store.protocol import Event
-from ...agent.turns import Turn
+from ...agent.turns import Asked, Turn
 from ...tools.errors import InputError
 from .forms import Approval, Deployment, Edits, Key, Message, TurnState, Undo
 from .hub import AHub, APerson, Hub, asked_by, check_owner, need
@@ -24,79 +25,59 @@ RUNNING: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.post("/messages", responses=RUNNING)
-async def say(
-    session: str,
-    said: Message,
-    hub: AHub,
-    person: APerson,
-    response: Response,
-    key: AKey = None,
-    wait: Wait = 30,
-) -> TurnState:
-    """Say something: an instruction, a change, a question, an answer, go or stop."""
+@dataclass(frozen=True)
+class Asking:
+    """Who asks for a turn of which session, and how long they wait for its end."""
+
+    hub: Hub
+    session: str
+    asked: Asked
+    wait: float
+    response: Response
+
+    async def answer(self, turn: Turn) -> TurnState:
+        """The turn at its end, or as it is after so long, or once robots drive."""
+        return await _answer(self.hub, self.session, turn, self.wait, self.response)
+
+
+def asking(
+    session: str, hub: AHub, person: APerson, response: Response, key: AKey = None, wait: Wait = 30
+) -> Asking:
+    """Who asks, if they may plan in that session."""
     need(person, "plan")
-    asked = asked_by(person, key)
-    turn = hub.service.say(
-        check_owner(session, person),
-        said.words,
-        asked,
-        pointed=said.pointed,
-        keep_out=said.keep_out,
-    )
-    return await _answer(hub, session, turn, wait, response)
+    return Asking(hub, check_owner(session, person), asked_by(person, key), wait, response)
+
+
+AnAsking = Annotated[Asking, Depends(asking)]
+
+
+@router.post("/messages", responses=RUNNING)
+async def say(said: Message, at: AnAsking) -> TurnState:
+    """Say something: an instruction, a change, a question, an answer, go or stop."""
+    pointed, kept = said.pointed, said.keep_out
+    turn = at.hub.service.say(at.session, said.words, at.asked, pointed=pointed, keep_out=kept)
+    return await at.answer(turn)
 
 
 @router.post("/edits", responses=RUNNING)
-async def edit(
-    session: str,
-    wanted: Edits,
-    hub: AHub,
-    person: APerson,
-    response: Response,
-    key: AKey = None,
-    wait: Wait = 30,
-) -> TurnState:
+async def edit(wanted: Edits, at: AnAsking) -> TurnState:
     """Change the plan that stands, by edits as `edit_formation` takes them."""
-    need(person, "plan")
-    asked = asked_by(person, key)
-    turn = hub.service.edit(check_owner(session, person), *wanted.edits, asked=asked)
-    return await _answer(hub, session, turn, wait, response)
+    return await at.answer(at.hub.service.edit(at.session, *wanted.edits, asked=at.asked))
 
 
 @router.post("/undo", responses=RUNNING)
-async def undo(
-    session: str,
-    back: Undo,
-    hub: AHub,
-    person: APerson,
-    response: Response,
-    key: AKey = None,
-    wait: Wait = 30,
-) -> TurnState:
+async def undo(back: Undo, at: AnAsking) -> TurnState:
     """Go back to the plan before; robots stay where they are."""
-    need(person, "plan")
-    asked = asked_by(person, key)
-    turn = hub.service.undo(check_owner(session, person), back.steps, back.to, asked)
-    return await _answer(hub, session, turn, wait, response)
+    return await at.answer(at.hub.service.undo(at.session, back.steps, back.to, at.asked))
 
 
 @router.put("/picture", responses=RUNNING, openapi_extra=PICTURE)
 async def image(
-    session: str,
-    request: Request,
-    hub: AHub,
-    person: APerson,
-    response: Response,
-    name: Annotated[str, Query(max_length=200)] = "picture",
-    key: AKey = None,
-    wait: Wait = 30,
+    request: Request, at: AnAsking, name: Annotated[str, Query(max_length=200)] = "picture"
 ) -> TurnState:
     """Go on with another picture, the body; plans made before are void."""
-    need(person, "plan")
-    picture = await picture_sent(request, hub, name)
-    turn = hub.service.image(check_owner(session, person), picture, asked_by(person, key))
-    return await _answer(hub, session, turn, wait, response)
+    picture = await picture_sent(request, at.hub, name)
+    return await at.answer(at.hub.service.image(at.session, picture, at.asked))
 
 
 @router.post("/deployments", status_code=202)
