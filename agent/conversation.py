@@ -31,8 +31,8 @@ HELD = "The robots are held where they are. Say what to change, or go to drive o
 MAY_NOT_MOVE = (
     "You may plan here but not move robots: nothing moves; somebody who may has to say go."
 )
-STOPS = re.compile(r"\b(?:stop|halt|freeze)\b")
 STOP = re.compile(
+    r"(?=.*\b(?:stop|halt|freeze)\b)"
     r"(?:\W*(?:stop|halt|freeze|please|now|it|the|robots?|all|them|every\w*|team|"
     r"immediately|at|once|emergency|right|just|quick|oh|no|hey|ok|moving|driving|this|that)\b)+\W*"
 )
@@ -364,8 +364,7 @@ def is_stop(words: str, *, driving: bool = False) -> bool:
     said = words.lower()
     if driving:
         return len(said.split()) <= SHORT and STOP_DRIVING.search(said) is not None
-    found = STOP.fullmatch(said)
-    return found is not None and STOPS.search(said) is not None
+    return STOP.fullmatch(said) is not None
 
 
 def in_own_loop(work: Coroutine[Any, Any, Any]) -> Any:
