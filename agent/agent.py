@@ -34,6 +34,7 @@ from .session import (
     Show,
     TurnOptions,
     answered_by,
+    believed,
     end_facts,
     picture_facts,
 )
@@ -291,6 +292,7 @@ class Agent:
                 fixed = context.settings.model_copy(update={"approved": plan_id})
                 context = replace(context, settings=fixed)
             if result is not None:
+                context = context.at(believed(context.world, messages, result))
                 await recorder.message(result, context.world)
                 messages = (*messages, result)
             left, spent = replace(run, context=context), run.report.usage.seconds

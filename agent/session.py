@@ -6,6 +6,7 @@ written down before anything follows from it, so that the log opens again after 
 
 import gc
 import io
+import re
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -34,6 +35,12 @@ from .store.folder_store import FolderSession
 from .store.protocol import StoredSession
 
 Show = Callable[[Message], None]
+AGREED = re.compile(
+    r"(?:(?:y|yes|yep|yeah|ok|okay|sure|right|correct|exactly|please)[ ,.!]*)+"
+    r"(?:(?:it|that)(?:'s| is| looks)? ?(?:right|correct|good|fine|it)?|use (?:it|that))?[ .!]*",
+    re.IGNORECASE,
+)
+"""A plain yes."""
 
 
 class SayOptions(TypedDict, total=False):
@@ -105,13 +112,15 @@ class Run:
         return file.getvalue()
 
     def view(self) -> bytes | None:
-        """A JPEG file, 1,024 px long or little more, of what a question offers, else of the plan
-        that stands."""
+        """A JPEG file, 1,024 px long or little more, of what a question offers or of an outline
+        that is doubted, else of the plan that stands."""
         picture, world, plan = self.context.picture, self.world, self._plan
         if asked := [choice["id"] for choice in self.report.candidates or ()]:
             targets = tuple(t for t in world.targets if t.id in asked)
             others = [self.context.candidate(n) for n in asked if n not in {t.id for t in targets}]
             return draw_view(picture, world.having(targets=targets), candidates=others)
+        if world.doubted is not None:
+            return draw_view(picture, world.with_doubted())
         return None if plan is None else draw_view(picture, world, plan=plan)
 
     @property
@@ -230,6 +239,15 @@ def stored_picture(
             "since, which voids its targets and plans; run again on the new picture."
         )
     return given
+
+
+def believed(world: World, messages: Sequence[Message], answer: Result) -> World:
+    """The world after an answer: a yes to a doubtful outline that was shown makes it a target."""
+    last = next((m for m in reversed(messages) if isinstance(m, Result)), None)
+    asked = last is not None and last.cause == "low_confidence"
+    if world.doubted is None or not asked or not AGREED.fullmatch(answer.text.strip()):
+        return world
+    return world.with_doubted().having(doubted=None)
 
 
 def answered_by(

@@ -105,7 +105,8 @@ class Display:
 
     def _picture(self, shown: Shown, path: Path) -> None:
         if self._console is not None and self._way != "none":
-            context, world, report = shown.run.context, shown.run.world, shown.report
+            context, report = shown.run.context, shown.report
+            world = shown.run.world.with_doubted()
             node = world.plans.get(report.plan_id or "")
             plan = None if node is None or report.candidates else node.plan
             with Image.open(path) as page:

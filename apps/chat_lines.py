@@ -124,7 +124,7 @@ class Talk:
         changed = now.plan_id not in (None, before.report.plan_id)
         other = run.world.picture != before.world.picture
         plan = None if was is None or was.plan.id == now.plan_id or other else was.plan
-        drawn = changed or bool(now.arrival or now.candidates)
+        drawn = changed or bool(now.arrival or now.candidates or run.world.doubted)
         return self._finished(run, plan, drawn=drawn, changed=changed)
 
     def _finished(

@@ -13,7 +13,7 @@ MethodName = Annotated[
     typer.Option("--method", help="rules, agent, alone, pile, scatter, boundary, circle or line."),
 ]
 ModeName = Annotated[
-    str, typer.Option("--mode", help="How to point: truth, outline, box, point or words.")
+    str, typer.Option("--mode", help="How to point: truth, outline, drawn, box, point or words.")
 ]
 Seeds = Annotated[
     str | None, typer.Option("--seeds", help="First and last seed of drawn scenes: 0-199.")

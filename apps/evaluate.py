@@ -2,7 +2,7 @@
 
 import typer
 
-from . import eval_compare, eval_report, eval_run, eval_suites
+from . import eval_compare, eval_perception, eval_report, eval_run, eval_suites
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
@@ -20,3 +20,4 @@ app.command(name="gate")(eval_compare.gate)
 app.command(name="merge")(eval_compare.merge_shards)
 app.command(name="report")(eval_report.report)
 app.command(name="descriptors")(eval_suites.descriptors)
+app.command(name="perception")(eval_perception.perception)

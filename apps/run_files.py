@@ -106,8 +106,7 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
     elif node is not None:
         files["picture"] = folder.draw("plan.png", draw_plan(picture, world, node.plan, title))
     elif world.targets or world.doubted:
-        shown = world.with_target(world.doubted) if world.doubted else world
-        files["picture"] = folder.draw("found.png", draw_look(picture, shown))
+        files["picture"] = folder.draw("found.png", draw_look(picture, world.with_doubted()))
     if (contract := suggested(run.outcome)) is not None:
         data = contract.model_dump_json(indent=1, exclude_defaults=True).encode()
         files["contract"] = folder.write(CONTRACT, data)
@@ -129,6 +128,9 @@ def write_turn(folder: Folder, turn: int, run: Run, before: Plan | None) -> dict
     title, node = report.instruction, world.plans.get(report.plan_id or "")
     if report.candidates:
         files["picture"] = folder.draw(f"question-{turn}.png", draw_choices(run))
+    elif world.doubted is not None:
+        found = draw_look(picture, world.with_doubted())
+        files["picture"] = folder.draw(f"found-{turn}.png", found)
     elif node is not None:
         drawn = draw_plan(picture, world, node.plan, title, before)
         data = plan_file(world, node.plan.id, title, picture)

@@ -209,6 +209,10 @@ class World(Value):
         others = tuple(t for t in self.targets if t.id != target.id)
         return self.having(targets=(*others, target))
 
+    def with_doubted(self) -> "World":
+        """The world to show to a person: with the outline that is doubted, if one is."""
+        return self if self.doubted is None else self.with_target(self.doubted)
+
     def with_sample(self, points: Sequence[Point]) -> tuple["World", str]:
         """The world with sampled positions under the next name, and that name."""
         name = f"s{len(self.samples) + 1}"

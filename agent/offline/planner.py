@@ -258,9 +258,9 @@ def _after_proposal(task: Task, result: Result, history: History, before: Histor
         again = result.cause == "no_room_beside" and _may_move_on(task, history)
         if again or (result.cause == "doubt" and not _was_doubted(history[:-1])):
             return _begin(task, history, before)
-        if result.cause == "low_confidence":
-            return _call("ask_user", {"question": result.text})
         facts = result.facts or {}
+        if result.cause == "low_confidence":
+            return _call("ask_user", {"question": facts.get("plain", result.text)})
         return _impossible(history, facts.get("plain", result.text), facts.get("partial_plan"))
     plan = json.loads(result.text)
     if not plan["certified"]:

@@ -1,13 +1,14 @@
 """How a task's thing is pointed at: the way of pointing is a variable of an experiment.
 
-truth: the drawn outline is the mask. box: the target's box, each side moved by up to 8 % of the
-box. outline: at most 12 vertices, each coordinate moved by up to 4 % of the size (square root of
-the area). point: one point well inside. words: nothing is pointed at but what a dialogue begins
-with, by its outline.
+truth: the drawn outline is the mask. box: each side off by up to 8 % of the box. outline: at most
+12 vertices, off by up to 4 % of the size (square root of the area). drawn: by hand, at one look.
+point: one well inside. words: no pointing but what a dialogue begins with, by its outline.
 """
 
+import json
 import zlib
-from typing import Literal, NamedTuple, get_args
+from functools import cache
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import shapely
@@ -17,9 +18,10 @@ from ...tools.errors import InputError
 from ...tools.geometry.outline import FloatArray
 from ...tools.perception.target_prompt import TargetPrompt
 from ...tools.world import Target
+from ..tasks.annotations import PHOTOS
 from ..tasks.task import Task, Thing
 
-Mode = Literal["truth", "outline", "box", "point", "words"]
+Mode = Literal["truth", "outline", "drawn", "box", "point", "words"]
 JITTERED: tuple[Mode, ...] = ("outline", "box", "point")
 """Modes in which each trial points in another way."""
 BOX_JITTER, OUTLINE_JITTER, OUTLINE_VERTICES = 0.08, 0.04, 12
@@ -50,6 +52,8 @@ def can_point(task: Task, mode: Mode) -> bool:
     """Whether a task can be pointed at this way: a single pointing settles one thing alone."""
     if task.dialogue is not None:
         return mode in ("truth", "words")
+    if mode == "drawn":
+        return task.id in _drawings()
     if mode in JITTERED:
         return len(task.things) == 1
     return mode == "words" or bool(task.things)
@@ -61,6 +65,8 @@ def pointing(task: Task, mode: Mode, number: int) -> Pointing:
     if mode == "words":
         shown = enumerate(things, start=1) if task.dialogue else ()
         return Pointing(pointed=tuple(_drawn_outline(thing, f"t{i}") for i, thing in shown))
+    if mode == "drawn":
+        return Pointing(pointed=(TargetPrompt.model_validate(_drawings()[task.id]),))
     if mode == "truth":
         return Pointing(targets=tuple(map(_true_target, things, range(len(things)))))
     random = np.random.default_rng([number, zlib.crc32(task.id.encode())])
@@ -68,6 +74,12 @@ def pointing(task: Task, mode: Mode, number: int) -> Pointing:
     far = np.array(task.goals[0].size, dtype=float) - 1
     jittered = {"box": _jittered_box, "outline": _jittered_outline, "point": _inner_point}[mode]
     return Pointing(pointed=(jittered(thing, random, far),))
+
+
+@cache
+def _drawings() -> dict[str, dict[str, Any]]:
+    """Outlines drawn by hand, by task."""
+    return json.loads((PHOTOS / "drawn.json").read_text(encoding="utf-8"))
 
 
 def _true_target(thing: Thing, index: int) -> Target:

@@ -201,7 +201,7 @@ async def deploy(
     """Move the robots to a certified plan; says where they arrived.
 
     Args:
-        plan_id: left out: the one of this reply, else the one that stands.
+        plan_id: left out: the one of this reply, else the one that stood when the turn began.
         tell: to the person once all have arrived; ends the turn.
     """
     plan_id, made = plan_id or _standing_id(context), context.proposed

@@ -71,16 +71,22 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
         ToolError: a prompt does not fit the picture, or its mask is not to be believed, with a
             picture of it.
     """
-    for prompt in prompts:
-        target = _measured(context, _correcting(context.world, prompt))
+    for given in prompts:
+        prompt = _correcting(context.world, given)
+        target = _measured(context, prompt)
         threshold = _threshold(context, prompt.how)
-        if target.confidence < threshold:
+        if target.confidence < threshold and not _believed(context.world, target):
             context.observed(context.world.having(doubted=target))
             shown = closer_view(context, target)
             raise _insufficient(target.confidence, threshold, prompt.how).showing(shown)
         context = context.at(context.world.with_target(target))
         context.observed(context.world)
     return context.world
+
+
+def _believed(world: World, target: Target) -> bool:
+    """Whether a person has agreed to that very outline, however doubtful."""
+    return any(t.id == target.id and t.outline == target.outline for t in world.targets)
 
 
 def _measured(context: Context, prompt: TargetPrompt) -> Target:
@@ -92,7 +98,8 @@ def _measured(context: Context, prompt: TargetPrompt) -> Target:
     try:
         found = measure_outline(context.picture, prompt, segmenter, candidate)
     except InputError as error:
-        text = f"Insufficient segmentation accuracy. {error} {ADVICE[prompt.how]}"
+        context.observed(context.world.having(doubted=None))
+        text = f"Insufficient segmentation accuracy. {error} {ADVICE[prompt.how]}."
         threshold = _threshold(context, prompt.how)
         raise ToolError(text, "low_confidence", threshold=threshold) from None
     missed, added = unlike_drawn(found.outline, prompt, *context.world.picture.size)
@@ -137,22 +144,25 @@ def _threshold(context: Context, how: str) -> float:
 
 
 ADVICE = {
-    "point": "Draw a box close around the thing, or better a rough outline.",
-    "candidate": "Draw a rough outline around the thing.",
-    "box": "Draw a rough outline around the thing.",
-    "outline": "Draw the outline closer, or name points that do not belong; if what was found "
-    "looks right, the person may allow a lower threshold.",
+    "point": "Draw a box close around the thing, or better a rough outline",
+    "candidate": "Draw a rough outline around the thing",
+    "box": "Draw a rough outline around the thing",
+    "outline": "Draw the outline closer, or name points that do not belong",
 }
 
 
 def _insufficient(confidence: float, threshold: float, how: str) -> ToolError:
     shown = math.floor(100 * confidence) / 100  # never rounded up to the threshold
-    return ToolError(
+    said = (
         f"Insufficient segmentation accuracy. The mask's confidence is {shown:.2f}, below the "
-        f"threshold {threshold:.2f}. {ADVICE[how]}",
+        f"threshold {threshold:.2f}. {ADVICE[how]}"
+    )
+    return ToolError(
+        f"{said}, or ask the person whether the outline shown is right.",
         "low_confidence",
         confidence=confidence,
         threshold=threshold,
+        plain=f"{said}, or say yes if the outline shown is right.",
     )
 
 

@@ -21,10 +21,8 @@ from ...geometry.outline import (
 from . import grabcut as gc
 from .grabcut import Bytes, Mask, Point
 from .protocol import Segmentation
-from .segment import segment_outline
+from .segment import BESIDE, discs, segment_outline
 
-BESIDE = 0.2
-"""How far around a point the drawn outline is taken, as a share of the thing's size."""
 STRAY = 0.1
 """Measured edges further than this from a drawn side, as a share of the size, are not its."""
 ENDS = 0.08
@@ -62,8 +60,8 @@ def segment_corrected(
         negative=[p for p in off if _contains_point(drawn, p)],
     )
     reach = BESIDE * float(np.sqrt(np.count_nonzero(drawn)))
-    kept = _discs(shape, [p for p in on if _contains_point(drawn, p)], reach)
-    cleared = _discs(shape, [p for p in off if not _contains_point(drawn, p)], reach)
+    kept = discs(shape, [p for p in on if _contains_point(drawn, p)], reach)
+    cleared = discs(shape, [p for p in off if not _contains_point(drawn, p)], reach)
     return replace(found, mask=(found.mask | (drawn & kept)) & (drawn | ~cleared))
 
 
@@ -110,14 +108,6 @@ def clipped_to_picture(outline: Outline, width: int, height: int) -> Outline:
 def _contains_point(region: Mask, point: Point) -> bool:
     x, y = (round(v) for v in point)
     return bool(region[y, x])
-
-
-def _discs(shape: tuple[int, int], centres: Sequence[Point], radius: float) -> Mask:
-    y, x = np.ogrid[: shape[0], : shape[1]]
-    region = np.zeros(shape, dtype=np.bool_)
-    for cx, cy in centres:
-        region |= (x - cx) ** 2 + (y - cy) ** 2 <= radius**2
-    return region
 
 
 def _fitted_side(side: FloatArray, places: FloatArray) -> FloatArray:

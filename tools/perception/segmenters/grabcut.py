@@ -101,11 +101,11 @@ class Window:
         return full
 
 
-def window_around(pixels: Bytes, box: Box) -> Window:
+def window_around(pixels: Bytes, box: Box, side: int = WORK_SIDE) -> Window:
     """The window of `pixels` (H, W, 3) RGB around `box` and a margin, ready to segment."""
     mx = MARGIN * (box[2] - box[0]) + MIN_MARGIN_PX
     my = MARGIN * (box[3] - box[1]) + MIN_MARGIN_PX
-    return open_window(pixels, (box[0] - mx, box[1] - my, box[2] + mx, box[3] + my), WORK_SIDE)
+    return open_window(pixels, (box[0] - mx, box[1] - my, box[2] + mx, box[3] + my), side)
 
 
 def open_window(pixels: Bytes, box: Box, side: int) -> Window:
@@ -135,6 +135,13 @@ def features(rgb: npt.ArrayLike) -> Bytes:
     lab = np.asarray(cv2.cvtColor(smooth.astype(np.float32) / 255, cv2.COLOR_RGB2LAB))
     scaled = lab * np.multiply(LAB_WEIGHTS, (2.55, 1, 1)) + (0, 128, 128)
     return scaled.clip(0, 255).round().astype(np.uint8)
+
+
+def lightness_and_chroma(image: Bytes) -> tuple[Floats, Floats]:
+    """CIE lightness L* and chroma, (h, w) each, of features."""
+    weights = np.multiply(LAB_WEIGHTS, (2.55, 1, 1)).astype(np.float32)
+    lab: Floats = (image.astype(np.float32) - np.array((0, 128, 128), np.float32)) / weights
+    return lab[..., 0], np.linalg.norm(lab[..., 1:], axis=2).astype(np.float32)
 
 
 def box_region(shape: tuple[int, int], box: npt.ArrayLike) -> Mask:
@@ -266,6 +273,15 @@ def distance_inside(mask: Mask) -> npt.NDArray[np.float32]:
     """Distance (h, w) of each pixel of the mask to the nearest pixel outside it or the window."""
     padded = np.pad(mask, 1).astype(np.uint8)
     return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, 5), np.float32)[1:-1, 1:-1]
+
+
+def signed_distance(mask: Mask) -> Floats:
+    """Distance (h, w) to the mask's edge, px, positive inside."""
+    inside, outside = (
+        np.asarray(cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
+        for part in (mask, ~mask)
+    )
+    return np.where(mask, inside - 0.5, 0.5 - outside)
 
 
 def bounding_box(mask: Mask) -> Box:

@@ -13,7 +13,7 @@ from .segment import segment_box, segment_points
 
 # Points mean parts as often as whole things, so only the clearest masks are taken; drawn outlines
 # are mostly right.
-THRESHOLDS = MappingProxyType({"point": 0.82, "box": 0.6, "outline": 0.55, "candidate": 0.55})
+THRESHOLDS = MappingProxyType({"point": 0.65, "box": 0.55, "outline": 0.5, "candidate": 0.5})
 
 
 class GrabCutSegmenter:

@@ -12,10 +12,13 @@ import numpy as np
 
 from ..detectors.whole_object import on_plain_ground, propose_whole
 from . import grabcut as gc
+from .cast_shadow import without_cast_shadow
+from .confidence import Way, fitted_confidence
+from .edge_path import edge_path
 from .grabcut import Box, Bytes, Mask, Point, Points, Window
 from .mask_openings import cut_openings
 from .protocol import Segmentation
-from .region_growing import Region, box_iou, edge_support, mask_solidity, pin, propose
+from .region_growing import Region, box_iou, edge_support, filled, mask_solidity, pin, propose
 
 # The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
 RING = 0.1
@@ -31,10 +34,12 @@ COLLAPSED = 0.1
 OUTLINE_ERROR = 0.05
 # Few vertices cut the corners of round things more often than they overshoot.
 OUTLINE_REACH = 0.06
+# Outlines keep more detail than boxes: GrabCut runs once, on a larger window.
+OUTLINE_SIDE = 320
+# Around a point against the outline, as a share of the size, colours alone say where the edge is.
+BESIDE = 0.2
 # Eroding by no more than this share of the local half-width keeps thin parts.
 THIN = 0.5
-# Golden angle: neighbouring vertices move in unrelated directions, the same ones each time.
-TURN = np.pi * (3 - 5**0.5)
 # Different regions a point may mean that are tried; a fourth was right now and then.
 PROPOSALS = 4
 # A whole holds this share of its part, is this many times as large (a thing with its shadow is
@@ -44,8 +49,6 @@ HELD, MUCH_LARGER, RIVAL, SOLID = 0.85, 2.2, 0.6, 0.88
 # is widened by this share a side, so often at most.
 CUT_SHORT, WIDER, WIDENINGS = 0.05, 0.15, 3
 NEXT_TO = np.ones((3, 3), np.uint8)
-# How strongly missing edges lower the confidence.
-EDGE_WEIGHT = 2
 # Other points of a mask that should lead back to it, and how deep inside it they lie at least.
 REPROPOSALS = 4
 DEPTH = 0.35
@@ -59,7 +62,6 @@ class _Prompt:
 
     `trimaps` are GrabCut labels, first for the prompt as given and then for perturbed ones;
     `extent` is what the prompt says the thing covers, `core` what is most surely the thing.
-    `drawn` says that a person or model drew its edge, so that the picture need not show one.
     """
 
     window: Window
@@ -68,7 +70,7 @@ class _Prompt:
     core: Mask
     positive: Points
     box: Box
-    drawn: bool = False
+    way: Way
 
 
 def segment_box(
@@ -87,8 +89,14 @@ def segment_box(
     boxes = [drawn, *_moved_boxes(drawn)]
     trimaps = [pin(window.features, _box_trimap(window.shape, b), on, off) for b in boxes]
     extent = gc.box_region(window.shape, drawn)
-    core = _middle_ellipse(window.shape, drawn)
-    return _segment(_Prompt(window, trimaps, extent, core, on, box))
+    prompt = _Prompt(window, trimaps, extent, _middle_ellipse(window.shape, drawn), on, box, "box")
+    masks = [_object_mask(prompt, trimap) for trimap in trimaps]
+    mask = gc.clean(gc.majority(masks), on)
+    stability = float(np.mean([gc.iou(mask, other) for other in masks[1:]]))
+    if mask.any():
+        ground = trimaps[0] == cv2.GC_BGD
+        mask = without_cast_shadow(window.features, mask, drawn, ground, on)
+    return _rated(prompt, mask, {"stability": stability})
 
 
 def segment_outline(
@@ -104,16 +112,26 @@ def segment_outline(
     a rotated box, and more of them settle what a box leaves open.
     """
     box = _bounding_box(vertices)
-    window = gc.window_around(pixels, box)
+    window = gc.window_around(pixels, box, OUTLINE_SIDE)
     drawn = window.to_work(vertices)
     on, off = window.to_work(list(positive)), window.to_work(list(negative))
-    regions = [gc.polygon_region(v, window.shape) for v in (drawn, *_moved_outlines(drawn))]
-    cores = [_eroded(region) for region in regions]
-    trimaps = [
-        pin(window.features, gc.trimap(region, _dilated(region), core), on, off)
-        for region, core in zip(regions, cores, strict=True)
-    ]
-    return _segment(_Prompt(window, trimaps, regions[0], cores[0], on, box, drawn=True))
+    region = gc.polygon_region(drawn, window.shape)
+    core = _eroded(region)
+    trimap = pin(window.features, gc.trimap(region, _dilated(region), core), on, off)
+    prompt = _Prompt(window, [trimap], region, core, on, box, "outline")
+    cut = _object_mask(prompt, trimap)
+    if not cut.any():
+        return _empty_segmentation(window.picture)
+    path = gc.polygon_region(edge_path(window.features, drawn, region), window.shape)
+    near = discs(window.shape, (*on, *off), BESIDE * float(np.sqrt(np.count_nonzero(region))))
+    mask = np.where(near, cut, _combined(cut, path))
+    return _rated(prompt, mask, {"path_agreement": gc.iou(filled(cut), path)})
+
+
+def _combined(cut: Mask, path: Mask) -> Mask:
+    """The mask midway between what colours and edges say; the holes are those of the colours."""
+    whole = filled(cut)
+    return (gc.signed_distance(whole) + gc.signed_distance(path) > 0) & ~(whole & ~cut)
 
 
 def segment_points(
@@ -129,9 +147,7 @@ def segment_points(
     parts = _tried_regions(pixels, propose(pixels, points, PROPOSALS), points, off)
     best = max(parts, key=lambda tried: tried.distinctness, default=None)
     if best is not None and on_plain_ground(best.prompt.window, best.mask):
-        return _rated(
-            best.prompt, best.mask, _reproposal_agreement(pixels, best.prompt, best.mask, propose)
-        )
+        return _rated(best.prompt, best.mask, _reproposal_stability(pixels, best, propose))
     whole_objects = _tried_regions(pixels, propose_whole(pixels, points, PROPOSALS), points, off)
     if best is not None:
         whole_objects = [tried for tried in whole_objects if _is_whole_of(tried, best)]
@@ -140,21 +156,11 @@ def segment_points(
     if chosen is None:
         return _empty_segmentation((pixels.shape[0], pixels.shape[1]))
     proposer = propose if chosen is best else propose_whole
-    agreement = _reproposal_agreement(pixels, chosen.prompt, chosen.mask, proposer)
-    found = _rated(chosen.prompt, chosen.mask, agreement)
+    stable = _reproposal_stability(pixels, chosen, proposer)
     if chosen is best and whole_objects:  # it may well be a part of one of them
         rival = max(tried.distinctness for tried in whole_objects)
-        share = chosen.distinctness / (chosen.distinctness + rival)
-        parts = {**found.parts, "unrivalled": share}
-        return Segmentation(found.mask, found.confidence * share, parts)
-    return found
-
-
-def _segment(prompt: _Prompt) -> Segmentation:
-    """The majority of the masks from the prompt and its perturbations, and their agreement."""
-    masks = [_object_mask(prompt, trimap) for trimap in prompt.trimaps]
-    mask = gc.clean(gc.majority(masks), prompt.positive)
-    return _rated(prompt, mask, float(np.mean([gc.iou(mask, other) for other in masks[1:]])))
+        stable["unrivalled"] = chosen.distinctness / (chosen.distinctness + rival)
+    return _rated(chosen.prompt, chosen.mask, stable)
 
 
 def _object_mask(prompt: _Prompt, trimap: Bytes) -> Mask:
@@ -170,23 +176,24 @@ def _object_mask(prompt: _Prompt, trimap: Bytes) -> Mask:
     return gc.clean(gc.grabcut(image, generous), prompt.positive)
 
 
-def _rated(prompt: _Prompt, mask: Mask, stability: float) -> Segmentation:
+def _rated(prompt: _Prompt, mask: Mask, stable: dict[str, float]) -> Segmentation:
+    """The mask in the picture, with the cues to how far it can be trusted and what they come to.
+
+    `stable` says how far other ways to the mask have led to the same.
+    """
     window = prompt.window
     if not mask.any() or mask.all():
         return _empty_segmentation(window.picture)
     mask = cut_openings(window.features, mask, prompt.positive)
     flooded = gc.watershed(window.features, prompt.core, prompt.trimaps[0])
-    parts = {
-        "stability": stability,
+    parts = stable | {
         "agreement": gc.iou(mask, flooded),
         "colour_separation": gc.colour_separation(window.features, mask),
         "prompt_fit": _prompt_fit(prompt, mask),
+        "compactness": _compactness(mask),
+        "edge_support": edge_support(window.features, mask),
     }
-    agreed = float(np.prod(list(parts.values())) ** (1 / len(parts)))
-    # Cues that agree are worth nothing where the mask ends in the middle of nowhere.
-    parts["edge_support"] = edge_support(window.features, mask)
-    confidence = agreed if prompt.drawn else agreed * parts["edge_support"] ** EDGE_WEIGHT
-    return Segmentation(window.to_picture(mask), confidence, parts)
+    return Segmentation(window.to_picture(mask), fitted_confidence(prompt.way, parts), parts)
 
 
 def _empty_segmentation(picture: tuple[int, int]) -> Segmentation:
@@ -196,6 +203,12 @@ def _empty_segmentation(picture: tuple[int, int]) -> Segmentation:
 def _prompt_fit(prompt: _Prompt, mask: Mask) -> float:
     """Overlap of the bounding boxes of the mask and of what the prompt says the thing covers."""
     return box_iou(gc.bounding_box(mask), gc.bounding_box(prompt.extent)) if mask.any() else 0.0
+
+
+def _compactness(mask: Mask) -> float:
+    """Share of its bounding box that a mask fills: thin things go wrong more easily."""
+    x0, y0, x1, y1 = gc.bounding_box(mask)
+    return np.count_nonzero(mask) / ((x1 - x0 + 1) * (y1 - y0 + 1))
 
 
 def _box_trimap(shape: tuple[int, int], box: Points) -> Bytes:
@@ -223,19 +236,19 @@ def _eroded(region: Mask) -> Mask:
     return depth > np.minimum(reach, THIN * half_width)
 
 
+def discs(shape: tuple[int, int], centres: Iterable[Point], radius: float) -> Mask:
+    """Pixels (h, w) within a radius of any of the centres."""
+    y, x = np.ogrid[: shape[0], : shape[1]]
+    region = np.zeros(shape, dtype=np.bool_)
+    for cx, cy in centres:
+        region |= (x - cx) ** 2 + (y - cy) ** 2 <= radius**2
+    return region
+
+
 def _dilated(region: Mask) -> Mask:
     reach = OUTLINE_REACH * np.sqrt(np.count_nonzero(region))
     beyond = cv2.distanceTransform((~region).astype(np.uint8), cv2.DIST_L2, 5)
     return np.asarray(beyond) <= reach
-
-
-def _moved_outlines(outline: Points) -> list[Points]:
-    """Outlines with every vertex moved by the expected error, each in its own direction."""
-    x, y = outline.T
-    area = abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1))) / 2
-    turns = TURN * np.arange(len(outline)) + np.pi / 2 * np.arange(4)[:, None]
-    moves = np.stack([np.cos(turns), np.sin(turns)], axis=-1)
-    return list(outline + OUTLINE_ERROR * np.sqrt(area) * moves)
 
 
 @dataclass(frozen=True)
@@ -301,23 +314,23 @@ def _region_prompt(
     trimap = _box_trimap(window.shape, drawn)
     trimap[core] = cv2.GC_FGD
     extent = gc.box_region(window.shape, drawn)
-    return _Prompt(window, [pin(window.features, trimap, on, off)], extent, core, on, box)
+    return _Prompt(window, [pin(window.features, trimap, on, off)], extent, core, on, box, "point")
 
 
 def _distinctness(prompt: _Prompt, mask: Mask) -> float:
     return _prompt_fit(prompt, mask) * gc.colour_separation(prompt.window.features, mask)
 
 
-def _reproposal_agreement(pixels: Bytes, prompt: _Prompt, mask: Mask, proposer: Proposer) -> float:
+def _reproposal_stability(pixels: Bytes, tried: _Trial, proposer: Proposer) -> dict[str, float]:
     """Mean overlap of the mask with the likest region proposed from other points well inside."""
-    window = prompt.window
+    window, mask = tried.prompt.window, tried.mask
     overlaps: list[float] = []
-    for point in _far_inside(mask, prompt.positive):
+    for point in _far_inside(mask, tried.prompt.positive):
         ((x, y),) = window.to_picture_points(point[None])
         regions = proposer(pixels, [(float(x), float(y))], PROPOSALS)
         shared = [gc.iou(mask, region.window.transfer(region.mask, window)) for region in regions]
         overlaps.append(max(shared, default=0.0))
-    return float(np.mean(overlaps)) if overlaps else 0.0
+    return {"stability": float(np.mean(overlaps)) if overlaps else 0.0}
 
 
 def _far_inside(mask: Mask, points: Points) -> Points:

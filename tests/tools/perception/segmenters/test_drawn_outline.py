@@ -25,33 +25,33 @@ from pydantic import ValidationError
 from shapely.geometry import Polygon
 
 BOX = [(60.0, 40.0), (140.0, 40.0), (140.0, 100.0), (60.0, 100.0)]
-WITH_TIP = [*BOX[:2], (140.0, 60.0), (175.0, 70.0), (140.0, 80.0), *BOX[2:]]
+WIDER = [(60.0, 40.0), (143.0, 40.0), (143.0, 100.0), (60.0, 100.0)]
 
 
 def picture() -> Bytes:
-    """A red box of 80 x 60 px on grey; a tip of the grey's own colour cannot be seen."""
+    """A red box of 80 x 60 px on grey."""
     pixels = np.full((140, 240, 3), 90, np.uint8)
     pixels[40:100, 60:140] = (200, 40, 40)
     return pixels
 
 
 def test_what_was_drawn_is_taken_beside_a_point_on_it_and_nowhere_else() -> None:
-    plain = segment_outline(picture(), WITH_TIP)
-    mended = segment_corrected(picture(), WITH_TIP, positive=[(165.0, 70.0)])
-    assert not plain.mask[70, 165:].any()
-    assert mended.mask[70, 150:174].all()
+    plain = segment_outline(picture(), WIDER)
+    mended = segment_corrected(picture(), WIDER, positive=[(142.0, 70.0)])
+    assert not plain.mask[70, 141:].any()
+    assert mended.mask[60:80, 141:143].all()
     changed = np.argwhere(plain.mask != mended.mask)
-    assert np.hypot(*(changed - (70, 165)).T).max() <= 0.2 * np.sqrt(Polygon(WITH_TIP).area) + 1
+    assert np.hypot(*(changed - (70, 142)).T).max() <= 0.2 * np.sqrt(Polygon(WIDER).area) + 1
     assert mended.confidence == plain.confidence
 
 
 def test_nothing_beyond_what_was_drawn_is_kept_beside_a_negative_point() -> None:
     pixels = picture()
-    pixels[60:70, 140:142] = (200, 40, 40)  # a bump of the same colour
+    pixels[55:85, 140:143] = (200, 40, 40)  # a bump of the same colour
     bumped = segment_outline(pixels, BOX)
-    mended = segment_corrected(pixels, BOX, negative=[(147.0, 65.0)])
-    assert bumped.mask[65, 141]
-    assert not mended.mask[61:69, 141:].any()
+    mended = segment_corrected(pixels, BOX, negative=[(147.0, 70.0)])
+    assert bumped.mask[70, 141]
+    assert not mended.mask[62:78, 141:].any()
     assert (mended.mask | bumped.mask == bumped.mask).all()
     assert mended.mask[:, :130].sum() == bumped.mask[:, :130].sum()
 

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
+from formup.tools.perception.segmenters.confidence import fitted_confidence
 from formup.tools.perception.segmenters.segment import (
     Segmentation,
     segment_box,
@@ -227,13 +228,11 @@ def test_a_wrong_box_is_trusted_less():
     assert ground.confidence < good.confidence - 0.3
 
 
-def test_confidence_is_the_mean_of_what_agrees_and_falls_with_missing_edges() -> None:
+def test_the_confidence_is_what_the_cues_come_to() -> None:
     found = segment_box(scene(DISC), box_around(DISC, 4))
-    parts = dict(found.parts)
-    assert all(0 <= value <= 1 for value in parts.values())
-    edges = parts.pop("edge_support")
-    agreed = float(np.prod(list(parts.values())) ** (1 / len(parts)))
-    assert found.confidence == pytest.approx(agreed * edges**2)
+    assert all(0 <= value <= 1 for value in found.parts.values())
+    assert found.confidence == pytest.approx(fitted_confidence("box", found.parts))
+    assert found.confidence > 0.8
 
 
 def test_a_mask_that_ends_where_there_is_no_edge_is_not_believed() -> None:

@@ -1,0 +1,53 @@
+"""`formup eval perception`: how exact outlines are, and what the confidence in them is worth."""
+
+import json
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from ..evals.perception.samples import MODES, Mode, measured, peak_memory
+from ..evals.perception.tables import Row, markdown, row
+from ..tools.errors import InputError
+from ..tools.perception.segmenters.registry import segmenter_named
+from .terminal import say
+
+Suites = Annotated[
+    list[str] | None,
+    typer.Argument(help="Suites of pictures.", show_default="photos photos-added"),
+]
+Modes = Annotated[
+    list[str] | None,
+    typer.Option("--mode", help="outline, box or point; repeatable.", show_default="all"),
+]
+Named = Annotated[str, typer.Option("--segmenter", help="As in formup run.")]
+AsJson = Annotated[bool, typer.Option("--json", help="As one JSON object.")]
+
+
+def perception(
+    suites: Suites = None, mode: Modes = None, segmenter: Named = "grabcut", json_: AsJson = False
+) -> None:
+    """Point at every thing of suites, three times each, and compare what is measured.
+
+    IoU is the overlap with the true outline, e95 the distance within which 95 % of the boundaries
+    lie, over the square root of the area; placed, whose confidence reaches the threshold.
+    """
+    chosen = segmenter_named(segmenter)
+    rows: list[Row] = []
+    for way in _modes(mode):
+        for suite in suites or ["photos", "photos-added"]:
+            rows.append(row(segmenter, way, suite, list(measured(suite, way, chosen))))
+    if json_:
+        data = {"rows": [asdict(r) for r in rows], "peak_memory_mib": round(peak_memory())}
+        say(json.dumps(data, indent=1))
+    else:
+        say(markdown(rows))
+        say(f"\nPeak memory: {peak_memory():.0f} MiB.")
+
+
+def _modes(given: list[str] | None) -> list[Mode]:
+    known: list[Mode] = [m for m in MODES if given is None or m in given]
+    wrong = set(given or ()) - set(MODES)
+    if wrong:
+        raise InputError(f"Unknown mode {min(wrong)!r}. There are: {', '.join(MODES)}.")
+    return known

@@ -1,0 +1,1 @@
+"""How exact outlines are, and what the confidence in them is worth."""

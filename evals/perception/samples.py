@@ -1,0 +1,151 @@
+"""Things of suites pointed at and measured, beside what is known of them."""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ...tools.errors import InputError
+from ...tools.geometry.outline import FloatArray, distances
+from ...tools.perception.contours import outline_of_mask
+from ...tools.perception.image import Picture, load_picture
+from ...tools.perception.segmenters.grabcut import Bytes, box_region, grabcut, trimap, window_around
+from ...tools.perception.segmenters.protocol import Segmenter
+from ...tools.perception.target_prompt import TargetPrompt
+from ..experiments.pointing import can_point, pointing
+from ..tasks.suites import load_suite
+from ..tasks.task import Task
+
+Mode = Literal["outline", "box", "point"]
+MODES: tuple[Mode, ...] = get_args(Mode)
+TRIALS = 3
+"""Each thing is pointed at so often, off in another way each time."""
+SPACING = 0.5
+"""Of the points of a boundary whose distances are taken, px."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One thing pointed at once, and what was measured.
+
+    Attributes:
+        suite, picture, thing: what it was.
+        overlap: intersection over union with the true region; 0 where there is no outline.
+        boundary_error: 95 % of either boundary lie this near to the other one, as a share of the
+            square root of the true area (the larger of the two directions).
+        confidence: the segmenter's; `threshold` is the least that it is used at.
+        cues: what the confidence is made of.
+        seconds: of CPU; `bare_seconds` those of one GrabCut on the same window.
+    """
+
+    suite: str
+    picture: str
+    thing: str
+    overlap: float
+    boundary_error: float
+    confidence: float
+    threshold: float
+    cues: Mapping[str, float]
+    seconds: float
+    bare_seconds: float
+
+    @property
+    def placed(self) -> bool:
+        """Whether robots would be placed about it."""
+        return self.confidence >= self.threshold
+
+
+def measured(suite: str, mode: Mode, segmenter: Segmenter) -> Iterator[Sample]:
+    """Every thing of a suite of pictures that its tasks are about, pointed at `TRIALS` times.
+
+    Raises:
+        InputError: no such suite, or one without pictures.
+    """
+    seen: set[tuple[Path, str]] = set()
+    for task in load_suite(suite).tasks:
+        if not isinstance(task.picture, Path) or not can_point(task, mode):
+            continue
+        key = task.picture, task.things[0].id
+        if key not in seen:
+            seen.add(key)
+            for number in range(TRIALS):
+                (prompt,) = pointing(task, mode, number).pointed
+                yield _sample(suite, task, task.picture, prompt, segmenter)
+    if not seen:
+        raise InputError(f"No task of the suite {suite} has one thing on a picture to point at.")
+
+
+def peak_memory() -> float:
+    """The most memory this process has held, MiB."""
+    import resource  # is not there on Windows
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def boundary_error(found: BaseGeometry, truth: BaseGeometry) -> float:
+    """The larger of the two directions' 95 % quantiles of the distance between boundaries.
+
+    As a share of the square root of the true area, for regions in px.
+    """
+    one, other = found.boundary, truth.boundary
+    apart = (distances(other, _along(one)), distances(one, _along(other)))
+    return max(float(np.quantile(d, 0.95)) for d in apart) / float(np.sqrt(truth.area))
+
+
+def _along(line: BaseGeometry) -> FloatArray:
+    parts = [
+        shapely.line_interpolate_point(part, np.arange(0.0, part.length, SPACING))
+        for part in shapely.get_parts(line)
+    ]
+    return shapely.get_coordinates(np.concatenate(parts))
+
+
+def _sample(
+    suite: str, task: Task, path: Path, prompt: TargetPrompt, segmenter: Segmenter
+) -> Sample:
+    picture, thing = _loaded(path), task.things[0]
+    began = time.process_time()
+    found = segmenter.segment(picture.pixels, prompt)
+    seconds = time.process_time() - began
+    truth = shapely.make_valid(thing.region)
+    overlap, error = 0.0, 1.0
+    try:
+        outline = outline_of_mask(found.mask).polygon
+    except InputError:  # nothing was found
+        pass
+    else:
+        overlap, error = thing.overlap(outline), min(1.0, boundary_error(outline, truth))
+    return Sample(
+        suite=suite,
+        picture=path.stem,
+        thing=thing.id,
+        overlap=overlap,
+        boundary_error=error,
+        confidence=found.confidence,
+        threshold=segmenter.thresholds[prompt.how],
+        cues=found.parts,
+        seconds=seconds,
+        bare_seconds=_bare_seconds(picture.pixels, truth.bounds),
+    )
+
+
+@lru_cache(maxsize=1)
+def _loaded(path: Path) -> Picture:
+    return load_loaded(path)
+
+
+def _bare_seconds(pixels: Bytes, box: Sequence[float]) -> float:
+    """The CPU time of one GrabCut in a box, the simplest thing to be had."""
+    x0, y0, x1, y1 = box
+    window = window_around(pixels, (x0, y0, x1, y1))
+    inside = box_region(window.shape, window.to_work(((x0, y0), (x1, y1))).ravel())
+    labels = trimap(inside, inside)
+    began = time.process_time()
+    grabcut(window.features, labels)
+    return time.process_time() - began
