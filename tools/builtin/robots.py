@@ -192,8 +192,10 @@ async def _team(context: Context, contract: Contract, taking: Sequence[str | Non
         radius=contract.robot_radius,
         seed=settings.seed,
     )
-    fleet = _opened(settings.fleet, request, site.others if starts is None else ())
-    fleet = await context.services.claim(fleet)
+    others = site.others if starts is None else ()
+    fleet = await context.services.claim(
+        settings.fleet, lambda: _opened(settings.fleet, request, others)
+    )
     await context.services.close_fleets()
     if settings.fleet in context.services.stopped:
         context.services.stopped.remove(settings.fleet)

@@ -2,6 +2,7 @@ import asyncio
 from collections.abc import AsyncGenerator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -223,7 +224,18 @@ def test_an_approval_is_for_one_plan_once(
 
 
 @pytest.mark.usefixtures("real")
-def test_one_process_has_a_real_fleet(store: Store, picture: Picture) -> None:
+def test_one_process_has_a_real_fleet(
+    store: Store, picture: Picture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[SimulatedFleet] = []
+    begin = SimulatedFleet.__init__
+
+    def counted(self: SimulatedFleet, *given: Any, **named: Any) -> None:
+        made.append(self)
+        begin(self, *given, **named)
+
+    monkeypatch.setattr(SimulatedFleet, "__init__", counted)
+
     async def talk() -> None:
         here, there = Service(Agent(), store), other(store)
         first, second = opened(here, picture), opened(here, picture)
@@ -235,6 +247,7 @@ def test_one_process_has_a_real_fleet(store: Store, picture: Picture) -> None:
         refused = await there.say(third, "Surround it")
         assert refused.report.status == "failed"
         assert "is used by" in refused.report.message
+        assert len(made) == 1, "no second one is opened, not even to be closed again"
         await here.close()
         again = opened(there, picture)
         assert (await there.say(again, "Surround it")).report.status == "planned"
