@@ -19,7 +19,7 @@ from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from ...tools.errors import StorageError
 from .folder import KINDS
-from .locks import lock_file, read_holder
+from .locks import lock_file, read_holder, taken
 from .protocol import (
     Event,
     EventKind,
@@ -109,7 +109,7 @@ class DatabaseStore:
     def delete(self, session: str) -> None:
         """See `Store.delete`."""
         stored = self.open(session)
-        lock = self.lock(session)
+        lock = taken(lambda: self.lock(session))
         if lock is None:
             raise busy(stored.label, holder=self.holder(session))
         with lock, self.writing() as connection:
@@ -198,7 +198,7 @@ class DatabaseSession:
 
     def write(self, after: int) -> EventLog:
         """See `StoredSession.write`."""
-        lock = self._store.lock(self.id)
+        lock = taken(lambda: self._store.lock(self.id))
         if lock is None:
             raise busy(self.label, self._since(after), self._store.holder(self.id))
         try:

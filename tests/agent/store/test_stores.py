@@ -144,6 +144,27 @@ def test_of_two_writers_one_is_refused_and_told_what_happened(
 
 
 @everywhere
+def test_who_looks_whether_it_is_written_refuses_nobody(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("formup.agent.store.locks.MOMENT", 60)
+    session = began(store, "a")
+    looking, written = session.write(4), list[int]()
+
+    def write() -> None:
+        log = session.write(4)
+        written.append(log.append("turn", {"words": "b"}))
+        log.close()
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    time.sleep(0.05)
+    looking.close()
+    writer.join()
+    assert written == [5]
+
+
+@everywhere
 def test_eight_writers_of_one_session_leave_no_gap(store: Store) -> None:
     session = store.create()
 
