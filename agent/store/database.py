@@ -184,7 +184,7 @@ class DatabaseSession:
         chosen = select(*wanted).where(EVENTS.c.session == self.id, EVENTS.c.number > after)
         with self._store.reading() as connection:
             rows = connection.execute(chosen.order_by(EVENTS.c.number)).all()
-        if not rows and not after:
+        if not rows and not self.last():  # which says so where it was deleted
             raise StorageError(f"{self.label} was broken off before anything began; run again.")
         numbers, kinds, seconds, texts = zip(*rows, strict=True) if rows else ((), (), (), ())
         try:

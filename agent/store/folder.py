@@ -144,7 +144,8 @@ def read_events(path: Path) -> tuple[Event, ...]:
     try:
         data = log_path(path).read_bytes()
     except OSError as error:
-        raise StorageError(f"{log_path(path)} cannot be read: {error.strerror}.") from None
+        kind = "missing" if isinstance(error, FileNotFoundError) else None
+        raise StorageError(f"{log_path(path)} cannot be read: {error.strerror}.", kind) from None
     events = _read_events(data[: data.rfind(b"\n") + 1], path)
     if not events:
         raise StorageError(f"{path} was broken off before anything began; run again.")

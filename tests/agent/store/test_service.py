@@ -397,3 +397,24 @@ def test_a_session_is_not_replaced_under_its_turn(
         assert {id(held) for held in seen} == {id(service.session(name))}
 
     asyncio.run(talk())
+
+
+def test_a_conversation_that_another_process_deleted_is_forgotten(
+    store: Store, picture: Picture
+) -> None:
+    async def talk() -> None:
+        here, there = Service(Agent(), store), other(store)
+        name = opened(here, picture)
+        await here.say(name, "Surround it")
+        following = asyncio.ensure_future(anext(here.follow(name, 99), None))
+        await asyncio.sleep(0)
+        await there.delete(name)
+        assert await following is None, "its stream ends"
+        for command in (here.fresh, here.stop, here.waits, here.undo, here.go, here.edit):
+            with pytest.raises(InputError) as gone:
+                await command(name)
+            assert gone.value.kind == "missing"
+        with pytest.raises(InputError):
+            here.session(name)
+
+    asyncio.run(talk())

@@ -8,6 +8,7 @@ from formup.apps.server.settings import ServerSettings
 from formup.apps.server.tokens import Tokens
 from formup.tools.errors import InputError
 from PIL import Image
+from pydantic_core import to_json
 
 from .conftest import JPEG, PHOTOS, Running, Serve
 
@@ -59,6 +60,32 @@ def test_sessions_are_listed_renamed_forked_and_deleted(server: Running) -> None
     assert len(server.client.get("/api/sessions").json()) == 2
     assert server.client.delete(session).status_code == 204
     assert server.client.get(session).status_code == 404
+
+
+def test_a_session_that_another_process_deleted_is_nowhere(server: Running) -> None:
+    paths = server.client.get("/openapi.json").json()["paths"]
+    own = [(method, path) for path, at in paths.items() if "{session}" in path for method in at]
+    photo = (PHOTOS / "us_coins.jpg").read_bytes()
+    bodies: dict[str, Any] = {
+        "messages": {"words": "further out"},
+        "edits": {"edits": [{"kind": "count", "robots": 6}]},
+        "approvals": {"plan_id": "p-1", "nonce": "n"},
+        "deployments": {"plan_id": "p-1"},
+        "{session}": {"name": "coins"},
+    }
+    for method, path in own:
+        session = server.begin()
+        turn = server.say(session, "Cage the largest coin")
+        name = session.rpartition("/")[2]
+        server.service.store.delete(name)
+        plan = turn["report"]["plan_id"]
+        address = path.format(
+            session=name, plan_id=plan, number=turn["turn"], sha256="0" * 64, turn=1
+        )
+        body = to_json(bodies.get(path.rpartition("/")[2], {})) if method != "put" else photo
+        headers = {"Idempotency-Key": "k", "Content-Type": "application/json"}
+        told = server.client.request(method, address, headers=headers, content=body)
+        assert told.status_code == 404, (method, path, told.text)
 
 
 def test_a_deployment_is_done_once_for_its_key(server: Running) -> None:
