@@ -1,6 +1,7 @@
 """Conversations: turns change the plan that stands, go moves robots, stop holds them."""
 
 import asyncio
+import re
 from collections.abc import AsyncGenerator
 from io import BytesIO
 from pathlib import Path
@@ -321,6 +322,10 @@ def test_stop_holds_robots_that_drive_within_one_control_period(
         driven = len(steps)
         await asyncio.sleep(0.1)
         assert len(steps) == driven, "nobody moves on"
+        asked = await service.say(name, "are they there?")
+        assert re.match(
+            r"No: 0 of 8 .*; robot \d is the furthest from its own, ", asked.report.message
+        )
         held = await service.say(name, "a bit further out")
         assert len(steps) == driven
         went = await service.say(name, "go")
