@@ -14,7 +14,7 @@ from ..tools.errors import FleetError, FormupError, InputError, StorageError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from .agent import Agent
-from .approvals import Waiting, check_nonce, waiting
+from .approvals import Waiting, check_nonce, is_waiting, waiting
 from .conversation import NOTHING_SAID, Session, is_stop
 from .feed import Poses
 from .fleet_owner import FleetOwner
@@ -207,6 +207,10 @@ class Service:
         if self._waiting.get(session, (None, None))[0] != events:
             self._waiting[session] = (events, waiting(run))
         return self._waiting[session][1] if run is not None else None
+
+    def waiting(self) -> set[str]:
+        """The conversations in memory in which a call waits for a person's yes."""
+        return {name for name, held in self._sessions.items() if is_waiting(held.run)}
 
     async def stop(self, session: str, asked: Asked = ANYONE) -> Run | None:
         """Hold the robots at once, and end the turn that runs, in whichever process.

@@ -7,6 +7,7 @@ import pytest
 from formup.apps.server.settings import ServerSettings
 from formup.apps.server.tokens import Tokens
 from formup.tools.errors import InputError
+from formup.tools.fleet.simulated import SimulatedFleet
 from PIL import Image
 from pydantic_core import to_json
 
@@ -210,6 +211,47 @@ def test_tokens_keep_sessions_apart_and_scopes_hold(
     assert not any(token in text for token in made.values()), "tokens are hashed at rest"
     Tokens(file).remove("plan")
     assert server.client.get(session, headers=by["plan"]).status_code == 401
+
+
+def test_who_approves_sees_what_waits_and_says_yes(
+    serve: Serve, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(SimulatedFleet, "real", True)
+    made = Tokens(file := tmp_path / "tokens.json")
+    ann, eve, boss = (
+        {"Authorization": f"Bearer {made.add(name, scope)}"}
+        for name, scope in (("ann", "move"), ("eve", "move"), ("boss", "approve"))
+    )
+    server = serve(tokens=file)
+    session, other = (server.begin(headers=ann) for _ in range(2))
+    said = {"words": "Cage the largest coin"}
+    turn = server.client.post(f"{session}/messages", json=said, headers=ann).json()
+    assert server.client.get(session, headers=boss).status_code == 404, "nothing waits yet"
+    plan = turn["report"]["plan_id"]
+    wanted = {"json": {"plan_id": plan}, "headers": ann | {"Idempotency-Key": "1"}}
+    asked = server.client.post(f"{session}/deployments", **wanted).json()["turn"]
+    told = server.client.get(f"{session}/turns/{asked}?wait=30", headers=ann).json()
+    assert told["status"] == "needs_approval"
+
+    listed = server.client.get("/api/sessions", headers=boss).json()
+    assert [facts["id"] for facts in listed] == [session.rpartition("/")[2]]
+    waits = server.client.get(session, headers=boss).json()["waits"]
+    assert server.client.get(f"{session}/plans/{plan}/picture", headers=boss).status_code == 200
+    yes = {"plan_id": plan, "nonce": waits["nonce"]}
+    for who in (eve, boss):
+        for method, path in (("GET", "/events"), ("POST", "/stop"), ("GET", f"/turns/{asked}")):
+            assert server.client.request(method, session + path, headers=who).status_code == 404
+        assert server.client.post(f"{session}/messages", json=said, headers=who).status_code == 404
+        assert server.client.get(other, headers=who).status_code == 404
+    assert server.client.post(f"{session}/approvals", json=yes, headers=eve).status_code == 404
+    given = server.client.post(f"{session}/approvals", json=yes, headers=boss)
+    assert given.status_code == 202
+    done = f"{session}/turns/{given.json()['turn']}?wait=30"
+    told = server.client.get(done, headers=boss).json()
+    assert (told["status"], told["by"]) == ("deployed", "boss")
+    assert server.client.get(done, headers=ann).json()["status"] == "deployed"
+    assert server.client.get(session, headers=boss).status_code == 404, "nothing waits any more"
+    assert server.client.get("/api/sessions", headers=boss).json() == []
 
 
 def test_what_others_may_not_send(serve: Serve) -> None:
