@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from ..tools.fleet.protocol import Fleet, FleetBusyError
 from ..tools.tool import to_its_end
 from .conversation import stop_all
-from .store.protocol import Store
+from .store.protocol import PROCESS, Store
 
 TRIES, PAUSE = 20, 0.05
 """How often a fleet is asked for that another process opens, and seconds between."""
@@ -24,30 +24,36 @@ class FleetOwner:
     async def claim(self, name: str, opened: Callable[[], Fleet]) -> Fleet:
         """The fleet of a name: the real one there is, else one that is opened now.
 
-        What is not known to be simulated is opened under its lock: no two drive one hardware.
+        What is not known to be simulated is opened under its lock: no two drive one hardware. A
+        database that was restarted has lost the lock, which is then taken again.
 
         Raises:
             FleetBusyError: another process has it.
         """
         for _ in range(TRIES):
-            if name in self._fleets:
-                return self._fleets[name]
             if name in self._simulated:
                 return opened()
+            who = await to_its_end(lambda: self._store.holder(f"fleet.{name}"))
+            mine = self._fleets.get(name)
+            if mine is not None and who == PROCESS:
+                return mine
             lock = await to_its_end(lambda: self._store.lock(f"fleet.{name}"))
+            if lock is None and mine is not None and not who:
+                return mine  # Windows reads no locked file
             if lock is None:  # perhaps just for as long as a simulated one is opened
                 await asyncio.sleep(PAUSE)
                 continue
             with lock:
-                fleet = opened()
+                fleet = mine or opened()
                 if fleet.real:
                     self._fleets[name] = fleet
                     self._locks.push(lock.pop_all())
                 else:
                     self._simulated.add(name)
             return fleet
-        who = self._store.holder(f"fleet.{name}") or "another process"
-        raise FleetBusyError(f"The fleet {name} is used by {who}: use it there, or end that.")
+        raise FleetBusyError(
+            f"The fleet {name} is used by {who or 'another process'}: use it there, or end that."
+        )
 
     async def hold(self) -> None:
         """Hold all robots, whoever drives them."""

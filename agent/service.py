@@ -339,6 +339,7 @@ class Service:
         await self.leave()
         if self._watcher is not None:
             self._watcher.cancel()
+            await asyncio.wait({self._watcher})  # what it reads of the store is read
         for held in self._sessions.values():
             if held.run is not None:
                 await held.run.context.services.close_fleets()
@@ -392,9 +393,7 @@ class Service:
         while self._turns:
             await asyncio.sleep(PATIENCE)
             for session, turn in list(self._turns.items()):
-                stored = self._feeds[session].stored if session in self._feeds else None
-                if stored is None or not turn.number:
-                    continue
+                feed = self._feeds.get(session)
                 with suppress(FormupError):  # a store that fails now is asked again
-                    if await asyncio.to_thread(is_noted, stored, turn.number):
+                    if feed is not None and await is_noted(feed.stored, turn.number):
                         await self.stop(session)

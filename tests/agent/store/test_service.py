@@ -11,6 +11,7 @@ from formup.agent.feed import Poses
 from formup.agent.service import Service
 from formup.agent.session import Run
 from formup.agent.store.folder_store import FolderStore
+from formup.agent.store.places import store_at
 from formup.agent.store.protocol import Event, Store
 from formup.agent.turns import Asked
 from formup.tools.context import Settings
@@ -19,6 +20,7 @@ from formup.tools.fleet.protocol import Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.perception.image import Picture, picture_from_array, picture_from_bytes
 from formup.tools.perception.target_prompt import TargetPrompt
+from sqlalchemy import create_engine, text
 
 pytestmark = pytest.mark.parametrize("address", ["folder", "sqlite", "postgresql"], indirect=True)
 RED = (150.0, 130.0, 220.0, 190.0)
@@ -311,6 +313,42 @@ def test_a_picture_that_came_as_bytes_is_the_same_when_it_is_read_again(store: S
         assert (await there.fresh(name)).picture.sha256 == sent.sha256
         await here.say(name, "Cage the largest coin")
         assert (await there.fresh(here.fork(name))).picture.sha256 == sent.sha256
+
+    asyncio.run(talk())
+
+
+@pytest.mark.usefixtures("real")
+def test_a_database_that_is_started_anew_loses_nothing(address: str, picture: Picture) -> None:
+    if "postgresql" not in address:
+        pytest.skip("files need no server")
+
+    def restarted() -> None:
+        """As after a restart: all connections are cut, and with them their locks gone."""
+        own = "pid <> pg_backend_pid() AND datname = current_database()"
+        engine = create_engine(address)
+        with engine.connect() as connection:
+            cut = f"SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE {own}"
+            connection.execute(text(cut))
+        engine.dispose()
+
+    async def talk() -> None:
+        here, there = other(store_at(address)), other(store_at(address))
+        name, others = opened(here, picture), opened(there, picture)
+        first = await here.say(name, "Surround it")
+        restarted()
+        second = await here.say(name, "a bit further out")
+        assert second.report.parent == first.report.plan_id
+        refused = await there.say(others, "Surround it")
+        assert "is used by" in refused.report.message, "the fleet's lock is taken again"
+        assert (await here.go(name)).report.status == "needs_approval"
+        restarted()
+        waits = await here.waits(name)
+        assert waits is not None
+        assert (await here.approve(name, str(waits.plan_id), waits.nonce)).report.arrival
+        numbers = [event.number for event in here.events(name)]
+        assert numbers == list(range(1, len(numbers) + 1))
+        await here.close()
+        await there.close()
 
     asyncio.run(talk())
 

@@ -1,5 +1,6 @@
 import json
 import socket
+import time
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,24 @@ def test_a_whole_conversation(server: Running) -> None:
     assert not plan["void"]
     track = server.client.get(f"{session}/artefacts/{done['report']['arrival']['track']}")
     assert len(json.loads(track.content)["robots"]) == 8
+
+
+def test_a_clock_that_is_set_back_changes_nothing(
+    server: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = server.begin()
+    first = server.say(session, "Cage the largest coin")
+    clock = time.time
+    monkeypatch.setattr(time, "time", lambda: clock() - 3600)
+    monkeypatch.setattr("formup.agent.store.database.now", lambda: "2000-01-01T00:00:00.000+00:00")
+    other = server.begin()
+    second = server.say(session, "a bit further out")
+    assert second["report"]["parent"] == first["report"]["plan_id"]
+    told = server.say(session, "go")
+    done = server.client.get(f"{session}/turns/{told['turn']}", params={"wait": 30}).json()
+    assert done["status"] == "deployed"
+    listed = [facts["id"] for facts in server.client.get("/api/sessions").json()]
+    assert sorted(listed) == sorted(path.rpartition("/")[2] for path in (session, other))
 
 
 def test_sessions_are_listed_renamed_forked_and_deleted(server: Running) -> None:
@@ -228,8 +247,9 @@ def test_who_approves_sees_what_waits_and_says_yes(
     turn = server.client.post(f"{session}/messages", json=said, headers=ann).json()
     assert server.client.get(session, headers=boss).status_code == 404, "nothing waits yet"
     plan = turn["report"]["plan_id"]
-    wanted = {"json": {"plan_id": plan}, "headers": ann | {"Idempotency-Key": "1"}}
-    asked = server.client.post(f"{session}/deployments", **wanted).json()["turn"]
+    key, wanted = ann | {"Idempotency-Key": "1"}, {"plan_id": plan}
+    began = server.client.post(f"{session}/deployments", json=wanted, headers=key)
+    asked = began.json()["turn"]
     told = server.client.get(f"{session}/turns/{asked}?wait=30", headers=ann).json()
     assert told["status"] == "needs_approval"
 
