@@ -2,7 +2,6 @@ import asyncio
 from collections.abc import AsyncGenerator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from formup.agent.feed import Poses
 from formup.agent.service import Service
 from formup.agent.session import Run
 from formup.agent.store.folder_store import FolderStore
-from formup.agent.store.places import store_at
 from formup.agent.store.protocol import Event, Store
 from formup.agent.turns import Asked
 from formup.tools.context import Settings
@@ -20,7 +18,6 @@ from formup.tools.fleet.protocol import Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.perception.image import Picture, picture_from_array, picture_from_bytes
 from formup.tools.perception.target_prompt import TargetPrompt
-from sqlalchemy import create_engine, text
 
 pytestmark = pytest.mark.parametrize("address", ["folder", "sqlite", "postgresql"], indirect=True)
 RED = (150.0, 130.0, 220.0, 190.0)
@@ -225,39 +222,6 @@ def test_an_approval_is_for_one_plan_once(
     asyncio.run(talk())
 
 
-@pytest.mark.usefixtures("real")
-def test_one_process_has_a_real_fleet(
-    store: Store, picture: Picture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made: list[SimulatedFleet] = []
-    begin = SimulatedFleet.__init__
-
-    def counted(self: SimulatedFleet, *given: Any, **named: Any) -> None:
-        made.append(self)
-        begin(self, *given, **named)
-
-    monkeypatch.setattr(SimulatedFleet, "__init__", counted)
-
-    async def talk() -> None:
-        here, there = Service(Agent(), store), other(store)
-        first, second = opened(here, picture), opened(here, picture)
-        third = opened(there, picture)
-        for name in (first, second):
-            assert (await here.say(name, "Surround it")).report.status == "planned"
-        fleets = [here.session(n).services.fleets["simulated"] for n in (first, second)]  # type: ignore[union-attr]
-        assert fleets[0] is fleets[1], "one fleet for all conversations"
-        refused = await there.say(third, "Surround it")
-        assert refused.report.status == "failed"
-        assert "is used by" in refused.report.message
-        assert len(made) == 1, "no second one is opened, not even to be closed again"
-        await here.close()
-        again = opened(there, picture)
-        assert (await there.say(again, "Surround it")).report.status == "planned"
-        await there.close()
-
-    asyncio.run(talk())
-
-
 def test_who_may_only_plan_moves_nothing(
     store: Store, picture: Picture, drives: list[Motion]
 ) -> None:
@@ -313,42 +277,6 @@ def test_a_picture_that_came_as_bytes_is_the_same_when_it_is_read_again(store: S
         assert (await there.fresh(name)).picture.sha256 == sent.sha256
         await here.say(name, "Cage the largest coin")
         assert (await there.fresh(here.fork(name))).picture.sha256 == sent.sha256
-
-    asyncio.run(talk())
-
-
-@pytest.mark.usefixtures("real")
-def test_a_database_that_is_started_anew_loses_nothing(address: str, picture: Picture) -> None:
-    if "postgresql" not in address:
-        pytest.skip("files need no server")
-
-    def restarted() -> None:
-        """As after a restart: all connections are cut, and with them their locks gone."""
-        own = "pid <> pg_backend_pid() AND datname = current_database()"
-        engine = create_engine(address)
-        with engine.connect() as connection:
-            cut = f"SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE {own}"
-            connection.execute(text(cut))
-        engine.dispose()
-
-    async def talk() -> None:
-        here, there = other(store_at(address)), other(store_at(address))
-        name, others = opened(here, picture), opened(there, picture)
-        first = await here.say(name, "Surround it")
-        restarted()
-        second = await here.say(name, "a bit further out")
-        assert second.report.parent == first.report.plan_id
-        refused = await there.say(others, "Surround it")
-        assert "is used by" in refused.report.message, "the fleet's lock is taken again"
-        assert (await here.go(name)).report.status == "needs_approval"
-        restarted()
-        waits = await here.waits(name)
-        assert waits is not None
-        assert (await here.approve(name, str(waits.plan_id), waits.nonce)).report.arrival
-        numbers = [event.number for event in here.events(name)]
-        assert numbers == list(range(1, len(numbers) + 1))
-        await here.close()
-        await there.close()
 
     asyncio.run(talk())
 
@@ -433,26 +361,5 @@ def test_a_session_is_not_replaced_under_its_turn(
         seen = [await service.fresh(name) for _ in range(20)]
         await turn
         assert {id(held) for held in seen} == {id(service.session(name))}
-
-    asyncio.run(talk())
-
-
-def test_a_conversation_that_another_process_deleted_is_forgotten(
-    store: Store, picture: Picture
-) -> None:
-    async def talk() -> None:
-        here, there = Service(Agent(), store), other(store)
-        name = opened(here, picture)
-        await here.say(name, "Surround it")
-        following = asyncio.ensure_future(anext(here.follow(name, 99), None))
-        await asyncio.sleep(0)
-        await there.delete(name)
-        assert await following is None, "its stream ends"
-        for command in (here.fresh, here.stop, here.waits, here.undo, here.go, here.edit):
-            with pytest.raises(InputError) as gone:
-                await command(name)
-            assert gone.value.kind == "missing"
-        with pytest.raises(InputError):
-            here.session(name)
 
     asyncio.run(talk())
