@@ -303,7 +303,7 @@ class DatabaseFiles:
 
 def _put(connection: Connection, session: str, data: bytes) -> None:
     facts = {"session": session, "sha256": hashlib.sha256(data).hexdigest(), "data": data}
-    connection.execute(insert(FILES).values(facts))
+    connection.execute(text(_PUT), facts)
 
 
 def _insert(connection: Connection, session: str, events: Sequence[Event]) -> None:
@@ -348,6 +348,10 @@ def _lock_number(name: str) -> int:
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big", signed=True)
 
 
+_PUT = """
+    INSERT INTO formup_files (session, sha256, data) VALUES (:session, :sha256, :data)
+    ON CONFLICT DO NOTHING
+"""  # as another process or thread may put the same at once
 _HOLDER = """
     SELECT application_name FROM pg_locks JOIN pg_stat_activity USING (pid)
     WHERE locktype = 'advisory' AND granted AND objsubid = 1
