@@ -30,6 +30,7 @@ class FleetOwner:
         Raises:
             FleetBusyError: another process has it.
         """
+        who = ""
         for _ in range(TRIES):
             if name in self._simulated:
                 return opened()
