@@ -32,7 +32,7 @@ class Waiting:
 
 def waiting(run: Run | None) -> Waiting | None:
     """The call that waits for a yes, with a new nonce; None where none does."""
-    if not _waits(run) or run is None or run.stored is None:
+    if not is_waiting(run) or run is None or run.stored is None:
         return None
     nonce = secrets.token_urlsafe(16)
     outcome = run.outcome
@@ -47,7 +47,7 @@ def check_nonce(run: Run | None, plan_id: str, nonce: str) -> None:
     Raises:
         InputError: nothing waits, another plan does, or the nonce is not one for it (`approval`).
     """
-    if not _waits(run) or run is None or run.stored is None:
+    if not is_waiting(run) or run is None or run.stored is None:
         raise InputError(f"{plan_id} cannot be approved: no plan waits for approval.", "approval")
     outcome = run.outcome
     assert isinstance(outcome, Paused)
@@ -61,7 +61,8 @@ def check_nonce(run: Run | None, plan_id: str, nonce: str) -> None:
         )
 
 
-def _waits(run: Run | None) -> bool:
+def is_waiting(run: Run | None) -> bool:
+    """Whether a call waits for a person's yes."""
     outcome = None if run is None else run.outcome
     return isinstance(outcome, Paused) and outcome.call.name != "ask_user"
 

@@ -28,6 +28,8 @@ from .wrappers.commands import Commands
 
 NOTHING_SAID = "Say what to do first, such as surround the coin with 6 robots."
 HELD = "The robots are held where they are. Say what to change, or go to drive on."
+DROPPED = "The question is dropped; nothing was changed."
+UNCHANGED = "Nothing was changed. To take back the change before that, say undo."
 MAY_NOT_MOVE = (
     "You may plan here but not move robots: nothing moves; somebody who may has to say go."
 )
@@ -37,6 +39,12 @@ STOP = re.compile(
     r"immediately|at|once|emergency|right|just|quick|oh|no|hey|ok|moving|driving|this|that)\b)+\W*"
 )
 """A sentence that holds the robots at once, whoever else would have read it."""
+CALLED_OFF = re.compile(
+    r"\W*(?:(?:oh|ok|okay|no|well|ah|actually|please|then|just)\b\W*)*"
+    r"(?:cancel|never ?mind|forget)(?: (?:about )?(?:it|that|this|the question))?"
+    r"(?:\W+(?:please|then|thanks|thank you))*\W*"
+)
+"""A sentence that drops a question; a change is taken back by it only right after it was made."""
 STOP_DRIVING = re.compile(r"\b(?:stop+|halt|freeze|hold|wait|abort|cancel|don'?t|whoa|enough)\b")
 """Words that do so in a short sentence while they drive: to stop once too often costs little."""
 SHORT = 8
@@ -113,6 +121,11 @@ class Session:
             return await self.astop()
         show, pointed = options.get("show"), (*self.pointed, *options.get("pointed", ()))
         run, said = self.run, words
+        if run is not None and CALLED_OFF.fullmatch(words.lower()):
+            if isinstance(run.outcome, Paused):
+                return await self.aact(words, text=DROPPED, show=show)
+            if run.world.current == run.began.current:
+                return await self.aact(words, text=UNCHANGED, show=show)
         if run is not None and isinstance(run.outcome, Paused):
             if not pointed and read_followup(words, self._standing(run)).kind not in DROPS:
                 return self._keep(await self._answered(run, words, show))

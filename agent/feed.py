@@ -11,6 +11,7 @@ from collections.abc import AsyncGenerator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..tools.errors import StorageError
 from ..tools.fleet.protocol import Pose
 from .store.protocol import Event, EventKind, EventLog, StoredSession
 from .turns import Turn
@@ -137,8 +138,13 @@ class Feed:
         """Find what another process has written; one subscriber looks for all."""
         if time.monotonic() - self._looked >= POLL:
             self._looked = time.monotonic()
-            for event in await asyncio.to_thread(self.stored.events, self.last):
-                self.publish(event)
+            try:
+                for event in await asyncio.to_thread(self.stored.events, self.last):
+                    self.publish(event)
+            except StorageError as error:
+                if error.kind != "missing":
+                    raise
+                self.end()
 
     def _wake(self) -> None:
         self._changed.set()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any, cast
 
+from ..tools.builtin.standing import arrival_facts
 from ..tools.context import Context
 from ..tools.draw import draw_view, view_scale
 from ..tools.errors import InputError, ToolError
@@ -104,7 +105,7 @@ def standing(context: Context) -> dict[str, Any] | None:
         "plan": node.plan.id,
         "contract": _rounded(to_json_values(formation.contract)),
         "robots": formation.robots,
-        "deployed": node.plan.id in world.arrivals,
+        "deployed": arrival_facts(world, node.plan)["arrived"],
         "last": {"words": node.words, "edits": json.loads(node.edit or "null")},
         "things": [
             {"id": t.id, "label": t.label, "centre": [round(v) for v in t.outline.centre]}

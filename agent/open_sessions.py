@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Mapping, Sequence
 
 from ..tools.context import Services
+from ..tools.errors import InputError
 from ..tools.perception.image import Picture
 from .agent import Agent
 from .conversation import Session
@@ -44,8 +45,16 @@ class OpenSessions:
         """A conversation as the store has it, read again where another process has gone on.
 
         Raises:
-            InputError: there is none, or it is damaged.
+            InputError: there is none (`missing`; it is let go of), or it is damaged.
         """
+        try:
+            return await self._current(session)
+        except InputError as error:
+            if error.kind == "missing":
+                self.drop(session)
+            raise
+
+    async def _current(self, session: str) -> Session:
         held = self.sessions.pop(session, None)
         if held is not None:
             self.sessions[session] = held  # used last

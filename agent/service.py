@@ -14,7 +14,7 @@ from ..tools.errors import FleetError, FormupError, InputError, StorageError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from .agent import Agent
-from .approvals import Waiting, check_nonce, waiting
+from .approvals import Waiting, check_nonce, is_waiting, waiting
 from .conversation import NOTHING_SAID, Session, is_stop
 from .feed import Poses
 from .fleet_owner import FleetOwner
@@ -208,6 +208,10 @@ class Service:
             self._waiting[session] = (events, waiting(run))
         return self._waiting[session][1] if run is not None else None
 
+    def waiting(self) -> set[str]:
+        """The conversations in memory in which a call waits for a person's yes."""
+        return {name for name, held in self._sessions.items() if is_waiting(held.run)}
+
     async def stop(self, session: str, asked: Asked = ANYONE) -> Run | None:
         """Hold the robots at once, and end the turn that runs, in whichever process.
 
@@ -335,6 +339,7 @@ class Service:
         await self.leave()
         if self._watcher is not None:
             self._watcher.cancel()
+            await asyncio.wait({self._watcher})  # what it reads of the store is read
         for held in self._sessions.values():
             if held.run is not None:
                 await held.run.context.services.close_fleets()
@@ -388,9 +393,7 @@ class Service:
         while self._turns:
             await asyncio.sleep(PATIENCE)
             for session, turn in list(self._turns.items()):
-                stored = self._feeds[session].stored if session in self._feeds else None
-                if stored is None or not turn.number:
-                    continue
+                feed = self._feeds.get(session)
                 with suppress(FormupError):  # a store that fails now is asked again
-                    if await asyncio.to_thread(is_noted, stored, turn.number):
+                    if feed is not None and await is_noted(feed.stored, turn.number):
                         await self.stop(session)

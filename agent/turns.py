@@ -11,6 +11,7 @@ from pydantic_core import PydanticSerializationError, to_json
 
 from ..tools.errors import InputError
 from ..tools.perception.image import Picture
+from ..tools.tool import to_its_end
 from .session import Run
 from .store.protocol import Event, StoredSession
 
@@ -184,6 +185,7 @@ def _note(session: str, turn: int) -> bytes:
     return to_json(["stop", session, turn])
 
 
-def is_noted(stored: StoredSession, turn: int) -> bool:
+async def is_noted(stored: StoredSession, turn: int) -> bool:
     """Whether another process wants a turn stopped."""
-    return hashlib.sha256(_note(stored.id, turn)).hexdigest() in stored.artefacts
+    name = hashlib.sha256(_note(stored.id, turn)).hexdigest()
+    return turn > 0 and await to_its_end(lambda: name in stored.artefacts)

@@ -107,7 +107,7 @@ def check_reach(settings: "ServerSettings") -> None:
 @tokens.command("add")
 def add(
     name: Annotated[str, typer.Argument(help="Whose it is: small letters, digits, underscores.")],
-    scope: Annotated[str, typer.Option(help="read, plan or move.")] = "plan",
+    scope: Annotated[str, typer.Option(help="read, plan, move or approve.")] = "plan",
     file: TokensFile = None,
 ) -> None:
     """Make a token and show it, this once."""

@@ -107,9 +107,9 @@ class MemoryArtefacts:
 USUAL = Settings()
 
 
-async def _as_is(fleet: Fleet) -> Fleet:
+async def _unshared(name: str, opened: Callable[[], Fleet]) -> Fleet:
     """Nobody else has it."""
-    return fleet
+    return opened()
 
 
 def _ignore(*what: object) -> None:
@@ -131,8 +131,8 @@ class Services:
         found: what detectors found in pictures, by detector and picture; shared by all services
             that are not given their own.
         stopped: fleets that were stopped when they were let go of.
-        claim: what is given a fleet that was opened, and returns the one to use; raises where it
-            is another's.
+        claim: what is given a fleet's name and what opens it, and returns the one to use; raises
+            where it is another's.
         watch: is given the poses of robots that drive, to be shown.
     """
 
@@ -142,7 +142,7 @@ class Services:
     found: dict[tuple[str, str], tuple[Candidate, ...]] = field(default_factory=lambda: _FOUND)
 
     stopped: set[str] = field(default_factory=set[str])
-    claim: Callable[[Fleet], Awaitable[Fleet]] = _as_is
+    claim: Callable[[str, Callable[[], Fleet]], Awaitable[Fleet]] = _unshared
     watch: Callable[[tuple[Pose, ...]], None] = _ignore
 
     @property

@@ -49,7 +49,7 @@ def talk(followup: Followup, standing: Standing | None, before: History) -> str:
         f"{g['robots']} robots {g['relation']} {' and '.join(g.get('targets', ()))}"
         for g in standing.groups
     )
-    driven = "the robots stand there" if standing.deployed else "no robot has moved to it yet"
+    driven = "the robots stand there" if standing.deployed else "the robots are not there yet"
     return f"Plan {standing.plan}: {groups}; {driven}."
 
 
@@ -224,12 +224,14 @@ def _count(
 def _arrival(
     query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
 ) -> str:
-    if not data["deployed"]:
+    if data["arrived"]:
+        return "Yes, all stand at their places."
+    if "there" not in data:
         return "No: no robot has moved to this plan yet; say go."
+    way = length_text(data["furthest_px"], scale)
     return (
-        "Yes, all stand at their places."
-        if data["arrived"]
-        else "No: not all stand at their places."
+        f"No: {data['there']} of {data['robots']} robots stand at their places; robot "
+        f"{data['furthest']} is the furthest from its own, {way}. Say go."
     )
 
 

@@ -8,7 +8,7 @@ from functools import cache
 
 from .followup_words import known_words, lexicon, rules
 from .lexicon import fillers
-from .phrases import phrase, table
+from .phrases import HEADS, phrase, table
 
 KEYS = ("qwertyuiop", "asdfghjkl", "zxcvbnm")
 LEAST_CORRECTED = 4
@@ -22,6 +22,12 @@ SHORT = {
     if slip not in ("net", "owt", "wto")
 }
 """Words of three letters with two swapped, where that is no other word."""
+NAMING = re.compile(r"(?i)\b(?:(?:an?|the|another|my|your) |(?:the|another|my|your) ([a-z]+) )\Z")
+NOUNS = frozenset(
+    {"side", "flank", "gap", "quantity", "distanceword", "steps", "team", "much", "lone"}
+    | {"robotword", "other", "rest", "portion", "it", "same", "opposite", "nearest", "first"}
+)
+"""Kinds of phrases that may follow "the"; others are no name, such as what is to be done."""
 UNITS = ("degrees", "pixels", "metres", "meters")
 
 
@@ -29,7 +35,14 @@ def spelled(text: str) -> str:
     """The text as the vocabularies have it, words one slip away from a known one put right."""
     for pattern, put in _rewritten():
         text = pattern.sub(put, text)
-    return re.sub(r"[^\W\d_]+", lambda m: _meant(m[0].lower()) or m[0], text)
+    return re.sub(r"[^\W\d_]+", lambda m: _meant(m[0].lower(), _names(m)) or m[0], text)
+
+
+def _names(word: re.Match[str]) -> bool:
+    """Whether a word stands where a thing is named: "the fork", "the red one"."""
+    before = NAMING.search(word.string, 0, word.start())
+    found = phrase([(before[1] or "").lower()], 0) if before else None
+    return before is not None and (not before[1] or (found is not None and found.kind not in HEADS))
 
 
 def instructed(text: str) -> str:
@@ -63,8 +76,12 @@ def _rewritten() -> list[tuple[re.Pattern[str], str]]:
 
 
 @cache
-def _meant(word: str) -> str | None:
-    """The one word that says something and that this is a slip away from, if it is none itself."""
+def _meant(word: str, names: bool = False) -> str | None:
+    """The one word that says something and that this is a slip away from, if it is none itself.
+
+    Args:
+        names: whether it stands where a thing is named, which may have any name.
+    """
     if word in SHORT:
         return SHORT[word]
     known = known_words() | fillers() | {*table()["follow"], *UNITS}
@@ -74,7 +91,17 @@ def _meant(word: str) -> str | None:
     if len(word) < LEAST_CORRECTED or word in known or phrase([word], 0) is not None:
         return None
     near = [w for w in _telling_words() if len(w) >= LEAST_CORRECTED and _is_slip(word, w)]
-    return near[0] if len(near) == 1 else None
+    if len(near) != 1 or (names and not _may_be_named(word, near[0])):
+        return None
+    return near[0]
+
+
+def _may_be_named(typed: str, meant: str) -> bool:
+    """Whether a slip is likelier than another name: "the sied", but not "the fork", "the sand"."""
+    long = max(len(typed), len(meant)) >= LEAST_ANY
+    named = any(words[-1] == meant and NOUNS & set(kinds) for words, kinds in lexicon().items())
+    replaced = len(typed) == len(meant) and sorted(typed) != sorted(meant)
+    return (long and named) if replaced else (long or named)
 
 
 @cache

@@ -19,7 +19,7 @@ from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from ...tools.errors import StorageError
 from .folder import KINDS
-from .locks import lock_file, read_holder
+from .locks import lock_file, read_holder, taken
 from .protocol import (
     Event,
     EventKind,
@@ -109,7 +109,7 @@ class DatabaseStore:
     def delete(self, session: str) -> None:
         """See `Store.delete`."""
         stored = self.open(session)
-        lock = self.lock(session)
+        lock = taken(lambda: self.lock(session))
         if lock is None:
             raise busy(stored.label, holder=self.holder(session))
         with lock, self.writing() as connection:
@@ -184,7 +184,7 @@ class DatabaseSession:
         chosen = select(*wanted).where(EVENTS.c.session == self.id, EVENTS.c.number > after)
         with self._store.reading() as connection:
             rows = connection.execute(chosen.order_by(EVENTS.c.number)).all()
-        if not rows and not after:
+        if not rows and not self.last():  # which says so where it was deleted
             raise StorageError(f"{self.label} was broken off before anything began; run again.")
         numbers, kinds, seconds, texts = zip(*rows, strict=True) if rows else ((), (), (), ())
         try:
@@ -198,7 +198,7 @@ class DatabaseSession:
 
     def write(self, after: int) -> EventLog:
         """See `StoredSession.write`."""
-        lock = self._store.lock(self.id)
+        lock = taken(lambda: self._store.lock(self.id))
         if lock is None:
             raise busy(self.label, self._since(after), self._store.holder(self.id))
         try:
@@ -303,7 +303,7 @@ class DatabaseFiles:
 
 def _put(connection: Connection, session: str, data: bytes) -> None:
     facts = {"session": session, "sha256": hashlib.sha256(data).hexdigest(), "data": data}
-    connection.execute(insert(FILES).values(facts))
+    connection.execute(text(_PUT), facts)
 
 
 def _insert(connection: Connection, session: str, events: Sequence[Event]) -> None:
@@ -348,6 +348,10 @@ def _lock_number(name: str) -> int:
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big", signed=True)
 
 
+_PUT = """
+    INSERT INTO formup_files (session, sha256, data) VALUES (:session, :sha256, :data)
+    ON CONFLICT DO NOTHING
+"""  # as another process or thread may put the same at once
 _HOLDER = """
     SELECT application_name FROM pg_locks JOIN pg_stat_activity USING (pid)
     WHERE locktype = 'advisory' AND granted AND objsubid = 1

@@ -16,6 +16,7 @@ from pydantic_core import from_json, to_json
 from ...prompts.files import lock
 from ...tools.errors import StorageError
 from ...tools.store import write_whole
+from .locks import taken
 from .protocol import Event, EventKind, busy
 
 NAME = "trace.jsonl"
@@ -40,7 +41,7 @@ class FolderLog:
             self._file = path.open("w+b" if begin and not path.exists() else "r+b", buffering=0)
         except OSError as error:
             raise StorageError(f"{path} cannot be written: {error.strerror}.") from None
-        if not lock(self._file.fileno()):
+        if not taken(lambda: lock(self._file.fileno())):
             self._file.close()
             raise busy(str(path))
         if begin:
@@ -143,7 +144,8 @@ def read_events(path: Path) -> tuple[Event, ...]:
     try:
         data = log_path(path).read_bytes()
     except OSError as error:
-        raise StorageError(f"{log_path(path)} cannot be read: {error.strerror}.") from None
+        kind = "missing" if isinstance(error, FileNotFoundError) else None
+        raise StorageError(f"{log_path(path)} cannot be read: {error.strerror}.", kind) from None
     events = _read_events(data[: data.rfind(b"\n") + 1], path)
     if not events:
         raise StorageError(f"{path} was broken off before anything began; run again.")

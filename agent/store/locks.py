@@ -1,10 +1,25 @@
 """Locks among processes as files, which say who has them; the system takes them back at an end."""
 
+import time
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import TypeVar
 
 from ...prompts.files import try_lock
 from .protocol import PROCESS
+
+T = TypeVar("T")
+MOMENT = 0.1
+"""Seconds that a writer asks again for a lock, which who only looks whether it is free has too."""
+
+
+def taken(take: Callable[[], T]) -> T:
+    """What a lock gives, asked for again for a moment while it gives nothing."""
+    until = time.monotonic() + MOMENT
+    while not (had := take()) and time.monotonic() < until:
+        time.sleep(MOMENT / 20)
+    return had
 
 
 def lock_file(path: Path) -> ExitStack | None:

@@ -217,8 +217,8 @@ MAX_NAME = 200
 _HASH = re.compile(rb'"([0-9a-f]{64})"')
 
 
-PROCESS = f"{socket.gethostname()}:{os.getpid()}"
-"""This process, as others are told of it."""
+PROCESS = f"{socket.gethostname()}:{os.getpid()}"[-63:]
+"""This process, as others are told of it, as long as PostgreSQL keeps such a name."""
 
 
 def new_id(owner: str = "") -> str:

@@ -103,11 +103,12 @@ async def standing(
         state = _reported(session, held.run.report, detail=detail)
     state.message = before + state.message
     content: list[ContentBlock] = [TextContent(text=state.model_dump_json(exclude_none=True))]
-    name = f"plans/{state.plan_id}/picture" if state.plan_id else "scene"
+    plan_id = None if state.candidates else state.plan_id  # a question is about what it offers
+    name = f"plans/{plan_id}/picture" if plan_id else "scene"
     uri = f"formup://sessions/{session}/{name}"
     content.append(ResourceLink(uri=uri, name=name, mime_type=JPEG))
     if picture:
-        data = await asyncio.to_thread(view, held, state.plan_id)
+        data = await asyncio.to_thread(view, held, plan_id)
         content.append(Image(data=data, format="jpeg").to_image_content())
     return CallToolResult(
         content=content, structured_content=state.model_dump(mode="json", exclude_none=True)
@@ -135,15 +136,13 @@ def view(held: Session, plan_id: str | None = None) -> bytes:
         InputError: there is no such plan.
     """
     run = held.run
+    plan = None if plan_id is None else planned(held, plan_id).plan
     if run is None:
         return draw_view(held.picture, World.of(held.picture))
-    if plan_id is not None:
-        return draw_view(run.context.picture, run.world, plan=planned(held, plan_id).plan)
-    offered = [choice["id"] for choice in run.report.candidates or ()]
-    targets = tuple(target for target in run.world.targets if target.id in offered)
-    named = {target.id for target in targets}
-    candidates = [run.context.candidate(name) for name in offered if name not in named]
-    return draw_view(run.context.picture, run.world.having(targets=targets), candidates=candidates)
+    if plan is not None:
+        return draw_view(run.context.picture, run.world, plan=plan)
+    shown = run.view() if run.report.candidates else None
+    return shown or draw_view(run.context.picture, run.world.having(targets=()))
 
 
 def planned(held: Session, plan_id: str) -> Any:

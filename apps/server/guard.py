@@ -3,8 +3,8 @@
 import asyncio
 import time
 from collections import defaultdict, deque
-from collections.abc import Generator
-from contextlib import contextmanager, nullcontext
+from collections.abc import AsyncGenerator, Generator
+from contextlib import asynccontextmanager, contextmanager, nullcontext
 from urllib.parse import SplitResult, urlsplit
 
 from starlette.datastructures import Headers
@@ -20,6 +20,9 @@ LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 STALLED = 60.0
 """Seconds after which a client that takes nothing of a response is cut off."""
+
+KNOWN = 2.0
+"""Seconds between looks whether the token of a request that goes on still stands."""
 
 
 class Guard:
@@ -52,11 +55,11 @@ class Guard:
 
         try:
             self._check_place(scope["method"], headers)
-            person = self._person(scope["path"], headers)
-            scope.setdefault("state", {})["person"] = person
-            counts = nullcontext() if scope["path"].startswith(OPEN) else self._counted(person)
-            with counts:
-                await self._app(scope, self._bounded(receive, headers, refused), watched)
+            async with self._known(scope["path"], headers) as person:
+                scope.setdefault("state", {})["person"] = person
+                counts = nullcontext() if scope["path"].startswith(OPEN) else self._counted(person)
+                with counts:
+                    await self._app(scope, self._bounded(receive, headers, refused), watched)
             if refused and not begun:
                 raise refused[0]
         except FormupError as error:
@@ -66,10 +69,37 @@ class Guard:
             await told(error)(scope, receive, watched)
         except _RefusedError as error:
             refused.clear()
+            if begun:
+                await send({"type": "http.response.body"})
+                return
             response = error_response(error.status, str(error))
             if error.status == 401:
                 response.headers["WWW-Authenticate"] = "Bearer"
             await response(scope, receive, watched)
+
+    @asynccontextmanager
+    async def _known(self, path: str, headers: Headers) -> AsyncGenerator[Person]:
+        """Who asks; what they asked for ends with their token."""
+        loop, person = asyncio.get_running_loop(), self._person(path, headers)
+
+        def look() -> None:
+            nonlocal looks
+            try:
+                self._person(path, headers)
+            except (FormupError, _RefusedError):
+                limit.reschedule(loop.time())
+            else:
+                looks = loop.call_later(KNOWN, look)
+
+        looks = loop.call_later(KNOWN, look)
+        try:
+            async with asyncio.timeout(None) as limit:
+                yield person
+        except TimeoutError:
+            self._person(path, headers)
+            raise
+        finally:
+            looks.cancel()
 
     def _check_place(self, method: str, headers: Headers) -> None:
         """Refuse names of this server that others gave it, and pages of other origins."""

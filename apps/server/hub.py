@@ -78,15 +78,30 @@ def need(person: Person, scope: Scope) -> None:
         )
 
 
-def check_owner(session: str, person: Person) -> str:
+def check_owner(session: str, person: Person, by: str | None = None) -> str:
     """The id of a session of theirs; others are as if they were not there.
+
+    Args:
+        by: who asked for the turn that is looked at: those who approve see what came of it.
 
     Raises:
         InputError: it is not theirs (`missing`).
     """
-    if owner_of(session) != person.name:
+    approved = person.may("approve") and by == person.name
+    if owner_of(session) != person.name and not approved:
         raise InputError(f"There is no session {session!r}.", "missing")
     return session
+
+
+async def check_seen(hub: Hub, session: str, person: Person) -> str:
+    """The id of a session of theirs, or for those who approve of one in which something waits.
+
+    Raises:
+        InputError: it is neither (`missing`).
+    """
+    if person.may("approve") and await hub.service.waits(session) is not None:
+        return session
+    return check_owner(session, person)
 
 
 def asked_by(person: Person, key: str | None = None) -> Asked:

@@ -155,7 +155,8 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
         return held
     need(person, "plan")
     async with alone(hub, person):
-        found = await find(hub, person, said) or await _open_session(hub, person, said)
+        there = await find(hub, person, said)
+        found = there or await _open_session(hub, person, said)
     if found is None:
         return Answer(NEEDED)
     session, key = found
@@ -166,6 +167,8 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
         await turn.begin()
         return Begun(base, session, turn)
     except InputError as error:
+        if there is None and error.kind not in ("repeated", "busy"):
+            await hub.service.delete(session)
         return await _instead(hub, session, said, base, error)
 
 

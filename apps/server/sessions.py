@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+from collections.abc import Collection
 from dataclasses import asdict
 from typing import Annotated, Any
 
@@ -15,7 +16,7 @@ from ...tools.draw import draw_plan
 from ...tools.errors import InputError
 from ...tools.perception.image import Picture, picture_from_bytes
 from .forms import AgentFacts, Error, Fork, Name, SessionFacts, SessionState, TurnState, Waits
-from .hub import AHub, APerson, Hub, check_owner, need
+from .hub import AHub, APerson, Hub, check_owner, check_seen, need
 from .tokens import Person
 
 ERRORS: dict[int | str, dict[str, Any]] = {
@@ -121,24 +122,33 @@ def check_room(hub: Hub, person: Person) -> None:
         raise InputError(f"You have {number} sessions, of {most} allowed; delete some.", "too_many")
 
 
-def owned(hub: Hub, person: Person, text: str = "") -> list[SessionFacts]:
-    """The sessions of a person that have a text in their names or words, the newest first."""
+def owned(
+    hub: Hub, person: Person, text: str = "", also: Collection[str] = ()
+) -> list[SessionFacts]:
+    """The sessions of a person that have a text in their names or words, the newest first.
+
+    Args:
+        also: ids of others.
+    """
     found = hub.service.store.sessions(text)
-    return [SessionFacts(**asdict(f)) for f in found if owner_of(f.id) == person.name]
+    return [
+        SessionFacts(**asdict(f)) for f in found if owner_of(f.id) == person.name or f.id in also
+    ]
 
 
 @router.get("/sessions")
 async def listed(
     hub: AHub, person: APerson, text: Annotated[str, Query(max_length=200)] = ""
 ) -> list[SessionFacts]:
-    """Your sessions, the newest first."""
-    return await asyncio.to_thread(owned, hub, person, text)
+    """Your sessions, the newest first; for those who approve also where something waits."""
+    waiting = hub.service.waiting() if person.may("approve") else ()
+    return await asyncio.to_thread(owned, hub, person, text, waiting)
 
 
 @router.get("/sessions/{session}")
 async def state(session: str, hub: AHub, person: APerson) -> SessionState:
     """A session as it stands."""
-    return await state_of(hub, check_owner(session, person))
+    return await state_of(hub, await check_seen(hub, session, person))
 
 
 async def state_of(hub: Hub, session: str) -> SessionState:
@@ -214,7 +224,7 @@ async def plan_picture(session: str, plan_id: str, hub: AHub, person: APerson) -
 
 
 async def _run_with(session: str, plan_id: str, hub: Hub, person: Person) -> Run:
-    run = (await hub.service.fresh(check_owner(session, person))).run
+    run = (await hub.service.fresh(await check_seen(hub, session, person))).run
     if run is None or plan_id not in run.world.plans:
         raise InputError(f"There is no plan {plan_id!r} in this session.", "missing")
     return run

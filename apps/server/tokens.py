@@ -15,9 +15,12 @@ from pydantic_core import from_json, to_json
 from ...tools.errors import InputError, StorageError
 from ...tools.store import read_text, write_whole
 
-Scope = Literal["read", "plan", "move"]
+Scope = Literal["read", "plan", "move", "approve"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
-"""From the least to the most; each includes those before it. Any of them may stop robots."""
+"""From the least to the most; each includes those before it. Any of them may stop robots.
+
+Who may `approve` sees what waits for a yes in the sessions of other tokens, and may give it.
+"""
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 
 

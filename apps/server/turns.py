@@ -14,7 +14,7 @@ from ...agent.store.protocol import Event
 from ...agent.turns import Asked, Turn
 from ...tools.errors import InputError
 from .forms import Approval, Deployment, Edits, Key, Message, TurnState, Undo
-from .hub import AHub, APerson, Hub, asked_by, check_owner, need
+from .hub import AHub, APerson, Hub, asked_by, check_owner, check_seen, need
 from .sessions import ERRORS, PICTURE, picture_sent
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["turns"], responses=ERRORS)
@@ -109,7 +109,7 @@ async def approve(
     """Say yes to exactly the plan that waits; real robots then drive to it."""
     need(person, "move")
     asked = asked_by(person)
-    name = check_owner(session, person)
+    name = await check_seen(hub, session, person)
     turn = hub.service.approve(name, given.plan_id, given.nonce, asked=asked)
     state = await _answer(hub, session, turn, 0, response)
     response.status_code = 202
@@ -119,7 +119,9 @@ async def approve(
 @router.post("/stop")
 async def stop(session: str, hub: AHub, person: APerson) -> TurnState:
     """Hold all robots at once, and end the turn that runs."""
-    run = await hub.service.stop(check_owner(session, person), asked_by(person))
+    now = hub.service.turn(session)
+    mine = check_owner(session, person, now and now.asked.by)
+    run = await hub.service.stop(mine, asked_by(person))
     if run is None:
         return TurnState(turn=0, status="answered", message="Nothing has moved yet.")
     return TurnState.of(run, hub.service.last_turn(session), person.name)
@@ -130,10 +132,14 @@ async def turn(
     session: str, number: int, hub: AHub, person: APerson, response: Response, wait: Wait = 0
 ) -> TurnState:
     """A turn by the number of the event that began it."""
-    now = hub.service.turn(check_owner(session, person))
+    if not person.may("approve"):
+        check_owner(session, person)
+    now = hub.service.turn(session)
     if now is not None and now.number == number:
+        check_owner(session, person, now.asked.by)
         return await _answer(hub, session, now, wait, response, moving=False)
     state = await turn_state(hub, session, number)
+    check_owner(session, person, state.by)
     response.status_code = 202 if state.status == "running" else 200
     return state
 

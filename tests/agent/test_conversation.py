@@ -1,6 +1,7 @@
 """Conversations: turns change the plan that stands, go moves robots, stop holds them."""
 
 import asyncio
+import re
 from collections.abc import AsyncGenerator
 from io import BytesIO
 from pathlib import Path
@@ -136,6 +137,25 @@ def test_a_question_is_dropped_for_what_is_no_answer_to_it(session: Session) -> 
     told = session.say("how far is robot 4?")
     assert told.report.status == "answered"
     assert told.report.plan_id == asked.report.plan_id
+
+
+@pytest.mark.parametrize("words", ["cancel", "Never mind.", "oh forget it", "ok, cancel that"])
+def test_what_calls_off_a_question_changes_nothing(
+    session: Session, picture: Picture, words: str
+) -> None:
+    plan = session.say("a bit further out").report.plan_id
+    for turn in ("more robots", "how far is robot 4?", "move it 900 px to the left"):
+        asked = session.say(turn)
+        assert asked.report.status in ("question", "answered", "impossible")
+        dropped = session.say(words)
+        assert (dropped.report.status, dropped.report.plan_id) == ("answered", plan)
+        assert "nothing was changed" in dropped.report.message.lower()
+    assert session.say("closer").report.plan_id != plan
+    assert session.say(words).report.plan_id == plan, "right after a change it is taken back"
+    fresh = Agent().start(picture, pointed=[TargetPrompt(box=RED)])
+    assert fresh.say("Surround it").report.status == "question"
+    assert fresh.say(words).report.status == "answered"
+    assert fresh.say("Surround it with 8 robots").report.status == "planned"
 
 
 def test_thanks_never_stand_for_the_command_beside_them(session: Session) -> None:
@@ -321,6 +341,10 @@ def test_stop_holds_robots_that_drive_within_one_control_period(
         driven = len(steps)
         await asyncio.sleep(0.1)
         assert len(steps) == driven, "nobody moves on"
+        asked = await service.say(name, "are they there?")
+        assert re.match(
+            r"No: 0 of 8 .*; robot \d is the furthest from its own, ", asked.report.message
+        )
         held = await service.say(name, "a bit further out")
         assert len(steps) == driven
         went = await service.say(name, "go")

@@ -24,6 +24,7 @@ from ..fleet.deploy import (
 )
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
 from ..fleet.registry import FLEETS
+from ..formation.checking.instruction_doubts import overruled
 from ..formation.contract import Contract
 from ..formation.encounters import notes_of
 from ..formation.plan import Plan
@@ -55,10 +56,18 @@ async def with_robots(
     world, plan = context.world, node.plan
     if not plan.verdict.certified:
         return world.with_plan(node)
+    settings, contract = context.settings, plan.formation.contract
+    told = overruled(
+        context.words,
+        contract,
+        counted=settings.robots is not None,
+        measured=settings.clearance is not None or settings.robot_radius is not None,
+        scale=world.metres_per_pixel,
+    )
     try:
-        fleet = await _team(context, plan.formation.contract, taking or ())
+        fleet = await _team(context, contract, taking or ())
     except FleetSizeError:  # more than can be driven can still be planned
-        return world.with_plan(_noted(world, node, [], (), 0.0))
+        return world.with_plan(_noted(world, node, told, (), 0.0))
     check_turns(plan, fleet)
     poses, points = await fleet.observe(max_age=MAX_AGE), plan.formation.points
     try:
@@ -68,7 +77,8 @@ async def with_robots(
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
     node = node.model_copy(update={"plan": plan})
     radius = fleet.radius or 0.0
-    node = await in_thread(lambda: _noted(world, node, _notes(found, poses), poses, radius))
+    told += _notes(found, poses)
+    node = await in_thread(lambda: _noted(world, node, told, poses, radius))
     return world.having(robots=poses).with_plan(node)
 
 
@@ -178,7 +188,9 @@ async def _team(context: Context, contract: Contract, taking: Sequence[str | Non
     ids = {pose.id for pose in world.robots}
     driven = any(pose.seen > 0 for pose in world.robots)
     wanted = max(contract.robots, len(ids | {robot for robot in taking if robot}))
-    if held is not None and (held.real or (driven and len(ids) >= wanted)):
+    if held is not None and held.real:
+        return await context.services.claim(settings.fleet, lambda: held)
+    if held is not None and driven and len(ids) >= wanted:
         return held
     stay = driven or not ids.isdisjoint(taking) or len(ids) == contract.robots
     site, starts = world.site(contract), settings.starts
@@ -192,8 +204,10 @@ async def _team(context: Context, contract: Contract, taking: Sequence[str | Non
         radius=contract.robot_radius,
         seed=settings.seed,
     )
-    fleet = _opened(settings.fleet, request, site.others if starts is None else ())
-    fleet = await context.services.claim(fleet)
+    others = site.others if starts is None else ()
+    fleet = await context.services.claim(
+        settings.fleet, lambda: _opened(settings.fleet, request, others)
+    )
     await context.services.close_fleets()
     if settings.fleet in context.services.stopped:
         context.services.stopped.remove(settings.fleet)

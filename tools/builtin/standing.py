@@ -1,11 +1,11 @@
 """The plan that stands as numbers: places, distances, and whether a ring closes."""
 
+import math
 from typing import Any
-
-import numpy as np
 
 from ..context import Context
 from ..errors import ToolError
+from ..fleet.deploy import tolerance
 from ..formation.checking.surroundings import clearance_of, ring_of
 from ..formation.plan import Plan
 from ..formation.units import with_metres
@@ -42,7 +42,7 @@ def standing_data(context: Context) -> dict[str, Any]:
         for row in _robot_rows(world, plan, k)
     ]
     data: dict[str, Any] = {"plan_id": plan.id, "robots": len(robots)}
-    data |= {"deployed": plan.id in world.arrivals, "arrived": _arrived(world, plan)}
+    data |= {"deployed": plan.id in world.arrivals, **arrival_facts(world, plan)}
     data |= {
         "groups": [_group_facts(world, plan, k) for k in range(len(plan.formation.contract.groups))]
     }
@@ -111,15 +111,21 @@ def _group_facts(world: World, plan: Plan, k: int) -> dict[str, Any]:
     return data | facts | {"opened": opened, "closed": ring.closed and not opened}
 
 
-def _arrived(world: World, plan: Plan) -> bool:
-    """Whether the robots were observed at the places of the plan, where they stand last."""
-    arrival = world.arrivals.get(plan.id)
-    if arrival is None or not arrival.arrived:
-        return False
-    seen = {pose.id: (pose.x, pose.y) for pose in world.robots}
-    places = zip(plan.formation.robots, plan.formation.positions, strict=True)
-    off = [np.hypot(*np.subtract(seen.get(name, (np.inf, 0)), place)) for name, place in places]
-    return bool(max(off) <= arrival.tolerance_px)
+def arrival_facts(world: World, plan: Plan) -> dict[str, Any]:
+    """Whether robots were seen at the places of a plan where they stand last, and how many were."""
+    seen = {pose.id: (pose.x, pose.y) for pose in world.robots if pose.seen > 0}
+    places = zip(plan.formation.robots, plan.formation.positions, strict=False)
+    off = {name: math.dist(seen[name], place) for name, place in places if name in seen}
+    if not off:
+        return {"arrived": False}
+    there = sum(way <= tolerance(world.picture.size) for way in off.values())
+    furthest, arrival = max(off, key=lambda name: off[name]), world.arrivals.get(plan.id)
+    return {
+        "arrived": there == len(plan.formation.positions) and (arrival is None or arrival.arrived),
+        "there": there,
+        "furthest": furthest,
+        "furthest_px": round(off[furthest], 1),
+    }
 
 
 def robot_named(world: World, name: str) -> tuple[float, float]:

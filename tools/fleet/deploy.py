@@ -135,6 +135,11 @@ def assign_robots(poses: Sequence[Pose], places: FloatArray) -> Assigned:
     return Assigned(robots, found.gap if found.method == "approximate" else None)
 
 
+def tolerance(size: tuple[float, float]) -> float:
+    """How far from its place a robot has arrived at it, px, in a picture of that size."""
+    return max(ARRIVED_PX, ARRIVED_SHARE * math.hypot(*size))
+
+
 async def deploy(
     plan: Plan,
     site: Site,
@@ -230,7 +235,7 @@ class _Drive:
         self._contract, self._site = contract, site
         self._fleet, self._robots, self._watch = fleet, tuple(robots), watch
         self._radius = max(contract.robot_radius, fleet.radius or 0.0)
-        self._tolerance = max(ARRIVED_PX, ARRIVED_SHARE * float(np.hypot(*site.room)))
+        self._tolerance = tolerance(site.room)
         self._poses: dict[str, Pose] = {}
         self._frames: list[FloatArray] = []
         self._stride, self._seen = 1, 0

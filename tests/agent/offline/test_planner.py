@@ -60,6 +60,19 @@ def test_a_count_given_beside_the_words_wins() -> None:
     assert len(report.positions) == 7
 
 
+def test_what_is_given_beside_the_words_holds_and_is_told() -> None:
+    words, fixed = "Cage the coin with 8 robots 20 px away", Settings(robots=10, clearance=12)
+    report = run(words, pointed=[COIN], settings=fixed)
+    assert report.verdict is not None
+    [note] = [n for n in report.verdict.notes if "beside the words holds" in n]
+    assert "8 robots" in note
+    assert "20 px" in note
+    assert note in report.message
+    same = run("Cage the coin with 10 robots", pointed=[COIN], settings=Settings(robots=10))
+    assert same.verdict is not None
+    assert not [n for n in same.verdict.notes if "holds" in n]
+
+
 def test_a_count_in_the_words_is_enough() -> None:
     report = run("Ring it with five robots", pointed=[COIN])
     assert report.positions is not None

@@ -222,27 +222,6 @@ def test_an_approval_is_for_one_plan_once(
     asyncio.run(talk())
 
 
-@pytest.mark.usefixtures("real")
-def test_one_process_has_a_real_fleet(store: Store, picture: Picture) -> None:
-    async def talk() -> None:
-        here, there = Service(Agent(), store), other(store)
-        first, second = opened(here, picture), opened(here, picture)
-        third = opened(there, picture)
-        for name in (first, second):
-            assert (await here.say(name, "Surround it")).report.status == "planned"
-        fleets = [here.session(n).services.fleets["simulated"] for n in (first, second)]  # type: ignore[union-attr]
-        assert fleets[0] is fleets[1], "one fleet for all conversations"
-        refused = await there.say(third, "Surround it")
-        assert refused.report.status == "failed"
-        assert "is used by" in refused.report.message
-        await here.close()
-        again = opened(there, picture)
-        assert (await there.say(again, "Surround it")).report.status == "planned"
-        await there.close()
-
-    asyncio.run(talk())
-
-
 def test_who_may_only_plan_moves_nothing(
     store: Store, picture: Picture, drives: list[Motion]
 ) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from formup.agent.store.copies import fork
+from formup.agent.store.database import DatabaseFiles
 from formup.agent.store.places import data_folder, store_at
 from formup.agent.store.protocol import Store, StoredSession
 from formup.tools.errors import InputError, StorageError
@@ -63,6 +64,20 @@ def test_files_go_by_their_hash(store: Store) -> None:
     assert SHA256 not in other.artefacts
     with pytest.raises(StorageError, match="lacks the file"):
         other.artefacts.get(SHA256)
+
+
+@databases
+def test_the_same_file_may_be_put_twice_at_once(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = began(store, "a")
+
+    def nowhere(files: DatabaseFiles, sha256: str) -> bool:
+        return False
+
+    monkeypatch.setattr(DatabaseFiles, "__contains__", nowhere)
+    assert session.artefacts.put(FILE) == session.artefacts.put(FILE) == SHA256
+    assert session.artefacts.get(SHA256) == FILE
 
 
 @everywhere
@@ -141,6 +156,27 @@ def test_of_two_writers_one_is_refused_and_told_what_happened(
     log = there.write(6)
     assert log.append("resume", {}) == 7
     log.close()
+
+
+@everywhere
+def test_who_looks_whether_it_is_written_refuses_nobody(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("formup.agent.store.locks.MOMENT", 60)
+    session = began(store, "a")
+    looking, written = session.write(4), list[int]()
+
+    def write() -> None:
+        log = session.write(4)
+        written.append(log.append("turn", {"words": "b"}))
+        log.close()
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    time.sleep(0.05)
+    looking.close()
+    writer.join()
+    assert written == [5]
 
 
 @everywhere

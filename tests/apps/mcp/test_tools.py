@@ -1,4 +1,5 @@
 import asyncio
+import base64
 import json
 from collections.abc import Callable
 from typing import Any
@@ -82,6 +83,24 @@ def test_tools_say_what_they_answer(with_server: Runs, era: str) -> None:
             [prompt] = (await client.list_prompts()).prompts
             told = await client.get_prompt(prompt.name, {"image": "a.jpg", "wish": "a ring"})
             assert "a ring" in str(told.messages[0].content)
+
+    with_server(talk)
+
+
+def test_the_picture_of_a_question_shows_what_it_offers(with_server: Runs) -> None:
+    async def talk(server: MCPServer[Any], hub: Hub) -> None:
+        async with Client(server) as client:
+            session = (await caged(client))["session"]
+            turn = {"session": session, "words": "around another coin", "picture": True}
+            _, link, image = (await client.call_tool("instruct", turn)).content
+            run = hub.service.session(session).run
+            assert isinstance(link, ResourceLink)
+            assert isinstance(image, ImageContent)
+            assert run is not None
+            assert run.report.candidates
+            assert run.report.plan_id, "a plan stands, and is not what is asked about"
+            assert link.uri == f"formup://sessions/{session}/scene"
+            assert base64.b64decode(image.data) == run.view()
 
     with_server(talk)
 

@@ -1,5 +1,6 @@
 import json
 import socket
+import time
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,9 @@ import pytest
 from formup.apps.server.settings import ServerSettings
 from formup.apps.server.tokens import Tokens
 from formup.tools.errors import InputError
+from formup.tools.fleet.simulated import SimulatedFleet
 from PIL import Image
+from pydantic_core import to_json
 
 from .conftest import JPEG, PHOTOS, Running, Serve
 
@@ -46,6 +49,24 @@ def test_a_whole_conversation(server: Running) -> None:
     assert len(json.loads(track.content)["robots"]) == 8
 
 
+def test_a_clock_that_is_set_back_changes_nothing(
+    server: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = server.begin()
+    first = server.say(session, "Cage the largest coin")
+    clock = time.time
+    monkeypatch.setattr(time, "time", lambda: clock() - 3600)
+    monkeypatch.setattr("formup.agent.store.database.now", lambda: "2000-01-01T00:00:00.000+00:00")
+    other = server.begin()
+    second = server.say(session, "a bit further out")
+    assert second["report"]["parent"] == first["report"]["plan_id"]
+    told = server.say(session, "go")
+    done = server.client.get(f"{session}/turns/{told['turn']}", params={"wait": 30}).json()
+    assert done["status"] == "deployed"
+    listed = [facts["id"] for facts in server.client.get("/api/sessions").json()]
+    assert sorted(listed) == sorted(path.rpartition("/")[2] for path in (session, other))
+
+
 def test_sessions_are_listed_renamed_forked_and_deleted(server: Running) -> None:
     session = server.begin()
     first = server.say(session, "Cage the largest coin")
@@ -59,6 +80,32 @@ def test_sessions_are_listed_renamed_forked_and_deleted(server: Running) -> None
     assert len(server.client.get("/api/sessions").json()) == 2
     assert server.client.delete(session).status_code == 204
     assert server.client.get(session).status_code == 404
+
+
+def test_a_session_that_another_process_deleted_is_nowhere(server: Running) -> None:
+    paths = server.client.get("/openapi.json").json()["paths"]
+    own = [(method, path) for path, at in paths.items() if "{session}" in path for method in at]
+    photo = (PHOTOS / "us_coins.jpg").read_bytes()
+    bodies: dict[str, Any] = {
+        "messages": {"words": "further out"},
+        "edits": {"edits": [{"kind": "count", "robots": 6}]},
+        "approvals": {"plan_id": "p-1", "nonce": "n"},
+        "deployments": {"plan_id": "p-1"},
+        "{session}": {"name": "coins"},
+    }
+    for method, path in own:
+        session = server.begin()
+        turn = server.say(session, "Cage the largest coin")
+        name = session.rpartition("/")[2]
+        server.service.store.delete(name)
+        plan = turn["report"]["plan_id"]
+        address = path.format(
+            session=name, plan_id=plan, number=turn["turn"], sha256="0" * 64, turn=1
+        )
+        body = to_json(bodies.get(path.rpartition("/")[2], {})) if method != "put" else photo
+        headers = {"Idempotency-Key": "k", "Content-Type": "application/json"}
+        told = server.client.request(method, address, headers=headers, content=body)
+        assert told.status_code == 404, (method, path, told.text)
 
 
 def test_a_deployment_is_done_once_for_its_key(server: Running) -> None:
@@ -183,6 +230,48 @@ def test_tokens_keep_sessions_apart_and_scopes_hold(
     assert not any(token in text for token in made.values()), "tokens are hashed at rest"
     Tokens(file).remove("plan")
     assert server.client.get(session, headers=by["plan"]).status_code == 401
+
+
+def test_who_approves_sees_what_waits_and_says_yes(
+    serve: Serve, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(SimulatedFleet, "real", True)
+    made = Tokens(file := tmp_path / "tokens.json")
+    ann, eve, boss = (
+        {"Authorization": f"Bearer {made.add(name, scope)}"}
+        for name, scope in (("ann", "move"), ("eve", "move"), ("boss", "approve"))
+    )
+    server = serve(tokens=file)
+    session, other = (server.begin(headers=ann) for _ in range(2))
+    said = {"words": "Cage the largest coin"}
+    turn = server.client.post(f"{session}/messages", json=said, headers=ann).json()
+    assert server.client.get(session, headers=boss).status_code == 404, "nothing waits yet"
+    plan = turn["report"]["plan_id"]
+    key, wanted = ann | {"Idempotency-Key": "1"}, {"plan_id": plan}
+    began = server.client.post(f"{session}/deployments", json=wanted, headers=key)
+    asked = began.json()["turn"]
+    told = server.client.get(f"{session}/turns/{asked}?wait=30", headers=ann).json()
+    assert told["status"] == "needs_approval"
+
+    listed = server.client.get("/api/sessions", headers=boss).json()
+    assert [facts["id"] for facts in listed] == [session.rpartition("/")[2]]
+    waits = server.client.get(session, headers=boss).json()["waits"]
+    assert server.client.get(f"{session}/plans/{plan}/picture", headers=boss).status_code == 200
+    yes = {"plan_id": plan, "nonce": waits["nonce"]}
+    for who in (eve, boss):
+        for method, path in (("GET", "/events"), ("POST", "/stop"), ("GET", f"/turns/{asked}")):
+            assert server.client.request(method, session + path, headers=who).status_code == 404
+        assert server.client.post(f"{session}/messages", json=said, headers=who).status_code == 404
+        assert server.client.get(other, headers=who).status_code == 404
+    assert server.client.post(f"{session}/approvals", json=yes, headers=eve).status_code == 404
+    given = server.client.post(f"{session}/approvals", json=yes, headers=boss)
+    assert given.status_code == 202
+    done = f"{session}/turns/{given.json()['turn']}?wait=30"
+    told = server.client.get(done, headers=boss).json()
+    assert (told["status"], told["by"]) == ("deployed", "boss")
+    assert server.client.get(done, headers=ann).json()["status"] == "deployed"
+    assert server.client.get(session, headers=boss).status_code == 404, "nothing waits any more"
+    assert server.client.get("/api/sessions", headers=boss).json() == []
 
 
 def test_what_others_may_not_send(serve: Serve) -> None:

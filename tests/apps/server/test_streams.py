@@ -1,11 +1,13 @@
 import json
 import socket
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
+from formup.apps.server.tokens import Tokens
 
-from .conftest import Running
+from .conftest import Running, Serve
 
 Frame = tuple[str | None, dict[str, Any]]
 
@@ -116,3 +118,19 @@ def test_who_follows_sees_poses_and_the_end(server: Running) -> None:
     if poses:  # the latest alone are told, perhaps none before the end
         assert {p["id"] for p in poses[-1]["poses"]} >= {str(n) for n in range(1, 31)}
     assert any(d.get("name") == "moving" for _, d in found)
+
+
+def test_a_stream_ends_with_its_token(serve: Serve, tmp_path: Path) -> None:
+    tokens = Tokens(tmp_path / "tokens.json")
+    ann, bob = ({"Authorization": f"Bearer {tokens.add(name, 'plan')}"} for name in ("ann", "bob"))
+    server = serve(tokens=tmp_path / "tokens.json")
+    streams = [
+        server.client.stream("GET", f"{server.begin(headers=who)}/events", headers=who)
+        for who in (ann, bob)
+    ]
+    with streams[0] as gone, streams[1] as stays:
+        tokens.remove("ann")
+        for _ in gone.iter_raw():
+            pass  # to its end, which is a whole one
+        assert server.client.get("/metrics", headers=bob).text.count("formup_event_streams 1.0")
+        assert next(stays.iter_raw())

@@ -72,6 +72,15 @@ def doubts(
     ]
 
 
+def overruled(
+    instruction: str, contract: Contract, *, counted: bool, measured: bool, scale: float | None
+) -> list[str]:
+    """The note that what the person gave beside the words holds against them; see `doubts`."""
+    left = doubts(instruction, contract, counted=counted, measured=measured, scale=scale)
+    said = [d for d in doubts(instruction, contract, scale=scale) if d not in left]
+    return [f"What was given beside the words holds: {'; '.join(said)}."] if said else []
+
+
 def _count_doubts(text: str, quantities: Sequence[Quantity], contract: Contract) -> Iterator[str]:
     counted = [q.whole for q in quantities if q.whole and ROBOTS.match(text, q.end)]
     found = [n for n in counted if n > 1]  # "one robot at each corner" counts nothing

@@ -156,7 +156,7 @@ REFUSED: list[tuple[list[Any], dict[str, Any], str]] = [
 
 
 def test_what_cannot_be_done_is_refused_in_a_sentence(
-    serve: Serve, client: Any, store: Store
+    serve: Serve, client: Any, store: Store, sent: Any
 ) -> None:
     openai = client(serve())
     for content, options, why in REFUSED:
@@ -165,6 +165,8 @@ def test_what_cannot_be_done_is_refused_in_a_sentence(
             openai.chat.completions.create(
                 model="formup", messages=[{"role": "user", "content": parts}], **options
             )
+    with pytest.raises(UnprocessableEntityError, match="4,000 can be read"):
+        openai.chat.completions.create(model="formup", messages=[sent("a" * 5_000, "us_coins.jpg")])
     assert store.sessions() == ()
 
 
@@ -307,6 +309,9 @@ def test_tokens_keep_sessions_apart(serve: Serve, chat: Any, store: Store, tmp_p
         chat(url, eve).say(CAGE, "us_coins.jpg")
     assert "No robots of this chat move" in chat(url, eve).say("stop")
     assert not moved(store)
+    before = store.sessions()
+    assert "not move robots" in chat(url, bob).say("go", "us_coins.jpg")
+    assert store.sessions() == before, "a first message that is refused leaves nothing"
 
 
 def test_words_of_a_model_make_no_picture_link_or_place(serve: Serve, chat: Any) -> None:
