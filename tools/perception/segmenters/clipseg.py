@@ -66,6 +66,7 @@ class ClipSegSegmenter:
             text=[phrase],
             images=[pixels],
             padding="max_length",
+            max_length=network.model.config.text_config.max_position_embeddings,
             truncation=True,
             return_tensors="pt",
         )

@@ -52,7 +52,11 @@ class _Frame:
 
 
 class SamSegmenter:
-    """Masks from points, boxes and outlines, by SAM."""
+    """Masks from points, boxes and outlines, by SAM.
+
+    Attributes:
+        network: remembers what it made of the last pictures.
+    """
 
     name = "sam"
     takes: frozenset[PromptKind] = frozenset({"box", "points", "outline"})
@@ -63,13 +67,13 @@ class SamSegmenter:
     """Whether the picture fills the square, or keeps its proportions."""
 
     def __init__(self, checkpoint: str = "") -> None:
-        self._network = load_network(checkpoint or self.checkpoint, self.classes, processor=False)
+        self.network = load_network(checkpoint or self.checkpoint, self.classes, processor=False)
 
     def segment(self, pixels: Pixels, prompt: TargetPrompt) -> Segmentation:
         """See `Segmenter.segment`."""
         height, width = pixels.shape[:2]
         frame = self._frame((height, width))
-        embedding = self._network.remembered(pixels, lambda: self._embedding(pixels, frame))
+        embedding = self.network.remembered(pixels, lambda: self._embedding(pixels, frame))
         box, on, drawn = _pointed(prompt, width, height)
         inputs: dict[str, Any] = {"image_embeddings": embedding, "multimask_output": True}
         if box is not None:
@@ -78,7 +82,7 @@ class SamSegmenter:
             inputs["input_points"] = frame.points([*on, *prompt.negative])[None, None]
             labels = [1] * len(on) + [0] * len(prompt.negative)
             inputs["input_labels"] = np.array([[labels]], dtype=np.int64)
-        made = self._network.run(self._network.model, inputs)
+        made = self.network.run(self.network.model, inputs)
         scores = array(made.iou_scores)[0, 0]
         best = int(scores.argmax())
         logits = frame.logits(made.pred_masks[0, 0, best : best + 1])[0]
@@ -90,7 +94,7 @@ class SamSegmenter:
         return rated(pixels, logits > 0, parts)
 
     def _frame(self, picture: tuple[int, int]) -> _Frame:
-        side = int(self._network.model.config.prompt_encoder_config.image_size)
+        side = int(self.network.model.config.prompt_encoder_config.image_size)
         if self.squashes:
             return _Frame(side, (side, side), picture)
         scale = side / max(picture)
@@ -103,7 +107,7 @@ class SamSegmenter:
         square = np.zeros((1, 3, frame.side, frame.side), dtype=np.float32)
         normal = (small - np.reshape(MEAN, (3, 1, 1))) / np.reshape(DEVIATION, (3, 1, 1))
         square[0, :, : frame.size[0], : frame.size[1]] = normal
-        network = self._network
+        network = self.network
         return network.run(network.model.get_image_embeddings, {"pixel_values": square})
 
 
