@@ -53,6 +53,7 @@ test-torch: .venv/torch/.ready
 	.venv/torch/bin/pytest -q tests/torch
 
 .venv/torch/.ready: pyproject.toml constraints.txt
+	@mkdir -p $(@D)
 	@{ $(call environment,$(@D),$(WITH_TORCH)); } 2>$(@D).log || \
 	  { $(call environment,$(@D),--extra-index-url $(TORCH_INDEX) $(WITH_TORCH)); }
 	@touch $@

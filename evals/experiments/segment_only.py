@@ -34,7 +34,7 @@ class SegmentOnly:
         assert isinstance(first, User)
         if not rest:
             return _call("locate_object", query={"noun": _phrase(first.text)})
-        found = _best(rest)
+        found = _best(tuple(rest))
         if found is None:
             reason = "The network found nothing by the words for the thing."
             return _call("report_impossible", reason=reason)
@@ -60,6 +60,10 @@ def _phrase(text: str) -> str:
 def _best(messages: History) -> str | None:
     """The candidate that the network is surest of."""
     result = next(m for m in messages if isinstance(m, Result) and m.call_id == SEGMENT_ONLY)
-    found = [] if result.error else json.loads(result.text)["candidates"]
-    scored = [(n["score"], c["id"]) for c in found for n in c.get("named", ())]
+    found: list[dict[str, Any]] = []
+    if not result.error:
+        found = json.loads(result.text)["candidates"]
+    scored: list[tuple[float, str]] = [
+        (n["score"], c["id"]) for c in found for n in c.get("named", ())
+    ]
     return max(scored)[1] if scored else None

@@ -82,3 +82,16 @@ def test_settings_of_the_machine_are_checked(
     code, report, err = formup(red_file, "Surround it", *chosen, **{variable: value})
     assert code == 2
     assert f"{variable}='{value}'" in report.get("message", "") + err
+
+
+def test_segmentation_alone_is_a_method_of_evals(checkpoints: Path, tmp_path: Path) -> None:
+    network = f"clipseg:{checkpoints / 'clipseg'}"
+    method = ("--method", "segment-only", "--model", network, "--task", "us_coins_t1")
+    words = ("eval", "run", "smoke", *method, "--out", str(tmp_path / "out"))
+    done = subprocess.run(
+        [sys.executable, "-m", "formup", *words], capture_output=True, text=True, check=False
+    )
+    (line,) = (tmp_path / "out/trials.jsonl").read_text("utf-8").splitlines()
+    row = json.loads(line)
+    assert (row["arm"]["method"], row["arm"]["model"]) == ("segment-only", network)
+    assert row["status"] in ("pass", "fail"), done.stderr

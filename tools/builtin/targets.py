@@ -73,7 +73,7 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
     """
     for prompt in prompts:
         if prompt.text is not None:
-            context, prompt = _named(context, prompt, prompt.text)
+            context, prompt = _found_by_text(context, prompt, prompt.text)
         target = _measured(context, _correcting(context.world, prompt))
         threshold = _threshold(context, prompt.how)
         if target.confidence < threshold:
@@ -85,7 +85,9 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
     return context.world
 
 
-def _named(context: Context, prompt: TargetPrompt, text: str) -> tuple[Context, TargetPrompt]:
+def _found_by_text(
+    context: Context, prompt: TargetPrompt, text: str
+) -> tuple[Context, TargetPrompt]:
     """A prompt by text as one by the candidate that it names, with that among the candidates.
 
     Raises:

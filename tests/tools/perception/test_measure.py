@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +45,16 @@ def test_what_is_built_in_goes_in_as_other_packages_do() -> None:
 def test_only_what_is_made_from_a_checkpoint_takes_one() -> None:
     with pytest.raises(InputError, match=r"'grabcut' takes no checkpoint; got 'file'\."):
         segmenter_named("grabcut:file")
+
+
+@pytest.mark.skipif(find_spec("torch") is not None, reason="the extra is there")
+@pytest.mark.parametrize("named", [segmenter_named, detector_named])
+def test_a_network_without_the_extra_is_one_sentence_that_names_it(
+    named: Callable[[str], object],
+) -> None:
+    name = "clipseg" if named is segmenter_named else "groundingdino"
+    with pytest.raises(InputError, match=r"need the extra: pip install 'formup\[torch\]'\."):
+        named(name)
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
