@@ -8,7 +8,12 @@ ROUNDS ?= 80
 SERVERS := transformers litellm ray conformance
 CONFORMANCE := @modelcontextprotocol/conformance@0.2.0-alpha.12
 
-.PHONY: wordings demo test test-servers check bench bench-evals bench-loop clean
+# The build for processors alone; its own index is asked where no other has it.
+TORCH := torch==2.13.0+cpu
+TORCH_INDEX := https://download.pytorch.org/whl/cpu
+WITH_TORCH := -c constraints.txt -e '.[torch]' '$(TORCH)' hypothesis pytest
+
+.PHONY: wordings demo test test-servers test-torch check bench bench-evals bench-loop clean
 
 demo: .venv/.ready
 	@$(BIN)/formup run $(PHOTOS)/cars_two.jpg "Surround the red car at the corners" -n 4 \
@@ -41,6 +46,16 @@ test-servers: .venv/.ready-dev $(SERVERS:%=.venv/servers/%/.ready)
 
 .venv/servers/%/.ready: tests/servers/%.txt
 	@$(call environment,$(@D),-r $<)
+	@touch $@
+
+# Networks are loaded and run on tiny checkpoints that the tests write.
+test-torch: .venv/torch/.ready
+	.venv/torch/bin/pytest -q tests/torch
+
+.venv/torch/.ready: pyproject.toml constraints.txt
+	@mkdir -p $(@D)
+	@{ $(call environment,$(@D),$(WITH_TORCH)); } 2>$(@D).log || \
+	  { $(call environment,$(@D),--extra-index-url $(TORCH_INDEX) $(WITH_TORCH)); }
 	@touch $@
 
 check: .venv/.ready-dev

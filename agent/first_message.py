@@ -38,6 +38,7 @@ class Task:
         metres_per_pixel: of the picture; None where it has no scale.
         standing: of a later turn, the plan that stands and what led to it, see `standing`.
         size: of the picture, px.
+        nouns: whether things can be found by what they are.
     """
 
     instruction: str
@@ -48,6 +49,7 @@ class Task:
     metres_per_pixel: float | None = None
     standing: dict[str, Any] | None = None
     size: tuple[int, int] = (0, 0)
+    nouns: bool = False
 
 
 def first_message(context: Context, before: History, *, seen: bool, fresh: bool = False) -> User:
@@ -84,6 +86,7 @@ def task_text(context: Context, how: str = "", *, follows: bool = False) -> str:
         "Pointed at": pointed,
         "Targets": [] if follows else [t.id for t in world.targets],
         "Deploy": settings.may_deploy,
+        **({"Nouns are found": True} if context.finder else {}),
         **({"Standing": standing(context)} if follows else {}),
     }
     return "\n".join(f"{name}: {json.dumps(v, ensure_ascii=False)}" for name, v in lines.items())
@@ -162,6 +165,7 @@ def read_task(text: str) -> Task:
         metres_per_pixel=facts.get("Metres per pixel"),
         standing=facts.get("Standing"),
         size=_size(facts["Picture"]),
+        nouns=facts.get("Nouns are found", False),
     )
 
 
@@ -185,6 +189,7 @@ def in_new_picture(context: Context, picture: Picture) -> Context:
         keep_out=(),
         samples={},
         shown=(),
+        phrases=(),
     )
     return context.at(made)
 

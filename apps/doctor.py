@@ -26,6 +26,7 @@ PURPOSES = {
     "postgres": "a store",
     "ray": "evals on a cluster",
     "serve": "a server",
+    "torch": "trained networks",
 }
 """What extras are for; of others their packages are named."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox")

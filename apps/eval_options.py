@@ -10,7 +10,10 @@ SuiteName = Annotated[
 ]
 MethodName = Annotated[
     str,
-    typer.Option("--method", help="rules, agent, alone, pile, scatter, boundary, circle or line."),
+    typer.Option(
+        "--method",
+        help="rules, agent, alone, segment-only, pile, scatter, boundary, circle or line.",
+    ),
 ]
 ModeName = Annotated[
     str, typer.Option("--mode", help="How to point: truth, outline, drawn, box, point or words.")
@@ -22,7 +25,9 @@ TaskList = Annotated[list[str] | None, typer.Option("--task", help="Only this ta
 ModelList = Annotated[
     list[str] | None,
     typer.Option(
-        "--model", help="Of agent and alone, as in formup run, or replay:FOLDER; repeatable."
+        "--model",
+        help="Of agent and alone, as in formup run, or replay:FOLDER; of segment-only a segmenter; "
+        "repeatable.",
     ),
 ]
 PromptList = Annotated[

@@ -5,17 +5,20 @@ fleet, and caches by content hash. Whatever a tool finds out or decides goes int
 """
 
 import hashlib
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
-from .errors import StorageError, ToolError
+from .errors import InputError, StorageError, ToolError
 from .fleet.protocol import Fleet, Pose
 from .fleet.registry import FLEETS
 from .formation.units import check_scale
 from .formation.value import Value
+from .perception.detection import Finder
+from .perception.detectors.protocol import Detector
 from .perception.detectors.registry import detector_named
 from .perception.image import Picture
+from .perception.named import with_named
 from .perception.referring.attributes import Candidate
 from .perception.segmenters.registry import segmenter_named
 from .perception.target_prompt import Point
@@ -23,7 +26,9 @@ from .world import Step, World
 
 MOST_FOUND = 64
 """Pictures whose candidates are remembered."""
-_FOUND: dict[tuple[str, str], tuple[Candidate, ...]] = {}
+_FOUND: dict[tuple[str, ...], tuple[Candidate, ...]] = {}
+BESIDE = "standout+"
+"""Before the name of a detector that knows words: what stands out is found beside what it finds."""
 Descriptor = Literal["edges", "edges+vertices", "matrix"]
 SAME_PLACE = 1.0
 """How far the box of a candidate may be from where it was shown, px."""
@@ -36,8 +41,8 @@ class Settings(Value):
         robots: how many, or None where the person left it open.
         robot_radius: px, 0 is a point; None leaves it to the contract.
         clearance: exact distance wanted from the target, px, or None for the default.
-        detector: name of the detector.
-        segmenter: name of the segmenter.
+        detector: name of the detector, with its checkpoint after a colon, with BESIDE before it.
+        segmenter: name of the segmenter, likewise with a checkpoint.
         threshold: t, the least confidence a mask is used at; None for the segmenter's own.
         descriptor: how describe_shape puts shapes into text.
         fleet: name of the fleet.
@@ -128,8 +133,8 @@ class Services:
         pictures: those of the conversation, by their hash.
         fleets: the robots in use, by the name of their fleet.
         artefacts: files that events and the world name by their hash.
-        found: what detectors found in pictures, by detector and picture; shared by all services
-            that are not given their own.
+        found: what detectors found in pictures, by detector, picture, segmenter and phrases; shared
+            by all services that are not given their own.
         stopped: fleets that were stopped when they were let go of.
         claim: what is given a fleet's name and what opens it, and returns the one to use; raises
             where it is another's.
@@ -139,7 +144,7 @@ class Services:
     pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
     fleets: dict[str, Fleet] = field(default_factory=dict[str, Fleet])
     artefacts: Artefacts = field(default_factory=MemoryArtefacts)
-    found: dict[tuple[str, str], tuple[Candidate, ...]] = field(default_factory=lambda: _FOUND)
+    found: dict[tuple[str, ...], tuple[Candidate, ...]] = field(default_factory=lambda: _FOUND)
 
     stopped: set[str] = field(default_factory=set[str])
     claim: Callable[[str, Callable[[], Fleet]], Awaitable[Fleet]] = _unshared
@@ -212,8 +217,16 @@ class Context:
         Raises:
             InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
         """
-        segmenter_named(self.settings.segmenter)
-        detector_named(self.settings.detector)
+        segmenter, detector = segmenter_named(self.settings.segmenter), self._detector
+        if isinstance(detector, Finder) and "box" not in segmenter.takes:
+            raise InputError(
+                f"The detector {detector.name!r} gives boxes, which the segmenter "
+                f"{segmenter.name!r} does not take; choose another of the two."
+            )
+        if self.settings.detector.startswith(BESIDE) and not isinstance(detector, Finder):
+            raise InputError(
+                f"{BESIDE} goes with a detector that knows words; got {detector.name!r}."
+            )
         FLEETS.load(self.settings.fleet)
         scale = self.settings.metres_per_pixel
         if scale is None or scale == self.world.metres_per_pixel:
@@ -230,11 +243,42 @@ class Context:
         """The picture with its pixels."""
         return self.services.pictures[self.world.picture.sha256]
 
+    @property
+    def _detector(self) -> Detector:
+        return detector_named(self.settings.detector.removeprefix(BESIDE))
+
+    @property
+    def finder(self) -> Finder | None:
+        """What finds things by a noun: the detector, else the segmenter; None where neither can."""
+        known = (self._detector, segmenter_named(self.settings.segmenter))
+        return next((one for one in known if isinstance(one, Finder)), None)
+
+    def looking_for(self, nouns: Iterable[str]) -> "Context":
+        """The same where what nouns name is among the candidates."""
+        phrases = tuple(dict.fromkeys((*self.world.phrases, *map(noun_phrase, nouns))))
+        return self.at(self.world.having(phrases=phrases))
+
     def candidates(self) -> tuple[Candidate, ...]:
-        """The things the detector finds in the picture; it is searched once."""
-        key = self.settings.detector, self.world.picture.sha256
+        """The things found in the picture: what stands out, then what phrases name.
+
+        The picture is searched once for each.
+        """
+        return self._candidates(self.world.phrases)
+
+    def _candidates(self, phrases: tuple[str, ...]) -> tuple[Candidate, ...]:
+        finder, settings = self.finder, self.settings
+        if finder is None:
+            phrases = ()
+        names = (settings.segmenter, *phrases) if phrases else ()
+        key = (settings.detector, self.world.picture.sha256, *names)
         if key not in self.services.found:
-            found = detector_named(key[0]).detect(self.picture, None)
+            if finder is not None and phrases:
+                before, masks = self._candidates(phrases[:-1]), segmenter_named(settings.segmenter)
+                found = with_named(before, self.picture, phrases[-1], finder, masks)
+            else:
+                beside = settings.detector.startswith(BESIDE)
+                detector = detector_named("standout") if beside else self._detector
+                found = detector.detect(self.picture)
             for old in [*self.services.found][: 1 - MOST_FOUND]:
                 self.services.found.pop(old, None)
             self.services.found[key] = found
@@ -255,6 +299,12 @@ class Context:
                 return candidate
         known = f"c1 to c{len(found)}" if found else "none: nothing stands out in this picture"
         raise ToolError(f"There is no candidate {name!r}. Candidates: {known}.")
+
+
+def noun_phrase(words: str) -> str:
+    """Words for a thing as a detector is asked: lower case, no article, single spaces."""
+    said = words.lower().split()
+    return " ".join(said[1:] if said[:1] in (["a"], ["an"], ["the"]) else said)
 
 
 def _apart(box: tuple[float, ...], other: tuple[float, ...]) -> float:

@@ -4,7 +4,8 @@ A package adds one by an entry point of the group, such as `formup.fleets`; what
 listed in the same form and loaded in the same way.
 """
 
-from collections.abc import Mapping
+import inspect
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, TypeVar, cast
@@ -51,3 +52,21 @@ class Registry(Generic[T]):
             raise InputError(
                 f"The {self.noun} {name!r} ({entry.value}) cannot be imported: {error}."
             ) from None
+
+
+def built(registry: Registry[Callable[..., T]], full_name: str) -> T:
+    """The object that a registered class makes.
+
+    Args:
+        full_name: NAME, or NAME:CHECKPOINT for what is made from a checkpoint.
+
+    Raises:
+        InputError: there is none of that name, or it takes no checkpoint or not this one.
+    """
+    name, colon, checkpoint = full_name.partition(":")
+    made = registry.load(name)
+    if not colon:
+        return made()
+    if not inspect.signature(made).parameters:
+        raise InputError(f"The {registry.noun} {name!r} takes no checkpoint; got {checkpoint!r}.")
+    return made(checkpoint)

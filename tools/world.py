@@ -139,6 +139,7 @@ class World(Value):
         arrivals: by plan id, what was observed after its last deployment, the latest last.
         robots: last observed pose of each robot; a snapshot, the fleet knows.
         shown: candidates that a question offered.
+        phrases: nouns that were looked for in the picture, in order; candidates' ids follow it.
         samples: positions that sampling tools named, s1, s2, ...
         doubted: what was found last with too little confidence, for a person to look at.
         undone: how many of the steps that led here were taken back since the last plan was made.
@@ -157,6 +158,7 @@ class World(Value):
     arrivals: dict[str, Arrival] = Field(default_factory=dict)
     robots: tuple[Pose, ...] = ()
     shown: tuple[ShownCandidate, ...] = ()
+    phrases: tuple[str, ...] = ()
     samples: dict[str, tuple[Point, ...]] = Field(default_factory=dict)
     doubted: Target | None = None
     undone: int = 0

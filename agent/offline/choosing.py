@@ -12,6 +12,7 @@ from itertools import count
 from typing import Any
 
 from ...tools.perception.referring.query import SINGLE
+from ..first_message import read_task
 from ..messages import Call, History, Reply, Result, User
 from .descriptions import Reference
 from .phrases import table
@@ -176,16 +177,17 @@ def _answers(message: User | Reply | Result, call: Call) -> bool:
 
 def _choose_one(thing: Reference, history: History) -> Found | Step:
     """The one candidate a description means, or what to do to learn it."""
+    named = thing.named_query if _nouns_are_found(history) else None
     trouble = _trouble(thing)
-    if trouble:
+    if trouble and (named is None or thing.plural):
         return _ask_all(trouble, history)
-    query = thing.whole_query
+    query = named or thing.whole_query
     reply = located(query, history)
     if reply is None:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
     alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and _is_told(thing))
-    if reply["settled"] and (alone or not _says_little(thing, _is_clear(reply))):
+    if reply["settled"] and (named or alone or not _says_little(thing, _is_clear(reply))):
         return Found(matches[0]["id"], thing.wording, tuple(matches[0].get("reasons", ())))
     if matches:
         why = reply["doubt"] or f"{_listed(matches)} may be meant"
@@ -195,6 +197,12 @@ def _choose_one(thing: Reference, history: History) -> Found | Step:
         return Step("report_impossible", {"reason": reason})
     why = reply["lacking"] or reply["doubt"]
     return _ask_all(f'Which one is "{thing.wording}"? {_sentence(why)}', history)
+
+
+def _nouns_are_found(history: History) -> bool:
+    """Whether the turn's first message says that things can be found by what they are."""
+    first = next((m.text for m in history if isinstance(m, User)), None)
+    return first is not None and read_task(first).nouns
 
 
 def _pair(thing: Reference, history: History) -> list[Found] | Step:

@@ -18,6 +18,7 @@ class Reference:
         said: the words.
         query: fields of a Query that say how it looks and where it is.
         noun: the kind of thing, a key of the noun table, or "shape"; "" where it is not known.
+        called: the noun as it was said, known or not; "" where there is none.
         weak: whether the noun says little that can be measured.
         plural: whether several things are meant.
         unknown: words about it that are not understood.
@@ -27,6 +28,7 @@ class Reference:
     wording: str = ""
     query: dict[str, Any] = field(default_factory=dict[str, Any])
     noun: str = ""
+    called: str = ""
     weak: bool = False
     plural: bool = False
     unknown: list[str] = field(default_factory=list[str])
@@ -36,6 +38,14 @@ class Reference:
     def strange(self) -> bool:
         """Whether nothing of it is understood."""
         return not self.noun and not self.query
+
+    @property
+    def named_query(self) -> dict[str, Any] | None:
+        """All that is said of it where nouns are found; None where more is said, or no noun."""
+        only = {"", self.called}
+        if not self.called or self.refused not in only or not only.issuperset(self.unknown):
+            return None
+        return {"noun": self.called, **self.query}
 
     @property
     def whole_query(self) -> dict[str, Any]:
@@ -202,6 +212,8 @@ class Description:
             return found.value == "any"  # the red one of the crates; the crate object
         if found.kind == "noun" and not (found.value == "any" and thing.noun == "shape"):
             thing.noun = found.value
+            said = self.words[self.at : self.at + found.length]
+            thing.called = "" if found.value == "any" else " ".join(said)
             thing.weak = "weak" in table()["nouns"][found.value]
         elif found.kind == "shapes" and thing.noun in ("", "any"):
             thing.noun = "shape"

@@ -79,6 +79,7 @@ def _described(words: Words, at: int) -> tuple[Reference, int] | None:
         thing.unknown.append(" ".join(clause))
         excludes = set(clause) & {*table()["blockers"], *table()["differences"]["negation"]}
         if words[end] not in table()["clauses"] or excludes:
+            thing.called = "" if thing.noun or excludes else " ".join(clause)  # the red fork
             thing.refused = thing.refused or " ".join(clause)  # the coin box is no coin
     if not thing.noun and words[end - 1] in table()["places"]:
         thing.refused = thing.refused or words[end - 1]  # the top left corner
@@ -144,7 +145,7 @@ def _stranger(words: Words, at: int) -> tuple[Reference, int] | None:
     name = " ".join(words[at + 1 : end])
     if not name or _is_robots(words, at, end) or end - at > STRANGERS + 1:
         return None
-    thing = Reference(wording=" ".join(words[at:end]), refused=name)
+    thing = Reference(wording=" ".join(words[at:end]), called=name, refused=name)
     relation = phrase(words, end)
     if relation is not None and relation.kind == "relations":
         after = end + relation.length

@@ -10,16 +10,18 @@ from ...agent.model import Model
 from ...prompts import Prompt, PromptLibrary
 from ...tools.context import Descriptor
 from ...tools.errors import InputError
+from ...tools.perception.segmenters.registry import segmenter_named
 from ...tools.tool import Tool
 from ..grading.policies import POLICIES
 from ..tasks.task import Task
 from .pointing import Mode, can_point
 from .rate_limiter import RateLimited, rate_limiter
 from .recordings import REPLAY, recordings
+from .segment_only import SEGMENT_ONLY, SegmentOnly
 from .simulated_model import SIMULATED, SimulatedModel
 from .trials import USUAL, Arm, Trial, canonical
 
-METHODS = ("rules", "agent", "alone", *POLICIES)
+METHODS = ("rules", "agent", "alone", SEGMENT_ONLY, *POLICIES)
 DIRECT = "former-direct"
 """The prompt of a model alone: to write coordinates."""
 NO_MODEL = {"rules": "offline", **dict.fromkeys(POLICIES, "none")}
@@ -34,8 +36,8 @@ class Method:
 
     Attributes:
         name: one of METHODS.
-        model: of agent and alone, as Agent takes it, `simulated`, or replay:FOLDER; the others
-            have their own.
+        model: of agent and alone, as Agent takes it, `simulated`, or replay:FOLDER; of
+            segment-only a segmenter that takes text; the others have their own.
         prompt: id@vNNN, None for the current one of the model's own.
         descriptor: how shapes are described.
         mode: how things are pointed at.
@@ -87,6 +89,8 @@ class Method:
         Raises:
             InputError: no such model or prompt, or one that writes no coordinates alone.
         """
+        if self.name == SEGMENT_ONLY:
+            return Agent(SegmentOnly(self.model))
         name = self.model if recording is None else f"{REPLAY}{recording}"
         model: str | Model = SimulatedModel(seed) if name == SIMULATED else name
         url = self.base_url if isinstance(model, str) and model != "offline" else None
@@ -130,7 +134,7 @@ def check_method(arm: Method) -> Method:
     if name not in METHODS:
         raise InputError(f"Unknown method {name!r}. There are: {', '.join(METHODS)}.")
     for option, given, takers in (
-        ("--model", arm.model, ("agent", "alone")),
+        ("--model", arm.model, ("agent", "alone", SEGMENT_ONLY)),
         ("--prompt", arm.prompt, ("agent", "alone")),
         ("--planner", arm.planner, ("agent",)),
         ("--descriptor", arm.descriptor != USUAL, WITH_TOOLS),
@@ -142,7 +146,10 @@ def check_method(arm: Method) -> Method:
     if arm.model == "offline":
         raise InputError("The offline rules are a method of their own: --method rules.")
     if not arm.model and name not in NO_MODEL:
-        raise InputError(f"The method {name} takes a --model, such as openai:NAME.")
+        example = "langsam, a segmenter that takes text" if name == SEGMENT_ONLY else "openai:NAME"
+        raise InputError(f"The method {name} takes a --model, such as {example}.")
+    if name == SEGMENT_ONLY and "text" not in segmenter_named(arm.model).takes:
+        raise InputError(f"The segmenter {arm.model!r} takes no text; clipseg and langsam do.")
     return replace(arm, model=arm.model or NO_MODEL[name])
 
 

@@ -28,6 +28,7 @@ from .dialogue_work import Held, hold
 from .methods import Method
 from .pointing import Pointing, pointing
 from .recordings import file_name, recordings
+from .segment_only import SEGMENT_ONLY
 from .simulated_model import SIMULATED
 from .tokens import spent
 from .trials import Status, Trial, TrialRow, Turns, canonical
@@ -140,6 +141,7 @@ class SuiteWork:
             descriptor=arm.descriptor,
             seed=seed,
             metres_per_pixel=task.metres_per_pixel,
+            segmenter=arm.model if arm.name == SEGMENT_ONLY else "grabcut",
         )
         trace = None
         if self.attempts is not None and arm.model not in ("offline", SIMULATED):

@@ -4,7 +4,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..context import Context
+from ..context import Context, noun_phrase
 from ..draw import draw_view, view_scale
 from ..errors import ToolError
 from ..perception.detectors.candidates import salient_candidates
@@ -37,6 +37,11 @@ def sighting(candidate: Candidate, reasons: tuple[str, ...] = ()) -> dict[str, A
         "orientation_deg": round(seen.orientation),
         "salience": round(candidate.salience, 2),
     }
+    if candidate.named:
+        data["named"] = [
+            {"noun": n.phrase, "score": round(n.score, 2), "mask": round(n.confidence, 2)}
+            for n in candidate.named
+        ]
     if seen.hole > 0:
         data["hole"] = round(seen.hole, 2)
     if seen.touches_border:
@@ -89,9 +94,10 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
     """Find things in the picture by how they look and where they are; code does the comparing.
 
     Without a query it measures what the person pointed at, or else lists all that stands out.
-    With one the reply has every match with numeric reasons. Nothing is recognised: say "round",
-    not "coin". Only when settled is true is there exactly one; doubt and lacking say why not.
-    Absent is true only where not even a part of a thing has the look asked for.
+    With one the reply has every match with numeric reasons. A noun counts where a network is set
+    that knows it; else `not_looked_for` names it: say "round", not "coin". Only when settled is
+    true is there exactly one; doubt and lacking say why not. Absent is true only where not even a
+    part of a thing has the look asked for.
 
     Args:
         query: colours, shade, shapes, traits, superlatives and relations that tell it apart.
@@ -103,6 +109,12 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
         targets = [summary(t) for t in world.targets]
         shown = closer_views(context.at(world), context.world, new)
         return ToolResult({"targets": targets, **framed(world)}, shown, world=world)
+    ignored: dict[str, Any] = {}
+    if query is not None and (nouns := query.nouns):
+        if context.finder is None:
+            ignored, query = {"not_looked_for": list(nouns)}, query.with_nouns(lambda noun: "")
+        else:
+            context, query = context.looking_for(nouns), query.with_nouns(noun_phrase)
     clear = salient_candidates(context.candidates())
     if query is None:
         shown = [sighting(c) for c in clear[:MOST_SHOWN]]
@@ -118,8 +130,10 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
             "lacking": selection.lacking,
             "absent": bool(selection.lacking) and not _hinted(query, context.candidates()),
             "things": len(clear),
+            **ignored,
             **framed(context.world),
-        }
+        },
+        world=context.world,
     )
 
 
@@ -138,13 +152,14 @@ def segment(
     id: str = "t1",
     label: str = "",
     candidate: str | None = None,
+    text: str | None = None,
     box: Box | None = None,
     points: tuple[Point, ...] | None = None,
     negative: tuple[Point, ...] = (),
     outline: tuple[Point, ...] | None = None,
     straight: bool = False,
 ) -> ToolResult:
-    """Measure the exact outline of one thing; needs an outline, box, points or a candidate.
+    """Measure the exact outline of one thing; needs an outline, box, points, text or a candidate.
 
     A doubtful mask is shown; a bad one is refused with "Insufficient segmentation accuracy".
 
@@ -152,6 +167,7 @@ def segment(
         id: target id to give it, t1, t2, ...; an id in use is replaced.
         label: what it is, in a few words.
         candidate: id of a numbered candidate, such as c3.
+        text: a bare noun, where nouns are found.
         box: x0, y0, x1, y1 close around it, px.
         points: points (x, y) on it, px; beside an outline or box they correct it.
         negative: points (x, y) that are not part of it, px.
@@ -163,6 +179,7 @@ def segment(
             "id": id,
             "label": label,
             "candidate": candidate,
+            "text": text,
             "box": box,
             "points": points,
             "negative": negative,

@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
-from ..context import Context
+from ..context import Context, noun_phrase
 from ..draw import draw_view, view_scale
 from ..errors import InputError, ToolError
 from ..formation.plan import Plan
@@ -73,6 +73,8 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
     """
     for given in prompts:
         prompt = _correcting(context.world, given)
+        if prompt.text is not None:
+            context, prompt = _found_by_text(context, prompt, prompt.text)
         target = _measured(context, prompt)
         threshold = _threshold(context, prompt.how)
         if target.confidence < threshold and not _believed(context.world, target):
@@ -87,6 +89,30 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
 def _believed(world: World, target: Target) -> bool:
     """Whether a person has agreed to that very outline, however doubtful."""
     return any(t.id == target.id and t.outline == target.outline for t in world.targets)
+
+
+def _found_by_text(
+    context: Context, prompt: TargetPrompt, text: str
+) -> tuple[Context, TargetPrompt]:
+    """A prompt by text as one by the candidate that it names, with that among the candidates.
+
+    Raises:
+        ToolError: nothing finds things by words, or not exactly one such thing was found.
+    """
+    if context.finder is None:
+        raise ToolError(
+            "Nothing that is set finds things by text: point with an outline, a box or points, or "
+            "the person may choose another --detector or --segmenter."
+        )
+    context = context.looking_for([text])
+    phrase = noun_phrase(text)
+    found = [c.id for c in context.candidates() if c.as_named(phrase)]
+    if len(found) != 1:
+        context.observed(context.world)
+        which = f": {', '.join(found[:MAX_POINTS])}. Name one as candidate" if found else ""
+        raise ToolError(f'{len(found) or "No"} things were found as "{phrase}"{which}.')
+    label = prompt.label or phrase
+    return context, prompt.model_copy(update={"text": None, "candidate": found[0], "label": label})
 
 
 def _measured(context: Context, prompt: TargetPrompt) -> Target:

@@ -51,6 +51,10 @@ def measure_outline(
         ToolError: the segmenter does not take such a prompt; the text says which it takes.
         InputError: the mask is empty or in pieces.
     """
+    if candidate is not None and candidate.named:
+        named = max(candidate.named, key=lambda n: n.score)
+        parts = {**named.parts, "detector_score": named.score}
+        return Measured(named.outline, named.confidence, parts)
     kinds = _prompt_kinds(prompt, segmenter)
     refused = kinds - segmenter.takes
     if refused:
@@ -111,6 +115,8 @@ def _prompt_kinds(prompt: TargetPrompt, segmenter: Segmenter) -> set[PromptKind]
         kinds.add("box" if by_box else "outline")
     if prompt.outline is not None:
         kinds.add("outline")
+    if prompt.text is not None:
+        kinds.add("text")
     if prompt.box is not None:
         kinds.add("box")
     if prompt.points or prompt.negative:

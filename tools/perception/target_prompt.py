@@ -1,4 +1,4 @@
-"""How a thing is pointed at: candidate, box, points or rough outline, checked on the picture."""
+"""How a thing is pointed at: by candidate, text, box, points or rough outline, checked."""
 
 from typing import Annotated, Self
 
@@ -20,8 +20,8 @@ MIN_SIDE = 2.0
 class TargetPrompt(BaseModel):
     """By outline (vertices in order; the surest way), box (x0, y0, x1, y1), points or candidate.
 
-    straight: its sides are. points on it, negative ones off it correct an outline or box there,
-    also alone, by the id of one measured.
+    text: a bare noun. straight: its sides are. points on it, negative ones off it correct an
+    outline or box there, also alone, by the id of one measured.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -29,6 +29,7 @@ class TargetPrompt(BaseModel):
     id: str = Field(default="t1", pattern=r"^t[0-9]{1,4}$")
     label: str = Field(default="", max_length=200)
     candidate: str | None = Field(default=None, pattern=r"^c[0-9]{1,4}$")
+    text: str | None = Field(default=None, min_length=1, max_length=60)
     box: Box | None = None
     points: tuple[Point, ...] | None = Field(default=None, min_length=1, max_length=MAX_POINTS)
     negative: tuple[Point, ...] = Field(default=(), max_length=MAX_POINTS)
@@ -37,14 +38,15 @@ class TargetPrompt(BaseModel):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        leading = [self.candidate, self.box, self.outline]
+        leading = [self.candidate, self.text, self.box, self.outline]
         given = sum(way is not None for way in leading)
         if given == 0 and self.points is None and not self.negative:
-            raise ValueError("give a candidate, a box, points or an outline")
+            raise ValueError("give a candidate, a text, a box, points or an outline")
         if given > 1:
-            raise ValueError("give one of candidate, box and outline")
-        if self.candidate is not None and (self.points or self.negative):
-            raise ValueError("a candidate takes no points; give an outline of yours instead")
+            raise ValueError("give one of candidate, text, box and outline")
+        if (self.candidate or self.text) and (self.points or self.negative):
+            named = "candidate" if self.candidate else "text"
+            raise ValueError(f"a {named} takes no points; give an outline of yours instead")
         if self.straight and self.outline is None:
             raise ValueError("straight belongs to an outline")
         return self
@@ -57,9 +59,9 @@ class TargetPrompt(BaseModel):
 
     @property
     def how(self) -> str:
-        """The way of pointing that leads: candidate, outline, box or point."""
-        if self.candidate is not None:
-            return "candidate"
+        """The way of pointing that leads: candidate, text, outline, box or point."""
+        if self.candidate is not None or self.text is not None:
+            return "candidate" if self.candidate is not None else "text"
         if self.outline is not None:
             return "outline"
         return "box" if self.box is not None else "point"

@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 from formup.tools.perception.contours import outline_of_mask
+from formup.tools.perception.detection import Detection
 from formup.tools.perception.image import Picture
 from formup.tools.perception.referring.attributes import Candidate
 from formup.tools.perception.referring.measure_attributes import candidate_of
@@ -28,12 +29,19 @@ class EllipseSegmenter:
 
 
 class BrightDetector:
-    """All that is bright, as one thing; of phrases it knows "lamp" alone."""
+    """All that is bright, as one thing; of nouns it knows "lamp" alone."""
 
     name = "example-bright"
 
-    def detect(self, picture: Picture, phrase: str | None) -> tuple[Candidate, ...]:
+    def detect(self, picture: Picture) -> tuple[Candidate, ...]:
         bright = picture.pixels.min(axis=2) > 200
-        if phrase not in (None, "lamp") or not bright.any():
+        if not bright.any():
             return ()
         return (candidate_of("c1", outline_of_mask(bright), picture, 0.8),)
+
+    def find(self, pixels: Pixels, phrase: str) -> tuple[Detection, ...]:
+        y, x = np.nonzero(pixels.min(axis=2) > 200)
+        if phrase != "lamp" or not len(x):
+            return ()
+        box = (float(x.min()), float(y.min()), float(x.max()), float(y.max()))
+        return (Detection(box, 0.8),)

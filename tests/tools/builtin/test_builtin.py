@@ -220,13 +220,13 @@ def test_segment_below_the_threshold_says_the_papers_sentence(work: "ToolCalls")
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ({}, "give a candidate, a box, points or an outline"),
+        ({}, "give a candidate, a text, a box, points or an outline"),
         ({"box": (60, 40, 50, 90)}, "inverted"),
         ({"box": (260, 40, 350, 90)}, "outside the picture"),
         ({"points": [(900, 4)]}, "outside the picture"),
         (
             {"box": BOX, "outline": [(0, 0), (9, 0), (9, 9)]},
-            "give one of candidate, box and outline",
+            "give one of candidate, text, box and outline",
         ),
         ({"candidate": "c1", "points": [(9, 9)]}, "a candidate takes no points"),
         ({"id": "car", "box": BOX}, "id"),

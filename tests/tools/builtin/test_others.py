@@ -94,9 +94,9 @@ def test_a_picture_is_searched_once_by_all_who_share_what_was_found(
     searched: list[Picture] = []
     found = StandoutDetector.detect
 
-    def detect(self: StandoutDetector, picture: Picture, phrase: str | None) -> Any:
+    def detect(self: StandoutDetector, picture: Picture) -> Any:
         searched.append(picture)
-        return found(self, picture, phrase)
+        return found(self, picture)
 
     monkeypatch.setattr(StandoutDetector, "detect", detect)
     one, other = picture(NEAR, (5, 5, 40, 40)), picture(NEAR, (5, 5, 40, 41))

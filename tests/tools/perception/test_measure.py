@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -30,19 +32,35 @@ def lamp() -> Picture:
 
 
 def test_what_is_built_in_goes_in_as_other_packages_do() -> None:
-    assert SEGMENTERS.names() == ("grabcut",)
-    assert DETECTORS.names() == ("standout",)
+    assert SEGMENTERS.names() == ("grabcut", "clipseg", "langsam", "sam", "sam2.1")
+    assert DETECTORS.names() == ("standout", "groundingdino", "mm-groundingdino")
     assert segmenter_named("grabcut") is segmenter_named("grabcut")
-    for name in SEGMENTERS.names():
-        assert segmenter_named(name).name == name
-    for name in DETECTORS.names():
-        assert detector_named(name).name == name
+    assert segmenter_named("grabcut").name == "grabcut"
+    assert detector_named("standout").name == "standout"
+    for registry in (SEGMENTERS, DETECTORS):
+        for name in registry.names():
+            assert getattr(registry.load(name), "name", name) == name
+
+
+def test_only_what_is_made_from_a_checkpoint_takes_one() -> None:
+    with pytest.raises(InputError, match=r"'grabcut' takes no checkpoint; got 'file'\."):
+        segmenter_named("grabcut:file")
+
+
+@pytest.mark.skipif(find_spec("torch") is not None, reason="the extra is there")
+@pytest.mark.parametrize("named", [segmenter_named, detector_named])
+def test_a_network_without_the_extra_is_one_sentence_that_names_it(
+    named: Callable[[str], object],
+) -> None:
+    name = "clipseg" if named is segmenter_named else "groundingdino"
+    with pytest.raises(InputError, match=r"need the extra: pip install 'formup\[torch\]'\."):
+        named(name)
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(InputError, match=r"Unknown segmenter 'sam'\. There are: grabcut\."):
-        segmenter_named("sam")
-    with pytest.raises(InputError, match=r"Unknown detector 'eye'\. There are: standout\."):
+    with pytest.raises(InputError, match=r"Unknown segmenter 'knife'\. There are: grabcut, cl"):
+        segmenter_named("knife")
+    with pytest.raises(InputError, match=r"Unknown detector 'eye'\. There are: standout, gr"):
         detector_named("eye")
 
 
@@ -71,9 +89,7 @@ def test_what_a_segmenter_does_not_take_is_refused(lamp: Picture) -> None:
 @pytest.mark.usefixtures("example_package")
 def test_an_installed_detector_finds_candidates_that_any_segmenter_measures(lamp: Picture) -> None:
     bright = detector_named("example-bright")
-    assert bright.detect(lamp, "red car") == ()
-    assert bright.detect(lamp, "lamp") == bright.detect(lamp, None)
-    (candidate,) = bright.detect(lamp, None)
+    (candidate,) = bright.detect(lamp)
     assert candidate.label == "white rectangle"
     assert not candidate.attributes.touches_border
     prompt = TargetPrompt(candidate=candidate.id)

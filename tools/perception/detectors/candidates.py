@@ -66,7 +66,7 @@ class StandoutDetector:
 
     name = "standout"
 
-    def detect(self, picture: Picture, phrase: str | None) -> tuple[Candidate, ...]:
+    def detect(self, picture: Picture) -> tuple[Candidate, ...]:
         """See `Detector.detect`."""
         return find_candidates(picture.pixels)
 
@@ -99,9 +99,10 @@ def find_candidates(pixels: Bytes) -> tuple[Candidate, ...]:
 
 
 def salient_candidates(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Those that words can mean: what stands out, without the faint patches of a texture."""
-    most = max((c.salience for c in candidates), default=0.0)
-    return tuple(c for c in candidates if c.salience >= min(CLEAR, CLEAR_SHARE * most))
+    """Those that words can mean: what was found by words, or stands out more than a texture."""
+    most = max((c.salience for c in candidates if not c.named), default=0.0)
+    least = min(CLEAR, CLEAR_SHARE * most)
+    return tuple(c for c in candidates if c.named or c.salience >= least)
 
 
 def segment_candidate(

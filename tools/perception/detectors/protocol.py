@@ -1,4 +1,4 @@
-"""What a detector is: a picture and perhaps a noun phrase go in, candidates come out."""
+"""What a detector is: a picture goes in, candidates come out."""
 
 from typing import Protocol
 
@@ -14,15 +14,11 @@ class Detector(Protocol):
         """What it is chosen by."""
         ...
 
-    def detect(self, picture: Picture, phrase: str | None) -> tuple[Candidate, ...]:
-        """The things found, with ids c1, c2, ... from the most salient one; none is no error.
+    def detect(self, picture: Picture) -> tuple[Candidate, ...]:
+        """Everything that stands out, as c1, c2, ... from the most salient one; none is no error.
 
-        `referring.measure_attributes.candidate_of` makes a candidate of an outline.
-
-        Args:
-            picture: as the person sees it.
-            phrase: a bare noun phrase such as "red car", or None for everything that stands out.
-                A detector that knows no words returns everything; words of colour, size, place
-                and shape are then measured on what it found.
+        `referring.measure_attributes.candidate_of` makes a candidate of an outline. Words of
+        colour, size, place and shape are measured on it. A detector that knows nouns is a
+        `detection.Finder` as well, which is asked for them.
         """
         ...

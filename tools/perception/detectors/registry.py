@@ -3,21 +3,26 @@
 from collections.abc import Callable
 from functools import cache
 
-from ...registry import Registry
+from ...registry import Registry, built
 from .protocol import Detector
 
-DETECTORS = Registry[Callable[[], Detector]](
+_HERE = "formup.tools.perception.detectors"
+DETECTORS = Registry[Callable[..., Detector]](
     "detector",
     "formup.detectors",
-    {"standout": "formup.tools.perception.detectors.candidates:StandoutDetector"},
+    {
+        "standout": f"{_HERE}.candidates:StandoutDetector",
+        "groundingdino": f"{_HERE}.grounding_dino:GroundingDinoDetector",
+        "mm-groundingdino": f"{_HERE}.grounding_dino:MmGroundingDinoDetector",
+    },
 )
 
 
 @cache  # a network's weights are loaded once
 def detector_named(name: str) -> Detector:
-    """The detector of a name.
+    """The detector of a name, or NAME:CHECKPOINT.
 
     Raises:
-        InputError: there is none, or its package cannot be imported.
+        InputError: there is none, or it cannot be loaded.
     """
-    return DETECTORS.load(name)()
+    return built(DETECTORS, name)

@@ -3,6 +3,7 @@
 Words such as "red", "round" or "the largest" are decided on these numbers alone.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -85,22 +86,46 @@ class Attributes:
 
 
 @dataclass(frozen=True)
+class Naming:
+    """That a network found a thing by a noun phrase; the two scores say different things.
+
+    Attributes:
+        score: the detector's: that it is such a thing.
+        outline, confidence, parts: of the mask, as of any other.
+    """
+
+    phrase: str
+    score: float
+    outline: Outline
+    confidence: float
+    parts: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class Candidate:
-    """A thing found in the picture, not yet identified with any words.
+    """A thing found in the picture.
 
     Attributes:
         id: c1, c2, ... in the order of salience, the same on every run.
         outline: image px.
         salience: 0 to 1, how much it looks like a thing.
+        named: the phrases it was found by, if any.
     """
 
     id: str
     outline: Outline
     attributes: Attributes
     salience: float
+    named: tuple[Naming, ...] = ()
+
+    def as_named(self, phrase: str) -> Naming | None:
+        """How it was found by a phrase, if it was."""
+        return next((n for n in self.named if n.phrase == phrase), None)
 
     @property
     def label(self) -> str:
-        """What it looks like, in two words: "red circle", "grey thing"."""
+        """What it is called, else what it looks like: "car", "red circle", "grey thing"."""
+        if self.named:
+            return self.named[0].phrase
         shape = self.attributes.shape
         return f"{self.attributes.colour} {'thing' if shape == 'irregular' else shape}"

@@ -168,6 +168,8 @@ def graded(values: FloatArray, limits: tuple[float, float]) -> IntArray:
 def attribute_filters(things: Things, description: Description) -> list[Filter]:
     """What a description demands of the looks of things."""
     found: list[Filter] = []
+    if description.noun:
+        found.append(_noun_filter(things, description.noun))
     if description.colours:
         found.append(_colour_filter(things, description))
     if description.shade:
@@ -196,6 +198,17 @@ def lacking(things: Things, filters: list[Filter]) -> str:
 def _there_are(names: list[str]) -> str:
     counts = sorted(Counter(names).items(), key=lambda item: (-item[1], item[0]))
     return "there are " + ", ".join(f"{name} {count}" for name, count in counts)
+
+
+def _noun_filter(things: Things, noun: str) -> Filter:
+    namings = [c.as_named(noun) for c in things.candidates]
+    degrees = np.array([NO if n is None else SURE for n in namings], dtype=np.int64)
+
+    def explain(index: int) -> str:
+        naming = namings[index]
+        return f"found as {noun} ({naming.score:.2f})" if naming else ""
+
+    return Filter(f"found as {noun}", degrees, explain, "no network found one")
 
 
 def _colour_filter(things: Things, description: Description) -> Filter:

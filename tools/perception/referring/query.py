@@ -3,7 +3,8 @@
 It has enumerations and numbers only, so that every word has one meaning, decided on measures.
 """
 
-from typing import Annotated, Literal, Self
+from collections.abc import Callable
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -69,6 +70,7 @@ class Description(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    noun: str = Field(default="", max_length=60, description="What it is, bare: car")
     colours: tuple[ColourName, ...] = Field(
         default=(), max_length=11, description="Its main colour is one of these"
     )
@@ -125,6 +127,29 @@ class Query(Description):
         "larger of the two orange sweets'",
     )
 
+    @property
+    def nouns(self) -> tuple[str, ...]:
+        """Every noun in it, of other things too."""
+        others = (t for r in self.relations for t in r.things if isinstance(t, Description))
+        return tuple(dict.fromkeys(t.noun for t in (self, *others) if t.noun))
+
+    def with_nouns(self, change: Callable[[str], str]) -> "Query":
+        """The same with every noun as `change` makes it."""
+        relations = tuple(
+            r.model_copy(update={"things": tuple(_with_noun(t, change) for t in r.things)})
+            for r in self.relations
+        )
+        return _with_noun(self.model_copy(update={"relations": relations}), change)
+
+
+T = TypeVar("T")
+
+
+def _with_noun(thing: T, change: Callable[[str], str]) -> T:
+    if isinstance(thing, Description):
+        return thing.model_copy(update={"noun": change(thing.noun)})
+    return thing
+
 
 def wording(description: Description) -> str:
     """The description in words, for a sentence about it: "the largest dark red one"."""
@@ -135,5 +160,6 @@ def wording(description: Description) -> str:
     words = [*picks, *((description.shade,) if description.shade else ()), *description.traits]
     if description.colours:
         words.append(" or ".join(description.colours))
-    words.append(" or ".join(description.shapes) if description.shapes else "one")
+    shapes = " or ".join(description.shapes)
+    words.append(" ".join(filter(None, (shapes, description.noun))) or "one")
     return " ".join(["the", *words])

@@ -39,7 +39,10 @@ class Segmenter(Protocol):
 
     @property
     def takes(self) -> frozenset[PromptKind]:
-        """The kinds of prompt it can be pointed with; points also correct the other ones."""
+        """The kinds of prompt it can be pointed with; points also correct the other ones.
+
+        One that takes text is a `detection.Finder` as well.
+        """
         ...
 
     @property
@@ -47,7 +50,7 @@ class Segmenter(Protocol):
         """The confidence below which a mask is refused (t in the paper), by way of pointing.
 
         `point`, `box` and `outline` as far as it takes these, and `candidate` where it takes a
-        box or an outline.
+        box, an outline or text.
         """
         ...
 

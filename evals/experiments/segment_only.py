@@ -1,0 +1,69 @@
+"""Segmentation alone (Table II of the paper): a network is given the words for the thing, whole.
+
+Nobody reads a relation or a rank, or compares anything: the best find is the thing. The rules
+place robots about it as they place them about what a person points at.
+"""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+from ...agent.first_message import read_task
+from ...agent.messages import Call, History, Reply, Result, User, turn_of
+from ...agent.model import Request
+from ...agent.offline.accounting import read_instruction
+from ...agent.offline.planner import OfflinePlanner
+
+SEGMENT_ONLY = "segment-only"
+LONGEST = 60
+"""Characters of a phrase that a network is asked with."""
+
+
+class SegmentOnly:
+    """A network's best find for the words, in the place of whoever would choose."""
+
+    reads_all = True
+
+    def __init__(self, segmenter: str) -> None:
+        self.name = segmenter
+        self._rules = OfflinePlanner()
+
+    async def reply(self, request: Request) -> Reply:
+        """Look for the thing by its words, then have the rules go on with what was found."""
+        first, *rest = turn_of(request.messages)
+        assert isinstance(first, User)
+        if not rest:
+            return _call("locate_object", query={"noun": _phrase(first.text)})
+        found = _best(tuple(rest))
+        if found is None:
+            reason = "The network found nothing by the words for the thing."
+            return _call("report_impossible", reason=reason)
+        pointed = json.dumps([{"id": "t1", "candidate": found}])
+        text = "\n".join(
+            f"Pointed at: {pointed}" if line.startswith("Pointed at: ") else line
+            for line in first.text.split("\n")
+        )
+        return await self._rules.reply(replace(request, messages=(User(text=text), *rest[2:])))
+
+
+def _call(name: str, **arguments: Any) -> Reply:
+    return Reply(calls=(Call(id=SEGMENT_ONLY, name=name, arguments=arguments),))
+
+
+def _phrase(text: str) -> str:
+    """The words for the thing, or all words where the rules know of none."""
+    said = read_task(text).instruction
+    reading = read_instruction(said)
+    return (reading.things[0] if reading.things else said)[:LONGEST]
+
+
+def _best(messages: History) -> str | None:
+    """The candidate that the network is surest of."""
+    result = next(m for m in messages if isinstance(m, Result) and m.call_id == SEGMENT_ONLY)
+    found: list[dict[str, Any]] = []
+    if not result.error:
+        found = json.loads(result.text)["candidates"]
+    scored: list[tuple[float, str]] = [
+        (n["score"], c["id"]) for c in found for n in c.get("named", ())
+    ]
+    return max(scored)[1] if scored else None

@@ -1,0 +1,1 @@
+"""Trained networks: where their checkpoints come from, and how they are run."""
