@@ -22,6 +22,7 @@ from PIL import ExifTags, Image, TiffImagePlugin, UnidentifiedImageError, featur
 
 from ..errors import ImageError
 from .deep_values import as_8_bits
+from .geotiff import Georeference, georeference_of
 
 MAX_FILE_BYTES = 64 * 2**20
 MAX_PIXELS = 50_000_000
@@ -69,6 +70,7 @@ class Picture:
     notes: what a person should know of how the pixels came about; often empty.
     path: absolute, of the file it was loaded from; None where it came from none.
     file: the content of the file, where it has no path.
+    place: on a map, of a GeoTIFF.
     """
 
     pixels: NDArray[np.uint8]
@@ -77,6 +79,12 @@ class Picture:
     notes: tuple[str, ...]
     path: Path | None = None
     file: bytes | None = None
+    place: Georeference | None = None
+
+    @property
+    def metres_per_pixel(self) -> float | None:
+        """As its file says; a resolution for printing (DPI) says nothing of the ground."""
+        return None if self.place is None else self.place.metres_per_pixel
 
     @property
     def width(self) -> int:
@@ -122,8 +130,9 @@ def picture_from_bytes(data: bytes, name: str) -> Picture:
     if not data:
         raise _empty(name)
     _check_bytes(name, len(data))
-    pixels, notes = _decode(data, name)
-    return Picture(pixels, hashlib.sha256(data).hexdigest(), name, notes, file=data)
+    pixels, place, notes = _decode(data, name)
+    sha256 = hashlib.sha256(data).hexdigest()
+    return Picture(pixels, sha256, name, notes, file=data, place=place)
 
 
 def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Picture:
@@ -234,7 +243,9 @@ def _too_many_pixels(name: str, claim: str) -> ImageError:
     )
 
 
-def _decode(data: bytes, name: str) -> tuple[NDArray[np.uint8], tuple[str, ...]]:
+def _decode(
+    data: bytes, name: str
+) -> tuple[NDArray[np.uint8], Georeference | None, tuple[str, ...]]:
     try:
         with _pillow_silenced(), Image.open(BytesIO(data), formats=_FORMATS) as opened:
             _check_size(name, *opened.size)
@@ -245,14 +256,17 @@ def _decode(data: bytes, name: str) -> tuple[NDArray[np.uint8], tuple[str, ...]]
             # Some decoders learn the true size only now.
             _check_size(name, *opened.size)
             shallow, deep = as_8_bits(opened, colours)
-            pixels, note = _to_rgb(_upright(shallow, opened))
+            upright = _upright(shallow, opened)
+            place = georeference_of(opened) if upright is shallow else None
+            pixels, note = _to_rgb(upright)
     except ImageError:
         raise
     # Over the years Pillow's readers have let out nearly every built-in exception.
     except Exception as error:
         raise _undecodable(name, data, error) from None
     pixels.setflags(write=False)
-    return pixels, tuple(text for text in (frames, deep, note) if text)
+    mapped = place.note if place is not None else ""
+    return pixels, place, tuple(text for text in (frames, deep, note, mapped) if text)
 
 
 @contextmanager
