@@ -63,6 +63,7 @@ def run(
     box: o.Boxes = None,
     outline: o.Outlines = None,
     target: o.Candidates = None,
+    mask: o.Masks = None,
     keep_out: o.KeepOuts = None,
     contract: o.ContractFile = None,
     plan_only: o.PlanOnly = False,
@@ -89,8 +90,10 @@ def run(
     seed: o.Seed = "0",
 ) -> None:
     """Carry out an instruction on a picture."""
+    picture = load_picture(image)
+    lengths = metres_per_pixel, robot_radius, clearance
     fixed = Settings(
-        **arguments.numbers(robots, metres_per_pixel, robot_radius, clearance, threshold, seed),
+        **arguments.numbers(robots, *lengths, threshold, seed, picture),
         detector=detector,
         segmenter=segmenter,
         descriptor=arguments.descriptor(descriptor),
@@ -99,11 +102,13 @@ def run(
         may_deploy=not plan_only,
         numbered=numbered,
     )
-    things = arguments.pointed(point, box, outline, target), arguments.kept_out(keep_out)
-    who, given = decided(contract, *things, fixed, model=model, planner=planner)
-    picture, keep = load_picture(image), arguments.recording(record)
+    given = arguments.pointed(point, box, outline, target), *arguments.masked(mask, picture)
+    things = arguments.numbered(given), arguments.kept_out(keep_out)
+    scale = fixed.metres_per_pixel or picture.metres_per_pixel
+    who, said = decided(contract, *things, fixed, model=model, planner=planner, scale=scale)
+    keep = arguments.recording(record)
     with agent_of(*who, base_url, prompt, prompts, limit, policy) as agent, Folder(out) as home:
-        made = agent.run(picture, instruction, trace=home.trace, **given)
+        made = agent.run(picture, instruction, trace=home.trace, **said)
         raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
 
 

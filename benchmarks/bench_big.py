@@ -36,7 +36,7 @@ def rows() -> Iterator[str]:
         place = Path(folder)
         _planned(PHOTO, place / "warm")
         small = min(_planned(PHOTO, place / f"small{k}") for k in range(REPEATS))
-        yield f"{'picture':12} {'formup':>8} {'decoding':>8} {'ratio':>7}   CPU s, best of {REPEATS}"
+        yield f"{'CPU seconds':12} {'formup':>8} {'decoding':>8} {'ratio':>7}   best of {REPEATS}"
         yield f"{'0.3 MP jpg':12} {small:8.2f}"
         for name, size in SIZES.items():
             for kind in ("jpg", "png"):

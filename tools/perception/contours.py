@@ -50,11 +50,11 @@ def outline_of_mask(mask: NDArray[np.bool_]) -> Outline:
     region = shapely.union_all(parts)
     if region.is_empty:
         raise InputError(f"The mask's {int(mask.sum())} pixels form lines or specks, no shape.")
-    whole = _in_one_piece(region)
+    whole = in_one_piece(region)
     return outline_of(whole.simplify(FINEST * math.sqrt(whole.area)))
 
 
-def _in_one_piece(region: BaseGeometry) -> BaseGeometry:
+def in_one_piece(region: BaseGeometry) -> BaseGeometry:
     """The largest part if it holds nearly all, else of the region with its narrow gaps bridged."""
     for share in GAP_SHARES:
         reach = share * math.sqrt(region.area)

@@ -3,11 +3,11 @@
 import cv2
 import numpy as np
 import shapely
-
 from formup.tools.perception.contours import outline_of_mask
+from numpy.typing import NDArray
 
 
-def disc(size: int, radius: int) -> np.ndarray:
+def disc(size: int, radius: int) -> NDArray[np.bool_]:
     canvas = np.zeros((size, size), np.uint8)
     cv2.circle(canvas, (size // 2, size // 2), radius, (1,), -1)
     return canvas.astype(bool)
@@ -18,7 +18,7 @@ def test_a_thing_has_the_same_outline_wherever_it_lies_in_a_picture() -> None:
     small[45:55, 45:55] = False
     large = np.zeros((900, 1200), bool)
     large[700:800, 40:140] = small
-    moved = shapely.transform(outline_of_mask(small).polygon, lambda at: at + (40, 700))
+    moved = shapely.transform(outline_of_mask(small).polygon, lambda at: at + np.array((40, 700)))
     assert outline_of_mask(large).polygon.equals_exact(moved, 1e-9)
 
 

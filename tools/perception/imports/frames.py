@@ -1,29 +1,31 @@
-"""Whether annotations are of their picture, in its frame: px as it is shown, x right, y down.
+"""In which frame outlines are that were drawn elsewhere: px as the picture is shown, or another.
 
-Outlines of another frame are refused with the frame that fits. Which one does is seen in the
-picture: across a true outline colours differ more than across the same one somewhere else.
+Which one fits is seen in the picture: across a true outline colours differ more than across the
+same one somewhere else.
 """
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from PIL import Image, ImageFilter
-from shapely.geometry import Polygon, box
+from shapely.geometry import box
+from shapely.geometry.base import BaseGeometry
 
-from ...tools.errors import InputError
-from ...tools.geometry.outline import FloatArray
-from ...tools.perception.image import load_picture
+from ...geometry.outline import FloatArray
+from ..image import Picture
 
 BETTER = 1.6
 """Times the contrast across outlines by which another frame fits; on photographs none had 1.2."""
+SURE = 2.5
+"""The same where an outline may be drawn about what has no edge: of such, 1 in 30 had more."""
 SEEN = 0.75
 """Least share of an outline that lies in the picture; what its border cuts may be drawn whole."""
 REACH = 4.0
 """How far to either side of an outline colours are compared, px."""
+LONG = 1500
+"""Px of a picture's longer side that are enough to see it."""
 SMALLEST = 100.0
 """Square px of an outline that says anything of another frame."""
 FRAMES: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
@@ -41,52 +43,34 @@ FRAMES: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
 """Frames that other programs write, and what takes (n, 2) points and the picture's size to ours."""
 
 
-def check_frame(entry: dict[str, Any], folder: Path) -> None:
-    """Hold an entry of annotations against its picture.
+def likeliest_frame(picture: Picture, rings: Sequence[FloatArray]) -> tuple[str, float]:
+    """Of the other frames the one that outlines would fit best, and how many times better.
 
-    Raises:
-        InputError: another picture or size, an outline that crosses itself, or another frame.
+    Args:
+        rings: (n, 2) each, which do not cross themselves.
     """
-    name, things = entry["image"], entry["objects"]
-    picture = load_picture(folder / name)
-    if entry.get("sha256", picture.sha256) != picture.sha256:
-        raise InputError(f"{name} is another picture than the annotated one: its sha256 differs.")
-    if (annotated := (entry["width"], entry["height"])) != picture.size:
-        raise InputError(
-            f"{name} is annotated as {annotated[0]} x {annotated[1]} px, but is shown with "
-            f"{picture.width} x {picture.height} px (EXIF orientation applied); annotate that."
-        )
-    rings = [np.asarray(thing["polygon"], dtype=float) for thing in things]
-    for thing, ring in zip(things, rings, strict=True):
-        if not all(Polygon(r).is_valid for r in (ring, *thing.get("holes", ()))):
-            raise InputError(
-                f"The outline of {thing['id']} in {name} crosses itself; give its points in order "
-                "around the thing."
-            )
+    step = max(max(picture.size) // LONG, 1)
+    shown = Image.fromarray(np.ascontiguousarray(picture.pixels[::step, ::step]))
+    pixels = np.asarray(shown.filter(ImageFilter.GaussianBlur(1.5)), dtype=float)
     size = np.asarray(picture.size, dtype=float)
-    soft = Image.fromarray(picture.pixels).filter(ImageFilter.GaussianBlur(1.5))
-    pixels = np.asarray(soft, dtype=float)
-    fit = {n: _contrast(pixels, [f(r, size) for r in rings], SMALLEST) for n, f in FRAMES.items()}
+    fit = {
+        name: _contrast(pixels, [move(r, size) / step for r in rings], SMALLEST)
+        for name, move in FRAMES.items()
+    }
     best = max(fit, key=fit.__getitem__)
-    fits = fit[best] > BETTER * max(_contrast(pixels, rings, 0.0), float(pixels.std()) / 2)
-    outside = [t["id"] for t, ring in zip(things, rings, strict=True) if not _is_seen(ring, size)]
-    if outside or fits:
-        what = f"of {', '.join(outside)} lie outside" if outside else "do not follow things in"
-        raise InputError(
-            f"Outlines {what} {name}, {picture.width} x {picture.height} px"
-            f"{f'; they would fit {best}' if fits else ''}. Give x, y in px as it is shown."
-        )
+    here = _contrast(pixels, [r / step for r in rings], 0.0)
+    return best, fit[best] / max(here, float(pixels.std()) / 2, 1e-9)
 
 
-def _is_seen(ring: FloatArray, size: FloatArray) -> bool:
-    region = Polygon(ring)
+def is_seen(region: BaseGeometry, size: FloatArray) -> bool:
+    """Whether a region lies in a picture of a size, but for what its border may cut."""
     return region.intersection(box(0, 0, *size)).area >= SEEN * region.area
 
 
 def _contrast(pixels: NDArray[np.floating], rings: Sequence[FloatArray], smallest: float) -> float:
     """Mean difference of colour across outlines; 0 where one is not seen, or smaller, px^2."""
     size = np.array(pixels.shape[1::-1], dtype=float)
-    if not all(_is_seen(ring, size) and Polygon(ring).area >= smallest for ring in rings):
+    if not all(is_seen(p, size) and p.area >= smallest for p in map(shapely.Polygon, rings)):
         return 0.0
     found = [0.0]
     for line in map(shapely.LinearRing, rings):
