@@ -226,15 +226,21 @@ def pointed(
         raise InputError(violations(error)) from None
 
 
-def masked(files: Sequence[Path] | None, picture: Picture | None) -> list[Things]:
-    """The things of mask files, those of one file together.
+def shown(
+    ways: Sequence[list[str] | None], files: Sequence[Path] | None, picture: Picture | None
+) -> list[Things]:
+    """What was pointed at, then the things of mask files, those of one file together.
+
+    Args:
+        ways: points, boxes, outlines and candidates.
 
     Raises:
-        InputError: one cannot be read, or does not fit the picture.
+        InputError: as `pointed`; or a file cannot be read, or does not fit the picture.
     """
     if files and picture is None:
         raise InputError("--mask needs the picture that it is of; name that too.")
-    found: list[Things] = []
+    points, boxes, outlines, candidates = ways
+    found: list[Things] = [(p,) for p in pointed(points, boxes, outlines, candidates)]
     for file in files or ():
         assert picture is not None
         masks = masks_in(read_bytes(file), file.name, picture.size, picture)

@@ -84,17 +84,13 @@ def chat(
     seed: o.Seed = "0",
 ) -> None:
     """Talk to the team: what it shall do, changes, questions; /help says what else."""
-    picture = None if image is None else load_picture(image)
-    lengths = metres_per_pixel, robot_radius, clearance
+    picture, lengths = image and load_picture(image), (metres_per_pixel, robot_radius, clearance)
     fixed = arguments.numbers(robots, *lengths, threshold, seed, picture)
     fixed |= {"descriptor": arguments.descriptor(descriptor), "starts": read_starts(starts)}
     fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
-    shown = [(thing,) for thing in arguments.pointed(point, box, outline, target)]
-    things = _in_order([*shown, *arguments.masked(mask, picture)], ctx.meta["words"])
+    things = _in_order(ctx, arguments.shown((point, box, outline, target), mask, picture))
     begin = Beginning(picture, session, things, arguments.kept_out(keep_out), Settings(**fixed))
-    rules, lines = ["deploy=refuse"] * plan_only + (policy or []), _lines(script, as_json)
-    if auto and plan_only:
-        raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
+    rules, lines = _rules(policy, auto=auto, plan_only=plan_only), _lines(script, as_json)
     display = None if as_json else _display(plain=plain or lines is not None)
     chosen = partial(_agent, (planner, base_url, prompt, prompts, limit, rules), display, lines)
     with chosen(model) as agent, Folder(out) as home:
@@ -191,9 +187,21 @@ def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
     return None
 
 
-def _in_order(things: Sequence[Things], words: Sequence[str]) -> Things:
-    """What each option gave, listed by kind, as t1, t2, ... in the order of the words."""
-    kinds = [POINTING.index(k) for word in words if (k := word.partition("=")[0]) in POINTING]
+def _rules(policy: list[str] | None, *, auto: bool, plan_only: bool) -> list[str]:
+    """The policy's rules, the first of which forbids to move where that is wanted.
+
+    Raises:
+        InputError: robots are to move at once as well.
+    """
+    if auto and plan_only:
+        raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
+    return ["deploy=refuse"] * plan_only + (policy or [])
+
+
+def _in_order(ctx: typer.Context, things: Sequence[Things]) -> Things:
+    """What each option gave, listed by kind, as t1, t2, ... in the order of the command line."""
+    words: list[str] = [word.partition("=")[0] for word in ctx.meta["words"]]
+    kinds = [POINTING.index(word) for word in words if word in POINTING]
     places = sorted(range(len(kinds)), key=lambda i: kinds[i])
     given = sorted(zip(places, things, strict=True), key=lambda p: p[0])
     return arguments.numbered(group for _, group in given)

@@ -90,23 +90,18 @@ def run(
     seed: o.Seed = "0",
 ) -> None:
     """Carry out an instruction on a picture."""
-    picture = load_picture(image)
+    picture, keep = load_picture(image), arguments.recording(record)
     lengths = metres_per_pixel, robot_radius, clearance
     fixed = Settings(
         **arguments.numbers(robots, *lengths, threshold, seed, picture),
-        detector=detector,
-        segmenter=segmenter,
+        **{"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered},
         descriptor=arguments.descriptor(descriptor),
-        fleet=fleet,
         starts=read_starts(starts),
         may_deploy=not plan_only,
-        numbered=numbered,
     )
-    given = arguments.pointed(point, box, outline, target), *arguments.masked(mask, picture)
-    things = arguments.numbered(given), arguments.kept_out(keep_out)
-    scale = fixed.metres_per_pixel or picture.metres_per_pixel
-    who, said = decided(contract, *things, fixed, model=model, planner=planner, scale=scale)
-    keep = arguments.recording(record)
+    given = arguments.shown((point, box, outline, target), mask, picture)
+    things = arguments.numbered(given), arguments.kept_out(keep_out), fixed
+    who, said = decided(contract, *things, model=model, planner=planner, picture=picture)
     with agent_of(*who, base_url, prompt, prompts, limit, policy) as agent, Folder(out) as home:
         made = agent.run(picture, instruction, trace=home.trace, **said)
         raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))

@@ -55,7 +55,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     for note in (report.image or {}).get("notes", ()):
         _line(console, "picture", note)
     for target in report.targets:
-        _found(console, target)
+        _show_target(console, target)
     if report.contract is not None and not (report.files or {}).get("contract"):
         for group in report.contract.groups:
             _line(console, "contract", group_words(group, _scale(report)))
@@ -74,7 +74,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     _files(console, report, folder)
 
 
-def _found(console: Console, target: Mapping[str, Any]) -> None:
+def _show_target(console: Console, target: Mapping[str, Any]) -> None:
     parts = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in target["parts"].items())
     box = ", ".join(f"{v:g}" for v in target["box"])
     _line(

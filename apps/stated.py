@@ -11,6 +11,7 @@ from ..tools.context import Settings
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import Contract
 from ..tools.formation.units import contract_in_pixels
+from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.store import read_text
 from ..tools.tool import violations
@@ -29,13 +30,13 @@ def decided(
     *,
     model: str,
     planner: str | None,
-    scale: float | None,
+    picture: Picture,
 ) -> tuple[Who, SayOptions]:
     """Who decides, and about what: the contract of a file if there is one, else the model.
 
     Args:
         kept: what no robot may enter; a contract may name it as k1, k2, ...
-        scale: metres per pixel, if that is known.
+        picture: whose file may say its scale.
 
     Raises:
         InputError: the file cannot be read, contradicts what else is given, or names what nothing
@@ -55,7 +56,7 @@ def decided(
             "c3."
         )
     try:
-        contract_in_pixels(contract, scale)
+        contract_in_pixels(contract, settings.metres_per_pixel or picture.metres_per_pixel)
     except ToolError:
         raise InputError(
             f'The lengths of --contract {path} cannot be used; say "unit": "px" in it, or "m" for '

@@ -34,19 +34,21 @@ def rows() -> Iterator[str]:
     """The table."""
     with TemporaryDirectory() as folder:
         place = Path(folder)
-        _planned(PHOTO, place / "warm")
-        small = min(_planned(PHOTO, place / f"small{k}") for k in range(REPEATS))
+        _seconds_planned(PHOTO, place / "warm")
+        small = min(_seconds_planned(PHOTO, place / f"small{k}") for k in range(REPEATS))
         yield f"{'CPU seconds':12} {'formup':>8} {'decoding':>8} {'ratio':>7}   best of {REPEATS}"
         yield f"{'0.3 MP jpg':12} {small:8.2f}"
         for name, size in SIZES.items():
             for kind in ("jpg", "png"):
-                file = _drawn(place / f"big.{kind}", size)
-                ours = min(_planned(file, place / f"{name}{kind}{k}") for k in range(REPEATS))
-                bare = min(_decoded(file) for _ in range(REPEATS))
+                file = _enlarged(place / f"big.{kind}", size)
+                ours = min(
+                    _seconds_planned(file, place / f"{name}{kind}{k}") for k in range(REPEATS)
+                )
+                bare = min(_seconds_decoded(file) for _ in range(REPEATS))
                 yield f"{name} {kind:6} {ours:8.2f} {bare:8.2f} {ours / bare:7.1f}"
 
 
-def _drawn(file: Path, size: tuple[int, int]) -> Path:
+def _enlarged(file: Path, size: tuple[int, int]) -> Path:
     """The photograph enlarged, with noise."""
     large = cv2.resize(load_picture(PHOTO).pixels, size, interpolation=cv2.INTER_CUBIC)
     noise = np.random.default_rng(0).normal(0, NOISE, (*large.shape[:2], 1)).astype(np.float32)
@@ -55,7 +57,7 @@ def _drawn(file: Path, size: tuple[int, int]) -> Path:
     return file
 
 
-def _planned(file: Path, out: Path) -> float:
+def _seconds_planned(file: Path, out: Path) -> float:
     out.mkdir()
     began = time.process_time()
     picture = load_picture(file)
@@ -73,7 +75,7 @@ def _planned(file: Path, out: Path) -> float:
     return time.process_time() - began
 
 
-def _decoded(file: Path) -> float:
+def _seconds_decoded(file: Path) -> float:
     began = time.process_time()
     Image.open(file).load()
     return time.process_time() - began

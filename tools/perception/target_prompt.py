@@ -71,9 +71,8 @@ class TargetPrompt(BaseModel):
         if self.mask is not None and not (self.mask.region.is_valid and self.mask.region.area):
             raise ValueError("the mask's rings cross, or enclose nothing")
         if (self.candidate or self.mask) and (self.points or self.negative):
-            raise ValueError(
-                "a candidate or mask takes no points; give an outline of yours instead"
-            )
+            what = "mask" if self.mask else "candidate"
+            raise ValueError(f"a {what} takes no points; give an outline of yours instead")
         if self.straight and self.outline is None:
             raise ValueError("straight belongs to an outline")
         return self

@@ -69,9 +69,9 @@ def masks_in(data: bytes, name: str, size: Size, picture: Picture | str) -> list
         if not 1 <= len(shapes) <= MOST:
             held = f"it holds {len(shapes) or 'no'} things"
             raise refusal(held, f"1 to {MOST} can be pointed at together")
-        found = _each(shapes, lambda shape: _found(shape, size, known and known.place))
+        found = _each(shapes, lambda shape: _read_shape(shape, size, known and known.place))
         note = "" if known is None else _frame_note(known, found)
-        regions = _each(found, lambda thing: _whole(thing, size))
+        regions = _each(found, lambda thing: _region_seen(thing, size))
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
     return [
@@ -95,7 +95,7 @@ def _each(things: Sequence[Thing], work: Callable[[Thing], Made]) -> list[Made]:
     return made
 
 
-def _found(shape: Shape, size: Size, place: Georeference | None) -> _Found:
+def _read_shape(shape: Shape, size: Size, place: Georeference | None) -> _Found:
     label = " ".join(shape.label.split())[:MOST_LABEL]
     if shape.pixels is not None:
         return _Found(label, Polygon(), "", shape.pixels)
@@ -124,7 +124,7 @@ def _frame_note(picture: Picture, found: Sequence[_Found]) -> str:
     return f"; its outlines would fit better {best}: look at them" if better > BETTER else ""
 
 
-def _whole(thing: _Found, size: Size) -> Polygon:
+def _region_seen(thing: _Found, size: Size) -> Polygon:
     """The region in the picture, in one piece."""
     if thing.pixels is not None:
         return outline_of_mask(thing.pixels()).polygon
