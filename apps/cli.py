@@ -92,15 +92,12 @@ def run(
     """Carry out an instruction on a picture."""
     picture, keep = load_picture(image), arguments.recording(record)
     lengths = metres_per_pixel, robot_radius, clearance
-    fixed = Settings(
-        **arguments.numbers(robots, *lengths, threshold, seed, picture),
-        **{"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered},
-        descriptor=arguments.descriptor(descriptor),
-        starts=read_starts(starts),
-        may_deploy=not plan_only,
-    )
+    fixed = arguments.numbers(robots, *lengths, threshold, seed, picture)
+    fixed |= {"descriptor": arguments.descriptor(descriptor), "starts": read_starts(starts)}
+    fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
+    settings = Settings(**fixed, may_deploy=not plan_only)
     given = arguments.shown((point, box, outline, target), mask, picture)
-    things = arguments.numbered(given), arguments.kept_out(keep_out), fixed
+    things = arguments.numbered(given), arguments.kept_out(keep_out), settings
     who, said = decided(contract, *things, model=model, planner=planner, picture=picture)
     with agent_of(*who, base_url, prompt, prompts, limit, policy) as agent, Folder(out) as home:
         made = agent.run(picture, instruction, trace=home.trace, **said)

@@ -98,14 +98,15 @@ def test_no_scale_is_guessed(tmp_path: Path, kind: str) -> None:
 
 
 def test_tags_that_say_nothing_sure_are_passed_over(tmp_path: Path) -> None:
-    for odd in (
+    odds: tuple[dict[str, Any], ...] = (
         {"scale": (0.0, 0.1)},
         {"scale": (math.nan, 0.1)},
         {"scale": None},
         {"model": 3},
         {"matrix": [0.0] * 16},
         {"matrix": [1.0] * 5},
-    ):
+    )
+    for odd in odds:
         picture = load_picture(geotiff(tmp_path, 32632, **odd))
         assert picture.place is None
         assert picture.notes == ()
