@@ -75,9 +75,7 @@ def task_text(context: Context, how: str = "", *, follows: bool = False) -> str:
     """A turn's first message: one fact a line, the person's words quoted so that they stay one."""
     settings, world = context.settings, context.world
     picture, scale = world.picture, world.metres_per_pixel
-    pointed = [
-        p.model_dump(mode="json", exclude_defaults=True) | {"id": p.id} for p in world.pointed
-    ]
+    pointed = [p.brief for p in world.pointed]
     lines = {
         "Instruction": context.words,
         "Robots": settings.robots,
@@ -191,6 +189,8 @@ def in_new_picture(context: Context, picture: Picture) -> Context:
         shown=(),
         phrases=(),
     )
+    if context.settings.metres_per_pixel is None and world.metres_per_pixel is not None:
+        made = made.having(metres_per_pixel=world.metres_per_pixel)
     return context.at(made)
 
 

@@ -125,6 +125,8 @@ def target_data(target: Target) -> dict[str, Any]:
         "box": _box(target.box),
         "confidence": target.confidence,
         "parts": target.parts,
+        "found_from": target.prompt,
+        **({"note": target.note} if target.note else {}),
         "outline": outline,
         "holes": holes,
     }
@@ -170,7 +172,9 @@ def make_report(
     status, message = _status(outcome, plan, arrival, new=new)
     if plan is not None and (new or arrival is not None):
         message = _with_encounters(message, world.plans[plan.id])
-    notes = context.picture.notes
+    notes, said = context.picture.notes, context.picture.metres_per_pixel
+    if said not in (None, world.metres_per_pixel):
+        notes = (*notes, f"{world.metres_per_pixel:g} m per pixel is used, as the person gave it")
     return Report(
         status=status,
         message=message,

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_args
@@ -17,9 +17,13 @@ from ..tools.errors import InputError
 from ..tools.formation.contract import MAX_LENGTH, MAX_ROBOTS
 from ..tools.formation.quantities import quantities_in
 from ..tools.formation.units import COARSEST, FINEST
-from ..tools.perception.target_prompt import TargetPrompt
-from ..tools.store import read_text
+from ..tools.perception.image import Picture
+from ..tools.perception.imports.masks import masks_in
+from ..tools.perception.target_prompt import MAX_VERTICES, TargetPrompt
+from ..tools.store import read_bytes, read_text
 from ..tools.tool import violations
+
+Things = tuple[TargetPrompt, ...]
 
 
 def robots(text: str | None) -> int | None:
@@ -65,18 +69,23 @@ def numbers(
     clearance: str | None,
     threshold: str | None,
     seed: str,
+    picture: Picture | None,
 ) -> dict[str, Any]:
     """Robots, scale, the robots' radius, clearance, threshold and seed, as of Settings.
+
+    Args:
+        picture: whose file may say its scale.
 
     Raises:
         InputError: one of them is none, or not in its range.
     """
-    metres_per_pixel = scale(scale_text)
+    given = scale(scale_text)
+    known = picture.metres_per_pixel if picture is not None and given is None else given
     return {
         "robots": robots(robots_text),
-        "metres_per_pixel": metres_per_pixel,
-        "robot_radius": length("--robot-radius", radius, metres_per_pixel),
-        "clearance": length("--clearance", clearance, metres_per_pixel),
+        "metres_per_pixel": given,
+        "robot_radius": length("--robot-radius", radius, known),
+        "clearance": length("--clearance", clearance, known),
         "threshold": share("--threshold", threshold),
         "seed": whole("--seed", seed, least=0),
     }
@@ -200,10 +209,10 @@ def pointed(
         found.append({"box": tuple(values)})
     for text in outlines or []:
         values = _numbers(text, option or "--outline", "X1,Y1,X2,Y2,...")
-        if len(values) % 2 or not 6 <= len(values) <= 60:
+        if len(values) % 2 or not 6 <= len(values) <= 2 * MAX_VERTICES:
             raise InputError(
-                f"{option or '--outline'} {text!r} has {len(values)} numbers; give 3 to 30 "
-                "vertices as X1,Y1,X2,Y2,..."
+                f"{option or '--outline'} {text!r} has {len(values)} numbers; give 3 to "
+                f"{MAX_VERTICES} vertices as X1,Y1,X2,Y2,..."
             )
         found.append({"outline": tuple(zip(values[::2], values[1::2], strict=True))})
     for text in candidates or []:
@@ -215,6 +224,34 @@ def pointed(
         )
     except ValidationError as error:
         raise InputError(violations(error)) from None
+
+
+def shown(
+    ways: Sequence[list[str] | None], files: Sequence[Path] | None, picture: Picture | None
+) -> list[Things]:
+    """What was pointed at, then the things of mask files, those of one file together.
+
+    Args:
+        ways: points, boxes, outlines and candidates.
+
+    Raises:
+        InputError: as `pointed`; or a file cannot be read, or does not fit the picture.
+    """
+    if files and picture is None:
+        raise InputError("--mask needs the picture that it is of; name that too.")
+    points, boxes, outlines, candidates = ways
+    found: list[Things] = [(p,) for p in pointed(points, boxes, outlines, candidates)]
+    for file in files or ():
+        assert picture is not None
+        masks = masks_in(read_bytes(file), file.name, picture.size, picture)
+        found.append(tuple(TargetPrompt(label=m.label, mask=m.mask) for m in masks))
+    return found
+
+
+def numbered(groups: Iterable[Things]) -> Things:
+    """Things as t1, t2, ..."""
+    things = (thing for group in groups for thing in group)
+    return tuple(t.model_copy(update={"id": f"t{i}"}) for i, t in enumerate(things, start=1))
 
 
 def kept_out(texts: list[str] | None) -> tuple[TargetPrompt, ...]:

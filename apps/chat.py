@@ -17,12 +17,12 @@ from ..agent.service import Service
 from ..agent.store.places import data_folder, store_at
 from ..tools.context import Context, Settings
 from ..tools.errors import InputError
-from ..tools.perception.image import load_picture
-from ..tools.perception.target_prompt import TargetPrompt
+from ..tools.perception.image import Picture, load_picture
 from ..tools.store import read_text
 from . import arguments
 from . import options as o
 from .agents import agent_of
+from .arguments import Things
 from .chat_display import Display
 from .chat_keyboard import ask_plainly, lines_piped
 from .chat_lines import Talk
@@ -33,8 +33,8 @@ from .starts import starts as read_starts
 from .terminal import say
 from .terminal_picture import way_of_terminal
 
-POINTING = ("--point", "--box", "--outline", "--target")
-"""Options that point, in the order in which `arguments.pointed` has them."""
+POINTING = ("--point", "--box", "--outline", "--target", "--mask")
+"""Options that point, in the order in which `chat` reads them."""
 
 
 class InOrder(TyperCommand):
@@ -54,6 +54,7 @@ def chat(
     box: o.Boxes = None,
     outline: o.Outlines = None,
     target: o.Candidates = None,
+    mask: o.Masks = None,
     keep_out: o.KeepOuts = None,
     script: o.Script = None,
     session: o.SessionId = None,
@@ -83,14 +84,13 @@ def chat(
     seed: o.Seed = "0",
 ) -> None:
     """Talk to the team: what it shall do, changes, questions; /help says what else."""
-    fixed = arguments.numbers(robots, metres_per_pixel, robot_radius, clearance, threshold, seed)
+    picture, lengths = image and load_picture(image), (metres_per_pixel, robot_radius, clearance)
+    fixed = arguments.numbers(robots, *lengths, threshold, seed, picture)
     fixed |= {"descriptor": arguments.descriptor(descriptor), "starts": read_starts(starts)}
     fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
-    things = _in_order(arguments.pointed(point, box, outline, target), ctx.meta["words"])
-    begin = Beginning(image, session, things, arguments.kept_out(keep_out), Settings(**fixed))
-    rules, lines = ["deploy=refuse"] * plan_only + (policy or []), _lines(script, as_json)
-    if auto and plan_only:
-        raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
+    things = _in_order(ctx, arguments.shown((point, box, outline, target), mask, picture))
+    begin = Beginning(picture, session, things, arguments.kept_out(keep_out), Settings(**fixed))
+    rules, lines = _rules(policy, auto=auto, plan_only=plan_only), _lines(script, as_json)
     display = None if as_json else _display(plain=plain or lines is not None)
     chosen = partial(_agent, (planner, base_url, prompt, prompts, limit, rules), display, lines)
     with chosen(model) as agent, Folder(out) as home:
@@ -110,10 +110,10 @@ def _agent(
 class Beginning:
     """What a chat begins with: a picture and what was said of it, or a stored session."""
 
-    image: Path | None
+    picture: Picture | None
     session: str | None
-    pointed: tuple[TargetPrompt, ...]
-    keep_out: tuple[TargetPrompt, ...]
+    pointed: Things
+    keep_out: Things
     settings: Settings
 
     def open(self, service: Service) -> str:
@@ -122,9 +122,10 @@ class Beginning:
         Raises:
             InputError: nothing to begin with, or it cannot be used.
         """
-        picture = None if self.image is None else load_picture(self.image)
+        picture = self.picture
         if self.session is not None:
             service.reopen(self.session, picture)
+            service.point(self.session, *self.pointed)
             return self.session
         if picture is None:
             raise InputError("Name a picture to talk about, or a session to go on with.")
@@ -186,9 +187,21 @@ def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
     return None
 
 
-def _in_order(things: tuple[TargetPrompt, ...], words: Sequence[str]) -> tuple[TargetPrompt, ...]:
-    """Things, listed by the kind of their option, as t1, t2, ... in the order of the words."""
-    kinds = [POINTING.index(k) for word in words if (k := word.partition("=")[0]) in POINTING]
+def _rules(policy: list[str] | None, *, auto: bool, plan_only: bool) -> list[str]:
+    """The policy's rules, the first of which forbids to move where that is wanted.
+
+    Raises:
+        InputError: robots are to move at once as well.
+    """
+    if auto and plan_only:
+        raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
+    return ["deploy=refuse"] * plan_only + (policy or [])
+
+
+def _in_order(ctx: typer.Context, things: Sequence[Things]) -> Things:
+    """What each option gave, listed by kind, as t1, t2, ... in the order of the command line."""
+    words: list[str] = [word.partition("=")[0] for word in ctx.meta["words"]]
+    kinds = [POINTING.index(word) for word in words if word in POINTING]
     places = sorted(range(len(kinds)), key=lambda i: kinds[i])
-    given = [thing for _, thing in sorted(zip(places, things, strict=True), key=lambda p: p[0])]
-    return tuple(t.model_copy(update={"id": f"t{i}"}) for i, t in enumerate(given, start=1))
+    given = sorted(zip(places, things, strict=True), key=lambda p: p[0])
+    return arguments.numbered(group for _, group in given)

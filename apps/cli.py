@@ -63,6 +63,7 @@ def run(
     box: o.Boxes = None,
     outline: o.Outlines = None,
     target: o.Candidates = None,
+    mask: o.Masks = None,
     keep_out: o.KeepOuts = None,
     contract: o.ContractFile = None,
     plan_only: o.PlanOnly = False,
@@ -89,21 +90,17 @@ def run(
     seed: o.Seed = "0",
 ) -> None:
     """Carry out an instruction on a picture."""
-    fixed = Settings(
-        **arguments.numbers(robots, metres_per_pixel, robot_radius, clearance, threshold, seed),
-        detector=detector,
-        segmenter=segmenter,
-        descriptor=arguments.descriptor(descriptor),
-        fleet=fleet,
-        starts=read_starts(starts),
-        may_deploy=not plan_only,
-        numbered=numbered,
-    )
-    things = arguments.pointed(point, box, outline, target), arguments.kept_out(keep_out)
-    who, given = decided(contract, *things, fixed, model=model, planner=planner)
     picture, keep = load_picture(image), arguments.recording(record)
+    lengths = metres_per_pixel, robot_radius, clearance
+    fixed = arguments.numbers(robots, *lengths, threshold, seed, picture)
+    fixed |= {"descriptor": arguments.descriptor(descriptor), "starts": read_starts(starts)}
+    fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
+    settings = Settings(**fixed, may_deploy=not plan_only)
+    given = arguments.shown((point, box, outline, target), mask, picture)
+    things = arguments.numbered(given), arguments.kept_out(keep_out), settings
+    who, said = decided(contract, *things, model=model, planner=planner, picture=picture)
     with agent_of(*who, base_url, prompt, prompts, limit, policy) as agent, Folder(out) as home:
-        made = agent.run(picture, instruction, trace=home.trace, **given)
+        made = agent.run(picture, instruction, trace=home.trace, **said)
         raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
 
 

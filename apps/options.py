@@ -17,11 +17,19 @@ Boxes = Annotated[
 ]
 Outlines = Annotated[
     list[str] | None,
-    typer.Option("--outline", help="X1,Y1,X2,Y2,...: 3 to 30 rough vertices; repeatable."),
+    typer.Option("--outline", help="X1,Y1,X2,Y2,...: 3 to 200 rough vertices; repeatable."),
 ]
 Candidates = Annotated[
     list[str] | None,
     typer.Option("--target", help="A thing found in the picture, such as c3; repeatable."),
+]
+Masks = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--mask",
+        help="A file with the exact masks of things: PNG, COCO, LabelMe, GeoJSON or YOLO .txt; "
+        "repeatable.",
+    ),
 ]
 KeepOuts = Annotated[
     list[str] | None,

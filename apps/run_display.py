@@ -55,14 +55,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     for note in (report.image or {}).get("notes", ()):
         _line(console, "picture", note)
     for target in report.targets:
-        parts = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in target["parts"].items())
-        box = ", ".join(f"{v:g}" for v in target["box"])
-        _line(
-            console,
-            "found",
-            f"{target['id']}: {target['label']}, box ({box}), "
-            f"confidence {target['confidence']:.2f} ({parts})",
-        )
+        _show_target(console, target)
     if report.contract is not None and not (report.files or {}).get("contract"):
         for group in report.contract.groups:
             _line(console, "contract", group_words(group, _scale(report)))
@@ -79,6 +72,19 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     if report.candidates:
         _choices(console, report.candidates)
     _files(console, report, folder)
+
+
+def _show_target(console: Console, target: Mapping[str, Any]) -> None:
+    parts = ", ".join(f"{k.replace('_', ' ')} {v:.2f}" for k, v in target["parts"].items())
+    box = ", ".join(f"{v:g}" for v in target["box"])
+    _line(
+        console,
+        "found",
+        f"{target['id']}: {target['label']}, box ({box}), "
+        f"confidence {target['confidence']:.2f}{f' ({parts})' if parts else ''}",
+    )
+    if note := target.get("note"):
+        _line(console, "", note)
 
 
 def _files(console: Console, report: Report, folder: str) -> None:

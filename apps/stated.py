@@ -11,11 +11,12 @@ from ..tools.context import Settings
 from ..tools.errors import InputError, ToolError
 from ..tools.formation.contract import Contract
 from ..tools.formation.units import contract_in_pixels
+from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.store import read_text
 from ..tools.tool import violations
+from .arguments import Things
 
-Things = tuple[TargetPrompt, ...]
 Who = tuple[str | StatedContract, str | None]
 """The model that decides, and its planner."""
 CANDIDATE = re.compile(r'(?<!"text":)(?<!"text": )"(c[1-9][0-9]{0,3})"')
@@ -29,11 +30,13 @@ def decided(
     *,
     model: str,
     planner: str | None,
+    picture: Picture,
 ) -> tuple[Who, SayOptions]:
     """Who decides, and about what: the contract of a file if there is one, else the model.
 
     Args:
         kept: what no robot may enter; a contract may name it as k1, k2, ...
+        picture: whose file may say its scale.
 
     Raises:
         InputError: the file cannot be read, contradicts what else is given, or names what nothing
@@ -49,10 +52,11 @@ def decided(
     if missing:
         raise InputError(
             f"--contract {path} names {missing[0]!r}, which nothing points at; point at it with "
-            "--point, --box, --outline or --target, or name a thing in the picture such as c3."
+            "--point, --box, --outline, --target or --mask, or name a thing in the picture such as "
+            "c3."
         )
     try:
-        contract_in_pixels(contract, settings.metres_per_pixel)
+        contract_in_pixels(contract, settings.metres_per_pixel or picture.metres_per_pixel)
     except ToolError:
         raise InputError(
             f'The lengths of --contract {path} cannot be used; say "unit": "px" in it, or "m" for '

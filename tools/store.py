@@ -7,6 +7,7 @@ import hashlib
 import json
 import secrets
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from io import StringIO
 from pathlib import Path
 from typing import Any, cast
 
@@ -158,18 +159,29 @@ def read_text(path: Path) -> str:
     Raises:
         StorageError: missing, no regular file, too large, not readable or not UTF-8.
     """
+    data = read_bytes(path)
+    wide = data[:2] in (BOM_UTF16_LE, BOM_UTF16_BE)  # Excel and PowerShell write it, with its mark
+    try:
+        text = data.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeError:
+        raise StorageError(f"{path} is not JSON or text in UTF-8.") from None
+    return StringIO(text, newline=None).read()
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a file a person named.
+
+    Raises:
+        StorageError: missing, no regular file, too large or not readable.
+    """
     try:
         if path.exists() and not path.is_file():
             raise StorageError(f"{path} is no file that can be read.")
         if path.stat().st_size > MAX_BYTES:
             raise StorageError(f"{path} has more than {MAX_BYTES >> 20} MiB.")
-        with path.open("rb") as file:  # Excel and PowerShell write UTF-16, always with its mark
-            wide = file.read(2) in (BOM_UTF16_LE, BOM_UTF16_BE)
-        return path.read_text(encoding="utf-16" if wide else "utf-8-sig")
+        return path.read_bytes()
     except OSError as error:
         raise StorageError(f"{path}: {error.strerror or error}.") from None
-    except UnicodeError:
-        raise StorageError(f"{path} is not JSON or text in UTF-8.") from None
 
 
 def write_whole(path: Path, data: bytes) -> None:

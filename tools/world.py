@@ -51,12 +51,13 @@ class Target(Value):
         box: x0, y0, x1, y1.
         confidence: alpha, 0 to 1: self-consistency of the segmentation, not accuracy.
         outline: measured, holes kept.
-        prompt: what it was found from: point, box, outline or candidate.
+        prompt: what it was found from: point, box, outline, candidate or mask.
         parts: what alpha was made of.
-        source: what it was found from, if that was an outline somebody drew.
+        source: what it was found from, if that was an outline somebody drew, or a mask.
         missed: where the rough outline it was found from reaches out of `outline`, (x, y, by px).
         added: where `outline` reaches out of that, likewise.
         seen: whether a model was shown the outline to look at.
+        note: what a person should know of how it was found; often empty.
     """
 
     id: str
@@ -70,6 +71,7 @@ class Target(Value):
     added: tuple[Deviation, ...] = ()
     source: TargetPrompt | None = None
     seen: bool = False
+    note: str = ""
 
 
 class KeepOut(Value):
@@ -171,8 +173,12 @@ class World(Value):
 
     @classmethod
     def of(cls, picture: Picture, **parts: Any) -> "World":
-        """The world of a picture in which nothing has been found yet, or what `parts` give."""
+        """The world of a picture in which nothing has been found yet, or what `parts` give.
+
+        Its scale is the one its file says, if it does.
+        """
         facts = PictureFacts(sha256=picture.sha256, width=picture.width, height=picture.height)
+        parts.setdefault("metres_per_pixel", picture.metres_per_pixel)
         return cls(picture=facts, **parts)
 
     def having(self, **parts: Any) -> "World":

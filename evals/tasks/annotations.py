@@ -13,6 +13,8 @@ import jsonschema
 
 from ...agent.report import Status
 from ...tools.errors import InputError
+from ...tools.perception.imports.masks import masks_in
+from ...tools.store import read_bytes
 from .task import Drawing, Goal, Split, Task, Thing
 
 ANNOTATIONS = "annotations.json"
@@ -42,7 +44,26 @@ def read_entries(path: Path, entries: Any = None) -> list[Entry]:
     for entry in entries:
         if not (path.parent / entry["image"]).is_file():
             raise InputError(f"{path} names {entry['image']}, which is not there.")
-    return entries
+    return [entry | {"objects": _drawn_objects(entry, path.parent)} for entry in entries]
+
+
+def _drawn_objects(entry: Entry, folder: Path) -> list[Entry]:
+    """An entry's objects with their outlines; of those that name a mask file, from there."""
+    size, picture = (entry["width"], entry["height"]), Path(entry["image"]).name
+    found: list[Entry] = []
+    for thing in entry["objects"]:
+        if (file := thing.get("mask")) is not None:
+            masks = masks_in(read_bytes(folder / file), file, size, picture)
+            number = int(thing.get("thing", len(masks) == 1))
+            if not 1 <= number <= len(masks):
+                raise InputError(
+                    f"{thing['id']} of {picture}: {file} holds {len(masks)} things; say which is "
+                    f'meant, "thing": 1 to {len(masks)}.'
+                )
+            rings = masks[number - 1].mask.rings
+            thing = thing | {"polygon": rings[0], "holes": rings[1:]}
+        found.append(thing)
+    return found
 
 
 def check_format(content: Any, schema: Any, what: str) -> None:

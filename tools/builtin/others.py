@@ -53,12 +53,14 @@ def with_keep_outs(context: Context, prompts: Sequence[TargetPrompt]) -> World:
     """
     world = context.world
     for prompt in prompts:
+        prompt, done = prompt.mended()
         try:
             outline = _region(context, prompt)
         except ToolError as error:
             raise InputError(f"keep-out: {error}") from None
         name = f"k{sum(k.hard for k in world.keep_out) + 1}"
-        region = KeepOut(id=name, outline=outline, reason="to be kept free")
+        reason = f"to be kept free{f' ({done})' if done else ''}"
+        region = KeepOut(id=name, outline=outline, reason=reason)
         world = world.having(keep_out=(*world.keep_out, region))
     return world
 

@@ -41,6 +41,7 @@ def summary(target: Target) -> dict[str, Any]:
         "area_px": round(target.outline.area),
         "kind": target.outline.kind,
         "corners": len(target.outline.corners),
+        **({"note": target.note} if target.note else {}),
     }
     unlike = {"leaves_out_of_yours": target.missed, "adds_to_yours": target.added}
     return data | {name: _rounded_parts(parts) for name, parts in unlike.items() if parts}
@@ -119,6 +120,8 @@ def _measured(context: Context, prompt: TargetPrompt) -> Target:
     problems = prompt.problems(*context.world.picture.size)
     if problems:
         raise ToolError(" ".join(problems))
+    prompt, note = prompt.mended()
+    note = f"The outline drawn was mended: {note}." if note else ""
     segmenter = segmenter_named(context.settings.segmenter)
     candidate = None if prompt.candidate is None else context.candidate(prompt.candidate)
     try:
@@ -139,13 +142,21 @@ def _measured(context: Context, prompt: TargetPrompt) -> Target:
         parts={name: round(value, 3) for name, value in found.parts.items()},
         missed=missed,
         added=added,
-        source=None if prompt.outline is None else prompt,
+        source=prompt if prompt.how in ("outline", "mask") else None,
+        note=note if prompt.mask is None else f"Its mask is {prompt.mask.found_in}.",
     )
 
 
 def _correcting(world: World, prompt: TargetPrompt) -> TargetPrompt:
-    """The prompt, with the outline that its points correct if it has no way of its own."""
+    """The prompt, with the outline that its points correct if it has no way of its own.
+
+    What a person gave a mask of is that, however a model points at it.
+    """
+    pointed = next((p for p in world.pointed if p.id == prompt.id), None)
     known = next((t.source for t in world.targets if t.id == prompt.id), None)
+    for given in (pointed, known):
+        if given is not None and given.mask is not None:
+            return given
     if prompt.how == "point" and known is not None:
         mended = known.corrected_by(prompt)
         most = max(len(mended.points or ()), len(mended.negative))
@@ -165,6 +176,8 @@ def _correcting(world: World, prompt: TargetPrompt) -> TargetPrompt:
 
 def _threshold(context: Context, how: str) -> float:
     """The least confidence a mask pointed at in that way is used at."""
+    if how == "mask":
+        return 0.0
     chosen = context.settings.threshold
     return segmenter_named(context.settings.segmenter).thresholds[how] if chosen is None else chosen
 

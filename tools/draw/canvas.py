@@ -81,7 +81,11 @@ class Canvas:
         self.offset = np.array([left, top], dtype=float)
         self.size = (left + width + right, top + height + bottom)
         self.photo: Box = (left, top, left + width, top + height)
-        photo = Image.fromarray(picture.pixels).resize((width, height), Image.Resampling.LANCZOS)
+        photo = Image.fromarray(picture.pixels).resize(
+            (width, height),
+            Image.Resampling.LANCZOS,
+            reducing_gap=1.0,  # a photograph twice as large or more is first averaged, far quicker
+        )
         self._image = Image.new("RGB", (self.size[0] * FINE, self.size[1] * FINE), INK)
         # Repeating pixels is what averaging down undoes without loss.
         fine = photo.resize((width * FINE, height * FINE), Image.Resampling.NEAREST)

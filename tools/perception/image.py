@@ -22,11 +22,14 @@ from PIL import ExifTags, Image, TiffImagePlugin, UnidentifiedImageError, featur
 
 from ..errors import ImageError
 from .deep_values import as_8_bits
+from .geotiff import Georeference, georeference_of
 
 MAX_FILE_BYTES = 64 * 2**20
 MAX_PIXELS = 50_000_000
 MAX_SIDE = 20_000
 MIN_SIDE = 16
+STRIP = 64
+"""Rows that are copied at a time: few enough to stay in the processor's cache."""
 
 # A closed list: Pillow reads dozens of rare formats whose decoders are little tested.
 _FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "GIF", "TIFF") + (
@@ -67,6 +70,7 @@ class Picture:
     notes: what a person should know of how the pixels came about; often empty.
     path: absolute, of the file it was loaded from; None where it came from none.
     file: the content of the file, where it has no path.
+    place: on a map, of a GeoTIFF.
     """
 
     pixels: NDArray[np.uint8]
@@ -75,6 +79,12 @@ class Picture:
     notes: tuple[str, ...]
     path: Path | None = None
     file: bytes | None = None
+    place: Georeference | None = None
+
+    @property
+    def metres_per_pixel(self) -> float | None:
+        """As its file says; a resolution for printing (DPI) says nothing of the ground."""
+        return None if self.place is None else self.place.metres_per_pixel
 
     @property
     def width(self) -> int:
@@ -120,8 +130,9 @@ def picture_from_bytes(data: bytes, name: str) -> Picture:
     if not data:
         raise _empty(name)
     _check_bytes(name, len(data))
-    pixels, notes = _decode(data, name)
-    return Picture(pixels, hashlib.sha256(data).hexdigest(), name, notes, file=data)
+    pixels, place, notes = _decode(data, name)
+    sha256 = hashlib.sha256(data).hexdigest()
+    return Picture(pixels, sha256, name, notes, file=data, place=place)
 
 
 def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Picture:
@@ -232,7 +243,9 @@ def _too_many_pixels(name: str, claim: str) -> ImageError:
     )
 
 
-def _decode(data: bytes, name: str) -> tuple[NDArray[np.uint8], tuple[str, ...]]:
+def _decode(
+    data: bytes, name: str
+) -> tuple[NDArray[np.uint8], Georeference | None, tuple[str, ...]]:
     try:
         with _pillow_silenced(), Image.open(BytesIO(data), formats=_FORMATS) as opened:
             _check_size(name, *opened.size)
@@ -243,14 +256,17 @@ def _decode(data: bytes, name: str) -> tuple[NDArray[np.uint8], tuple[str, ...]]
             # Some decoders learn the true size only now.
             _check_size(name, *opened.size)
             shallow, deep = as_8_bits(opened, colours)
-            pixels, note = _to_rgb(_upright(shallow, opened))
+            upright = _upright(shallow, opened)
+            place = georeference_of(opened) if upright is shallow else None
+            pixels, note = _to_rgb(upright)
     except ImageError:
         raise
     # Over the years Pillow's readers have let out nearly every built-in exception.
     except Exception as error:
         raise _undecodable(name, data, error) from None
     pixels.setflags(write=False)
-    return pixels, tuple(text for text in (frames, deep, note) if text)
+    mapped = place.note if place is not None else ""
+    return pixels, place, tuple(text for text in (frames, deep, note, mapped) if text)
 
 
 @contextmanager
@@ -320,4 +336,13 @@ def _to_rgb(image: Image.Image) -> tuple[NDArray[np.uint8], str]:
         canvas = Image.new("RGB", image.size, "white")
         canvas.paste(image, mask=image)
         image = canvas
-    return np.asarray(image.convert("RGB")), note
+    return _pixels_of(image if image.mode == "RGB" else image.convert("RGB")), note
+
+
+def _pixels_of(image: Image.Image) -> NDArray[np.uint8]:
+    """An RGB picture's pixels; Pillow's own way copies all of them twice more."""
+    pixels = np.empty((image.height, image.width, 3), dtype=np.uint8)
+    for top in range(0, image.height, STRIP):
+        bottom = min(top + STRIP, image.height)
+        pixels[top:bottom] = np.asarray(image.crop((0, top, image.width, bottom)))
+    return pixels

@@ -9,7 +9,7 @@ from shapely.geometry import MultiPoint
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import ToolError
-from ..geometry.outline import Outline, distances
+from ..geometry.outline import Outline, distances, outline_of
 from .contours import outline_of_mask
 from .detectors.candidates import segment_candidate
 from .image import Picture
@@ -51,6 +51,8 @@ def measure_outline(
         ToolError: the segmenter does not take such a prompt; the text says which it takes.
         InputError: the mask is empty or in pieces.
     """
+    if prompt.mask is not None:
+        return Measured(outline_of(prompt.mask.region), 1.0, {})
     if candidate is not None and candidate.named:
         named = max(candidate.named, key=lambda n: n.score)
         parts = {**named.parts, "detector_score": named.score}

@@ -1,9 +1,12 @@
-"""How a thing is pointed at: by candidate, text, box, points or rough outline, checked."""
+"""How a thing is pointed at: candidate, text, box, points, rough outline, or somebody's mask."""
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic.json_schema import SkipJsonSchema
 from shapely.geometry import Polygon
+
+from ..geometry.mending import mended
 
 _Number = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
 _PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
@@ -13,8 +16,29 @@ Box = Annotated[tuple[_Number, _Number, _Number, _Number], WithJsonSchema(_FOUR)
 
 MAX_POINTS = 20
 """Points of a kind."""
+MAX_VERTICES = 200
+"""Of an outline that somebody draws."""
 MIN_SIDE = 2.0
 """Smallest side of a box, px."""
+
+
+class Mask(BaseModel):
+    """A thing's exact region, which is taken as it is.
+
+    Attributes:
+        rings: around it, then around its holes, (x, y) px.
+        found_in: where it is from, and what was done to it.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rings: tuple[Annotated[tuple[Point, ...], Field(min_length=3)], ...] = Field(min_length=1)
+    found_in: str = Field(max_length=1_000)
+
+    @property
+    def region(self) -> Polygon:
+        """It as a polygon."""
+        return Polygon(self.rings[0], self.rings[1:])
 
 
 class TargetPrompt(BaseModel):
@@ -33,20 +57,23 @@ class TargetPrompt(BaseModel):
     box: Box | None = None
     points: tuple[Point, ...] | None = Field(default=None, min_length=1, max_length=MAX_POINTS)
     negative: tuple[Point, ...] = Field(default=(), max_length=MAX_POINTS)
-    outline: tuple[Point, ...] | None = Field(default=None, min_length=3, max_length=30)
+    outline: tuple[Point, ...] | None = Field(default=None, min_length=3, max_length=MAX_VERTICES)
     straight: bool = False
+    mask: SkipJsonSchema[Mask | None] = None  # from a file; no model is to write one
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        leading = [self.candidate, self.text, self.box, self.outline]
+        leading = [self.candidate, self.text, self.box, self.outline, self.mask]
         given = sum(way is not None for way in leading)
         if given == 0 and self.points is None and not self.negative:
             raise ValueError("give a candidate, a text, a box, points or an outline")
         if given > 1:
             raise ValueError("give one of candidate, text, box and outline")
-        if (self.candidate or self.text) and (self.points or self.negative):
-            named = "candidate" if self.candidate else "text"
-            raise ValueError(f"a {named} takes no points; give an outline of yours instead")
+        if self.mask is not None and not (self.mask.region.is_valid and self.mask.region.area):
+            raise ValueError("the mask's rings cross, or enclose nothing")
+        if (self.candidate or self.text or self.mask) and (self.points or self.negative):
+            what = "mask" if self.mask else "candidate" if self.candidate else "text"
+            raise ValueError(f"a {what} takes no points; give an outline of yours instead")
         if self.straight and self.outline is None:
             raise ValueError("straight belongs to an outline")
         return self
@@ -58,8 +85,25 @@ class TargetPrompt(BaseModel):
         return self.model_copy(update=update | ({"label": later.label} if later.label else {}))
 
     @property
+    def brief(self) -> dict[str, Any]:
+        """As JSON, with its box alone in place of a mask."""
+        box = {} if self.mask is None else {"box": self.mask.region.bounds}
+        given = self.model_dump(mode="json", exclude_defaults=True, exclude={"mask"})
+        return given | {"id": self.id} | box
+
+    def mended(self) -> tuple["TargetPrompt", str]:
+        """The prompt with an outline that does not cross itself, and what was done to it if so."""
+        made = None if self.outline is None else _mended_outline(self.outline)
+        if made is None:
+            return self, ""
+        region, done = made
+        return self.model_copy(update={"outline": tuple(region.exterior.coords[:-1])}), done
+
+    @property
     def how(self) -> str:
-        """The way of pointing that leads: candidate, text, outline, box or point."""
+        """The way of pointing that leads: mask, candidate, text, outline, box or point."""
+        if self.mask is not None:
+            return "mask"
         if self.candidate is not None or self.text is not None:
             return "candidate" if self.candidate is not None else "text"
         if self.outline is not None:
@@ -68,16 +112,17 @@ class TargetPrompt(BaseModel):
 
     def problems(self, width: int, height: int) -> list[str]:
         """All that makes it unusable on a picture of this size; each one sentence."""
-        allowed = _picture_extent(width, height)
         found = [
-            f"The point ({x:g}, {y:g}) lies outside the picture; {allowed}."
+            f"The point ({x:g}, {y:g}) lies outside the picture; {_picture_extent(width, height)}."
             for x, y in (*(self.points or ()), *self.negative)
             if not (0 <= x <= width - 1 and 0 <= y <= height - 1)
         ]
         if self.box is not None:
             found += box_problems(self.box, width, height)
         if self.outline is not None:
-            found += _outline_problems(self.outline, width, height, allowed)
+            found += _outline_problems(self.outline, width, height)
+        if self.mask is not None:
+            found += _region_problems(self.mask.region, "mask", width, height)
         return found
 
 
@@ -99,15 +144,28 @@ def _picture_extent(width: int, height: int) -> str:
     return f"the picture is {width} x {height} px (x 0 to {width - 1}, y 0 to {height - 1})"
 
 
-def _outline_problems(
-    outline: tuple[Point, ...], width: int, height: int, allowed: str
-) -> list[str]:
+def _outline_problems(outline: tuple[Point, ...], width: int, height: int) -> list[str]:
     region = Polygon(outline)
     if region.convex_hull.area < MIN_SIDE**2:
         return ["The outline is empty: its vertices enclose less than 4 square px."]
     if not region.is_valid:
-        return ["The outline crosses itself; give its vertices in order around the thing."]
+        made = _mended_outline(outline)
+        if made is None:
+            return ["The outline crosses itself; give its vertices in order around the thing."]
+        region = made[0]
+    return _region_problems(region, "outline", width, height)
+
+
+def _mended_outline(outline: tuple[Point, ...]) -> tuple[Polygon, str] | None:
+    """An outline that crosses itself, mended; None for one that does not, or cannot be."""
+    made = None if Polygon(outline).is_valid else mended(outline)
+    if made is None or len(made[0].exterior.coords) - 1 > MAX_VERTICES:
+        return None
+    return made
+
+
+def _region_problems(region: Polygon, what: str, width: int, height: int) -> list[str]:
     frame = Polygon([(0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)])
     if region.intersection(frame).area < MIN_SIDE**2:
-        return [f"The outline lies outside the picture; {allowed}."]
+        return [f"The {what} lies outside the picture; {_picture_extent(width, height)}."]
     return []

@@ -1,0 +1,62 @@
+"""Mends outlines that cross themselves where it is clear what was meant.
+
+A hand that closes an outline overshoots, or names two vertices in the wrong order: such a crossing
+says nothing of the thing.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from .outline import largest_part
+
+WHOLE = 0.9
+"""The share of all that is enclosed which one part must hold to stand for it."""
+MOST_VERTICES, MOST_CROSSINGS = 2_000, 50
+"""What has more is a scribble, of which every part would take long to find."""
+MOST_SWAPPED = 60
+"""Vertices up to which it is tried whether two of them changed places."""
+AS_SHORT, ALIKE = 1.1, 0.8
+"""Another order, no longer than so many times the shortest, must overlap with it so far."""
+
+
+def mended(vertices: Sequence[tuple[float, float]]) -> tuple[Polygon, str] | None:
+    """An outline that crosses itself as one that does not, and what was done in words.
+
+    None where it could mean several things.
+    """
+    if len(vertices) > MOST_VERTICES or _crossings(vertices) > MOST_CROSSINGS:
+        return None
+    orders = _swapped(vertices) if len(vertices) <= MOST_SWAPPED else []
+    near = [p for p in orders if p.length <= AS_SHORT * orders[0].length]
+    if near and all(_overlap(near[0], other) >= ALIKE for other in near):
+        return near[0], "it crossed itself, and two vertices changed places"
+    faces = shapely.polygonize([shapely.node(Polygon(vertices).exterior)])
+    whole = largest_part(faces)
+    if whole is not None and whole.area >= WHOLE * faces.area:
+        return Polygon(whole.exterior), "it crossed itself, and a small loop was left out"
+    return None
+
+
+def _crossings(vertices: Sequence[tuple[float, float]]) -> int:
+    """How often its sides meet beside where one follows the other."""
+    ring = np.asarray(vertices, dtype=float)
+    sides = np.asarray(shapely.linestrings(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)))
+    pairs = shapely.STRtree(sides).query(sides, predicate="intersects")
+    return (pairs.shape[1] - 3 * len(ring)) // 2
+
+
+def _swapped(vertices: Sequence[tuple[float, float]]) -> list[Polygon]:
+    """The outlines that do not cross themselves once two vertices change places, shortest first."""
+    pairs = np.array(list(combinations(range(len(vertices)), 2)))
+    order = np.tile(np.arange(len(vertices)), (len(pairs), 1))
+    np.put_along_axis(order, pairs, pairs[:, ::-1], axis=1)
+    made = [Polygon(ring) for ring in np.asarray(vertices)[order]]
+    return sorted((p for p in made if p.is_valid), key=lambda p: p.length)
+
+
+def _overlap(one: Polygon, other: Polygon) -> float:
+    return float(one.intersection(other).area / one.union(other).area)

@@ -1,0 +1,1 @@
+"""Masks that other programs made: from a file to the regions of things in a picture."""
