@@ -137,7 +137,7 @@ def _sample(
 
 @lru_cache(maxsize=1)
 def _loaded(path: Path) -> Picture:
-    return load_loaded(path)
+    return load_picture(path)
 
 
 def _bare_seconds(pixels: Bytes, box: Sequence[float]) -> float:
