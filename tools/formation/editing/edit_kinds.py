@@ -102,10 +102,11 @@ class Scale(_GroupEdit):
 
 
 class Add(_GroupEdit):
-    """More robots; they take the last numbers of their group."""
+    """More robots; they take the last numbers of their group, or stand so around another thing."""
 
     kind: Literal["add"] = "add"
     n: Number
+    to: str | None = None
 
 
 class Remove(_GroupEdit):
@@ -237,7 +238,7 @@ EDIT_SCHEMA: dict[str, Any] = {
     "description": (
         "Kinds: out, in: px or factor. distance: px from the outline. spacing: px or factor. "
         "rotate: degrees clockwise. mirror: axis left-right or top-bottom. shift: dx, dy. scale: "
-        "factor. add: n. remove: n or robots (numbers); others close up. count: robots, a number, "
+        "factor. add: n, to an id. remove: n or robots (numbers); others close up. count: robots, a number, "
         "needed (to close the ring) or fit (px apart). swap: a, b. skip: robots; places stay "
         "empty. side: all to it. sides: only or without, lists. opening: towards, px wide or "
         "factor. close, open, escape-proof. arrange: demands, fields of a group. target: to an "

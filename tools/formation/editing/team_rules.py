@@ -36,7 +36,7 @@ from .edit_kinds import (
 )
 from .moving import carried_out
 from .part import ON_CURVE, Part, check_known, closed_up, skipped
-from .regrouping import arranged, left_of, merged, more_of, targeted, without
+from .regrouping import added_about, arranged, left_of, merged, more_of, targeted, without
 from .ring_rules import closed, ringed
 from .staying import alone
 
@@ -81,6 +81,8 @@ def _fewer(draft: Draft, k: int, n: int) -> Draft:
 
 
 def _added(draft: Draft, edit: Add) -> Draft:
+    if edit.to is not None:
+        return added_about(draft, edit.group or 1, edit.n, edit.to)
     return draft.with_each(draft.chosen(edit), lambda part: more_of(part, edit.n))
 
 
