@@ -78,7 +78,7 @@ class Line:
             found.pop()  # "the lower one, i mean"
         if any({"stay", "except"} & set(c.kinds) for c in found) and not self._leaving(found):
             found = [_as_team(c) if "rest" in c.kinds else c for c in found]
-        self.chunks = self._without_excepted(self._without_lead(found))
+        self.chunks = self._without_excepted(_without_contrast(self._without_lead(found)))
 
     def _leaving(self, chunks: Sequence[Chunk]) -> bool:
         """Whether robots leave, or the others are said to stay."""
@@ -157,7 +157,10 @@ class Line:
         """The clause, where a frame takes it whole and uses all of it."""
         asks, only_asks = self._asks()
         edits = tuple(e for e in before if e["kind"] not in NO_EDITS)
-        said = Said(self.standing, self.words_of(chunks), edits, denies=self.denies)
+        phrases = tuple((c, self.words[c.start : c.end]) for c in chunks)
+        said = Said(
+            self.standing, self.words_of(chunks), edits, self.denies, phrases, self.words
+        )
         for frame in frames():
             if (frame.asks and not asks) or (
                 only_asks and not frame.asks and frame.name not in TALK
@@ -191,9 +194,11 @@ class Line:
     def _of_team(self, effect: Effect, chunks: Sequence[Chunk], words: str) -> Effect:
         """The edit for the group whose thing is named; which one is asked where it has to be."""
         kind, groups = effect["kind"], self.standing.groups
-        if len(groups) < 2 or "group" in effect:
+        if len(groups) < 2 or "group" in effect or (kind == "add" and "to" in effect):
             return effect
         named = [str(c.kinds["current"]) for c in chunks if "current" in c.kinds]
+        if kind == "heading":
+            named = [name for name in named if name != effect["to"]]
         found = [k for k, g in enumerate(groups, 1) if named and named[-1] in g.get("targets", ())]
         if found and kind in (*OF_TEAMS, *OF_A_TEAM):
             return effect | {"group": found[0]}
@@ -221,8 +226,8 @@ class Line:
         if robots and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
         amounts = bool(after) and all({"px", "angle"} & set(c.kinds) for c in after)
-        if amounts and self.standing.said not in ("", self.standing.words):
-            return self._of_words(self.standing.said, after)
+        if after and (amounts or self.denies) and self.standing.said not in ("", self.standing.words):
+            return self.clauses(after) if self.adds else self._of_words(self.standing.said, after)
         if not self.standing.words or not after or not (self.denies or (too and robots)):
             return None
         if robots and not self.denies:
@@ -285,6 +290,24 @@ def _commanding(chunks: Sequence[Chunk]) -> list[Chunk]:
     return found
 
 
+def _without_contrast(chunks: list[Chunk]) -> list[Chunk]:
+    """The phrases without what is said not to be meant: "to the left, not the right"."""
+    for k, chunk in enumerate(chunks[:-1]):
+        no, after = chunks[k + 1], chunks[k + 2 :]
+        rest = [*chunks[:k], *after]
+        ended = not after or "sep" in after[0].kinds
+        if "neg" in chunk.kinds and set(chunk.kinds) <= {"neg", "clear"} and ended and any(_alike(no, c) for c in rest):
+            return rest[:-1] if rest and "sep" in rest[-1].kinds else rest
+    return chunks
+
+
+def _alike(a: Chunk, b: Chunk) -> bool:
+    """Whether two phrases say the same kind of thing, and not the same."""
+    kinds = [k for k in (*REPLACED, *AMOUNTS) if k in a.kinds and k in b.kinds]
+    found = not str(a.kinds.get("thing", "")).startswith("?")
+    return found and bool(kinds) and all(a.kinds[k] != b.kinds[k] for k in kinds)
+
+
 def _as_team(chunk: Chunk) -> Chunk:
     """A phrase for the others as one for all that are not said to stay."""
     return replace(chunk, kinds={"team": ""})
@@ -308,12 +331,15 @@ def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
     """The phrases of a clause with others put in; None where one has no place there."""
     chunks, changed = list(clause.chunks), False
     for new in after:
-        at = next((k for k in range(len(chunks) - 1, -1, -1) if _stands_for(new, chunks[k])), None)
+        fits = [k for k in range(len(chunks) - 1, -1, -1) if _stands_for(new, chunks[k])]
+        fits.sort(key=lambda k: "much" in chunks[k].kinds)  # "a bit" is no number
+        at = next(iter(fits), None)
         kinds = set(new.kinds)
         if at is not None:
-            unit = next((u for u in ("px", "angle") if u in chunks[at].kinds), "")
-            bare = unit and "num" in kinds
-            chunks[at] = replace(new, kinds={unit: new.kinds["num"]}) if bare else new
+            unit = next((u for u in ("px", "angle", "robots") if u in chunks[at].kinds), "")
+            bare = unit if "num" in kinds else ""
+            value = (int(new.kinds["num"]),) if bare == "robots" else new.kinds.get("num")
+            chunks[at] = replace(new, kinds={bare: value}) if bare else new
             changed = True
         elif kinds & {*AMOUNTS} or (clause.frame == "rotate" and kinds & {"dir", "spin"}):
             chunks.append(new)
@@ -326,6 +352,7 @@ def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
 def _stands_for(new: Chunk, old: Chunk) -> bool:
     """Whether a phrase can be put in the place of another: both say the same kind of thing."""
     amounts = bool(set(new.kinds) & {*AMOUNTS}) and bool(set(old.kinds) & {*AMOUNTS})
+    amounts = amounts or ("num" in new.kinds and "robots" in old.kinds)
     return amounts or bool(set(new.kinds) & set(old.kinds) & {*REPLACED})
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from ...tools.formation.number_words import SMALL
 from .followup_frames import Slots
+from .followup_words import Chunk
 from .standing import Standing
 
 Effect = dict[str, Any]
@@ -57,12 +58,16 @@ class Said:
         words: of the clause.
         before: effects of the clauses before it in the same line.
         denies: whether the line begins with "no".
+        phrases: of the clause, each with its words.
+        line: all that was said.
     """
 
     standing: Standing
     words: str = ""
     before: tuple[Mapping[str, Any], ...] = ()
     denies: bool = False
+    phrases: tuple[tuple[Chunk, str], ...] = ()
+    line: str = ""
 
     @property
     def last(self) -> list[Effect]:
@@ -147,6 +152,8 @@ def ratio(slots: Slots, said: Said) -> Effects:
 def distance(slots: Slots, said: Said) -> Effects:
     """Exactly so far from the thing; at least, or at most, is so far too."""
     slots.has("bound")
+    if any(r != said.standing.relation for r in slots.get("relation", ())):
+        return None
     length = float(slots["px"][0]) if "px" in slots else bare_length(slots)
     return None if length is None else [{"kind": "distance", "px": length}]
 
@@ -334,7 +341,9 @@ def heading(slots: Slots, said: Said) -> Effects:
     if "unface" in slots or "current" in slots:
         return [{"kind": "heading", "to": "towards" if "current" in slots else None}]
     if "there" in slots or "other" in slots or "thing" in slots:
-        to = where(slots, said, "face {}")
+        named = [c.kinds.get("thing", c.kinds.get("current")) for c, _ in said.phrases]
+        last = [name for name in named if name][-1:]  # "those at t1 face t2"
+        to = where(Slots({**slots, "thing": last}) if "thing" in slots else slots, said, "face {}")
         return to if isinstance(to, list) else [{"kind": "heading", "to": to}]
     for name in ("dir", "side"):
         if name in slots and slots[name][0] in DEGREES:

@@ -6,6 +6,7 @@ from .followup_edits import (
     OPPOSITE,
     RINGS,
     SIDE_OF,
+    SIDES,
     Effect,
     Effects,
     Said,
@@ -163,6 +164,17 @@ def opened(slots: Slots, said: Said) -> Effects:
     return [{"kind": "open"}] if said.standing.relation == "cage" else [{"kind": "opening"}]
 
 
+def widened(slots: Slots, said: Said) -> Effects:
+    """The one side that was left free is stood on too."""
+    side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]), "")
+    taken = list(said.standing.groups[0].get("sides") or ())
+    slots.has("add", "again", "close", "back", "too")
+    filled = {*slots.get("relation", ())} <= {"inside", "around"}
+    return [{"kind": "close"}] if filled and {*taken, side} == {*SIDES} != {*taken} else None
+
+
 def cage(slots: Slots, said: Said) -> Effects:
-    """Nothing gets out."""
+    """Nothing gets out, as close in as that takes."""
+    if "radial" in slots and "asclose" not in slots:
+        return None
     return [{"kind": "escape-proof"}]

@@ -21,6 +21,8 @@ from .followup_edits import (
     shift,
 )
 from .followup_frames import Slots
+from .followup_teams import count
+from .followup_words import chunks_of
 
 RELATIVE = (
     *("out", "in", "rotate", "shift", "scale", "spacing", "place", "add", "remove"),
@@ -30,6 +32,8 @@ RELATIVE = (
 BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
 STATED = 2.0
 """Widest range, px, of a distance that was stated."""
+CHOSEN = re.compile(r"\bnot\b|\b(?:then|sorry|i mean(?:t)?|rather|instead)\W*$", re.IGNORECASE)
+"""What says that something is chosen: "six then", "7, not 5"."""
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
@@ -291,7 +295,7 @@ def inverse(edit: Effect) -> Effect | None:
         return edit
     if edit["kind"] in ("add", "remove"):
         other = {"add": "remove", "remove": "add"}[edit["kind"]]
-        return {"kind": other, "n": edit["n"]} if "n" in edit else None
+        return edit | {"kind": other} if "n" in edit and "to" not in edit else None
     return _scaled(edit, -1.0) if edit["kind"] in RELATIVE else None
 
 
@@ -340,10 +344,21 @@ def bare(slots: Slots, said: Said) -> Effects:
     last = said.last[-1] if len(said.last) == 1 else {}
     if "num" in slots and "px" in last and last["kind"] in ("distance", "spacing", "opening"):
         return [last | {"px": float(slots["num"][0])}]
+    if "num" in slots and _is_count(said):
+        return count(Slots(num=slots["num"]), said)
     if "num" in slots:
         n = f"{slots['num'][0]:g}"
         return ask(f"{n} of what?", f"make it {n} in all", f"{n} more", f"turn it {n} degrees")
     return ask(f'What should change, in "{said.words}"?', *MOVES[1:])
+
+
+def _is_count(said: Said) -> bool:
+    """Whether a bare number is one of robots: they were counted last, or it corrects the first."""
+    if any("howmany" in c.kinds for c in chunks_of(said.standing.said, said.standing)):
+        return True
+    counted = {e["kind"] for e in said.last} <= {"count"}
+    chosen = said.denies or CHOSEN.search(said.line) is not None
+    return counted and chosen and len(said.standing.groups) < 2
 
 
 def _is_at_length(said: Said) -> bool:

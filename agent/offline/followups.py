@@ -233,7 +233,7 @@ def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
     stated = [k for k in ("distance", "count", "sides", "side") if alone.count(k) > 1]
     if stated:
         return _questioned(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
-    parted = [e["to"] for e in edits if e["kind"] == "target" and e.get("robots")]
+    parted = [e["to"] for e in edits if e["kind"] == "target" and e.get("robots") and "group" not in e]
     if len(set(parted)) < len(parted):
         return _questioned(line, f'"{line.words}": which robots are to go, and where? Name them.')
     if alone.count("target") > 1:
