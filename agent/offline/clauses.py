@@ -318,6 +318,11 @@ def is_empty(chunk: Chunk) -> bool:
     return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= SLIGHT
 
 
+def is_part(chunk: Chunk) -> bool:
+    """Whether a phrase only names what a command is about: a robot, an amount, a side, a thing."""
+    return bool(set(chunk.kinds) & {*REPLACED, *AMOUNTS, *rules()["common"], "yes", "current"})
+
+
 def _is_kind(chunk: Chunk) -> bool:
     """Whether a phrase is no more than thanks or a greeting, or says nothing beside one."""
     return bool({"thanks", "hello"} & set(chunk.kinds)) or is_empty(chunk)

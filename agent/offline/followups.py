@@ -11,7 +11,7 @@ from typing import Literal
 
 from .accounting import read_instruction
 from .asides import without_asides
-from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty
+from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty, is_part
 from .drafting import contract_of
 from .drawn_forms import form_in
 from .followup_edits import Effect, listed
@@ -134,6 +134,13 @@ def _read(words: str, standing: Standing | None) -> Followup:
     if standing is None:
         return _without_plan(line, clauses)
     return _not_framed(line) if clauses is None else _gathered(line, clauses)
+
+
+def commands(words: str, standing: Standing) -> bool:
+    """Whether words are a command of their own, not only what another one leaves open."""
+    line = Line(words, standing)
+    verbs = (c for c in line.chunks if {"make", "move"} & set(c.kinds) or not is_part(c))
+    return any(verbs) and read_followup(words, standing).kind not in ("ask", "refuse", "instruction")
 
 
 def _afresh(line: Line) -> str:
