@@ -31,6 +31,12 @@ OFF = re.compile(
     re.IGNORECASE,
 )
 """What comes before a thing that is to be kept clear of."""
+NOT = re.compile(
+    r"[,;]?\s*(?:(?:and|but)\s+)?(?:not|rather than|instead of)\s+"
+    r"(?:(?:a?round|about|at)\s+)?(?:the\s+)?$",
+    re.IGNORECASE,
+)
+"""What comes before a thing that is said not to be meant."""
 SEVERAL = re.compile(
     r"\b(?:each|every|both|all)\b(?: of)?(?: the| these| those)?\s*$", re.IGNORECASE
 )
@@ -60,6 +66,11 @@ def narrowed(task: Task, history: History) -> Task | Step:
         named = [(named[0][0], str(task.pointed[0]["id"]))]
     if len(task.pointed) < 2 and named[0][1] not in centres:
         return task
+    for chunk, name in named[1:] if len(task.pointed) > 1 else ():
+        denied = NOT.search(task.instruction[: chunk.start])
+        if denied and name != named[0][1]:
+            text = f"{task.instruction[: denied.start()]}{task.instruction[chunk.end :]}"
+            return narrowed(replace(task, instruction=text), history)
     kept_off = _clear_of(task, named, centres)
     if kept_off is not None or len({name for _, name in named}) > 1:
         return kept_off or task
