@@ -212,6 +212,9 @@ class Line:
 
     def _corrected(self) -> list[Clause] | None:
         """What is meant after "no wait", or of what was said last, if this corrects or adds."""
+        own = self.clauses(self.chunks) if self.denies else None
+        if own and all(c.frame == "allotted" and c.settled for c in own):
+            return own
         marks = [k for k, c in enumerate(self.chunks) if k and {"correction", "no"} & set(c.kinds)]
         if marks and marks[-1] < len(self.chunks) - 1:
             first = [c for c in self.chunks[: marks[-1]] if not {"correction", "no"} & set(c.kinds)]

@@ -35,6 +35,8 @@ EXACT = re.compile(
     rf"\bto (?:exactly |about |just |only |some )?(?:[0-9]|(?:{'|'.join(SMALL)})\b)", re.IGNORECASE
 )
 """The whole of it, not a change: "increase it to 60 px"."""
+LESSER = re.compile(r"\W*(?:not (?:so|as|that|quite)|less)\b", re.IGNORECASE)
+"""Takes a part of the last change back: "not so tight"."""
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
@@ -243,6 +245,10 @@ def resized(slots: Slots, said: Said) -> Effects:
 def snug(slots: Slots, said: Said) -> Effects:
     """Tighter, looser: from robot to robot, in a row or after a word about that."""
     apart = bool(said.last) and said.last[-1]["kind"] == "spacing"
+    if apart and LESSER.match(said.words) and "factor" in said.last[-1] and len(slots) == 1:
+        last = said.last[-1]["factor"]
+        if (last < 1) == (slots["snug"][0] == "wide"):
+            return [{"kind": "spacing", "factor": rounded((1 + last) / 2 / last)}]
     if not apart and said.standing.relation not in ROWS:
         return None
     factor = factor_of(slots)

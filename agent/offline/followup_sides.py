@@ -156,6 +156,8 @@ def close(slots: Slots, said: Said) -> Effects:
     if slots.has("back", "undo") and said.standing.changes:
         opened = [e["kind"] for e in said.standing.edits] == ["opening"]
         return [{"kind": "undo", "steps": 1}] if opened else [{"kind": "close"}]
+    if said.standing.relation == "inside":
+        return [{"kind": "arrange", "demands": {"relation": "around"}}]
     return [{"kind": "close"}]
 
 
@@ -177,4 +179,7 @@ def cage(slots: Slots, said: Said) -> Effects:
     """Nothing gets out, as close in as that takes."""
     if "radial" in slots and "asclose" not in slots:
         return None
+    if "asclose" in slots:
+        near = {"relation": "cage", "closure": "escape-proof", "clearance": None}
+        return [{"kind": "arrange", "demands": near}]
     return [{"kind": "escape-proof"}]

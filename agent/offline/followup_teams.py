@@ -137,8 +137,7 @@ def count(slots: Slots, said: Said) -> Effects:
 def needed(slots: Slots, said: Said) -> Effects:
     """As many as close the ring."""
     slots.has("add", "close", "closeq", "relation", "again")
-    shut: list[Effect] = [{"kind": "escape-proof"}] if slots.has("escape") else []
-    return [{"kind": "count", "robots": "needed"}, *shut]
+    return [{"kind": "count", "robots": "held" if slots.has("escape") else "needed"}]
 
 
 def fit(slots: Slots, said: Said) -> Effects:
@@ -368,7 +367,8 @@ def arranged(slots: Slots, said: Said) -> Effects:
         return made
     edits = [e for e in made if e["kind"] != "talk"]
     counted: list[Effect] = [] if n == said.count else [{"kind": "count", "robots": n}]
-    return [*edits, *counted] or made
+    fewer = n < said.count and any(e["demands"].get("relation") == "corners" for e in edits)
+    return ([*counted, *edits] if fewer else [*edits, *counted]) or made
 
 
 def _group(relation: str, slots: Slots) -> Effect:

@@ -70,6 +70,15 @@ def returned(slots: Slots, said: Said) -> Effects:
     return None
 
 
+def unadded(slots: Slots, said: Said) -> Effects:
+    """Those that were added last leave again."""
+    slots.used.update(slots)
+    counts = [e for e in said.last if e["kind"] in ("add", "count")]
+    named = re.search(r"\b(?:those|them|these|they)\b", said.words, re.IGNORECASE)
+    fewer = not said.standing.past or said.standing.past[0][1] < said.count
+    return undo(Slots(), said) if counts and named and fewer else None
+
+
 def dont(slots: Slots, said: Said) -> Effects:
     """ "No, don't: like before"; "don't undo" is another matter."""
     called_off = re.match(r"\W*(?:don'?t|do not)\W*[,.;:!-]", said.words, re.IGNORECASE)
@@ -79,6 +88,8 @@ def dont(slots: Slots, said: Said) -> Effects:
 def redo(slots: Slots, said: Said) -> Effects:
     """So many steps forward again."""
     steps = _times(slots, said)
+    if said.standing.redo < steps and said.words.lower().split()[:2] == ["undo", "undo"]:
+        return undo(Slots(num=[2]), said)
     if said.standing.redo < steps:
         return refuse("There is nothing to make again: nothing was taken back. Say what to change.")
     return [{"kind": "undo", "steps": -steps}]
