@@ -19,7 +19,6 @@ from .choosing import Step, agrees, calls_in, chosen_candidates, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup_things import UNNAMED
 from .followups import Followup, commands, read_followup
-from .pointed import centre_of
 from .spelling import spelled
 from .standing import Standing
 
@@ -96,9 +95,8 @@ def _standing(task: Task, before: History) -> Standing | None:
     pointed = tuple(str(p["id"]) for p in task.pointed)
     points = [p["points"][0] for p in task.pointed if p.get("points")]
     place = (points[0][0], points[0][1]) if points else None
-    facts = task.standing | {"things": _things(task)}
     return Standing.of(
-        facts,
+        task.standing,
         pointed=pointed,
         place=place,
         size=task.size,
@@ -107,18 +105,6 @@ def _standing(task: Task, before: History) -> Standing | None:
             (read_task(m.text).instruction for m in reversed(before) if isinstance(m, User)), ""
         ),
     )
-
-
-def _things(task: Task) -> list[dict[str, Any]]:
-    """What was measured and what is pointed at beside it, in the order of their numbers."""
-    measured = list((task.standing or {}).get("things", ()))
-    known = {t["id"] for t in measured}
-    shown = [
-        {"id": p["id"], "label": p.get("label") or UNNAMED[0], "centre": centre_of(p)}
-        for p in task.pointed
-        if p["id"] not in known
-    ]
-    return sorted([*measured, *shown], key=lambda t: int(t["id"][1:]) if t["id"][1:].isdecimal() else 0)
 
 
 def _answer_to(messages: History) -> tuple[str | None, History]:
@@ -217,8 +203,8 @@ class _Steps:
         unnamed = all(label.startswith(UNNAMED) for _, label in standing.things)
         if thing.startswith("?") and unnamed and len(standing.things) == 1:
             thing = standing.things[0][0]
-        if thing.startswith("?") or thing in standing.pointed:
-            return Reply(text=f'"{thing.removeprefix("?")}" is not measured yet: point at it, and ask again.')
+        if thing.startswith("?"):
+            return Reply(text=f'"{thing[1:]}" is not measured yet: point at it, and ask again.')
         if measured is not None and measured.error:
             return Reply(text=measured.text)
         if measured is not None:

@@ -54,7 +54,7 @@ def narrowed(task: Task, history: History) -> Task | Step:
         task = replace(
             task, instruction=SHOWING.sub("", ONE_SHOWN.sub("this one", task.instruction))
         )
-    centres = {str(p["id"]): centre_of(p) for p in task.pointed}
+    centres = {str(p["id"]): _centre(p) for p in task.pointed}
     things = tuple((str(p["id"]), str(p.get("label") or UNNAMED[0])) for p in task.pointed)
     contract: dict[str, Any] = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}
     standing = Standing("", contract, (), things=things, centre=centres)
@@ -142,7 +142,7 @@ def _shows(text: str, chunk: Chunk) -> bool:
     return text[chunk.start : chunk.end].lower().startswith(("this ", "that "))
 
 
-def centre_of(prompt: dict[str, Any]) -> tuple[float, float]:
+def _centre(prompt: dict[str, Any]) -> tuple[float, float]:
     """Where a thing that is pointed at lies, px."""
     box: Sequence[float] | None = prompt.get("box")
     corners = None if box is None else [box[:2], box[2:]]
