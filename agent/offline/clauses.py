@@ -8,7 +8,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from . import followup_edits, followup_parts, followup_sides, followup_teams, followup_turns
+from . import (
+    followup_edits,
+    followup_last,
+    followup_moves,
+    followup_parts,
+    followup_sides,
+    followup_teams,
+    followup_turns,
+)
 from .followup_edits import Effect, Effects, Said, ask
 from .followup_frames import Frame, Slots, frames
 from .followup_things import resolved
@@ -78,7 +86,7 @@ class Line:
             found.pop()  # "the lower one, i mean"
         if any({"stay", "except"} & set(c.kinds) for c in found) and not self._leaving(found):
             found = [_as_team(c) if "rest" in c.kinds else c for c in found]
-        self.chunks = self._without_excepted(_without_contrast(self._without_lead(found)))
+        self.chunks = self._without_excepted(self._without_contrast(self._without_lead(found)))
 
     def _leaving(self, chunks: Sequence[Chunk]) -> bool:
         """Whether robots leave, or the others are said to stay."""
@@ -153,14 +161,30 @@ class Line:
                 return [*chunks[:k], *chunks[k + 2 :]]
         return chunks
 
+    def _without_contrast(self, chunks: list[Chunk]) -> list[Chunk]:
+        """The phrases without what is said not to be meant: "to the left, not the right"."""
+        robots = any("robots" in c.kinds for c in chunks)
+        for k, chunk in enumerate(chunks):
+            no, after, rest = (
+                chunks[k + 1 : k + 2],
+                chunks[k + 2 :],
+                [*chunks[:k], *chunks[k + 2 :]],
+            )
+            denied = "neg" in chunk.kinds and set(chunk.kinds) <= {"neg", "clear"} and no
+            ended = not after or "sep" in after[0].kinds
+            if denied and ended and any(_alike(no[0], c) for c in rest):
+                return rest[:-1] if rest and "sep" in rest[-1].kinds else rest
+            named = self.words[chunk.start : chunk.end].lower().startswith("not ")
+            if robots and named and "other" in chunk.kinds:  # "not that one, number six"
+                return [*chunks[:k], *chunks[k + 1 :]]
+        return chunks
+
     def _framed(self, chunks: Sequence[Chunk], before: tuple[Effect, ...]) -> Clause | None:
         """The clause, where a frame takes it whole and uses all of it."""
         asks, only_asks = self._asks()
         edits = tuple(e for e in before if e["kind"] not in NO_EDITS)
         phrases = tuple((c, self.words[c.start : c.end]) for c in chunks)
-        said = Said(
-            self.standing, self.words_of(chunks), edits, self.denies, phrases, self.words
-        )
+        said = Said(self.standing, self.words_of(chunks), edits, self.denies, phrases, self.words)
         for frame in frames():
             if (frame.asks and not asks) or (
                 only_asks and not frame.asks and frame.name not in TALK
@@ -229,7 +253,11 @@ class Line:
         if robots and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
         amounts = bool(after) and all({"px", "angle"} & set(c.kinds) for c in after)
-        if after and (amounts or self.denies) and self.standing.said not in ("", self.standing.words):
+        if (
+            after
+            and (amounts or self.denies)
+            and self.standing.said not in ("", self.standing.words)
+        ):
             return self.clauses(after) if self.adds else self._of_words(self.standing.said, after)
         if not self.standing.words or not after or not (self.denies or (too and robots)):
             return None
@@ -249,10 +277,10 @@ class Line:
     def _instead(self, found: list[Clause] | None) -> list[Clause] | None:
         """The clauses as one change that takes the last one back first."""
         kinds = {e["kind"] for c in found or () for e in c.effects}
-        if not found or not self.standing.edits or not kinds & {*followup_turns.RELATIVE}:
+        if not found or not self.standing.edits or not kinds & {*followup_last.RELATIVE}:
             return found
         edits = [e for c in found for e in c.effects]
-        effects = followup_turns.corrected([dict(e) for e in self.standing.edits], edits)
+        effects = followup_last.corrected([dict(e) for e in self.standing.edits], edits)
         return [replace(found[0], effects=tuple(effects), frame="corrected")]
 
     def _for_robots(self, after: Sequence[Chunk]) -> list[Clause] | None:
@@ -291,17 +319,6 @@ def _commanding(chunks: Sequence[Chunk]) -> list[Chunk]:
             kinds = {name: v for name, v in chunks[k].kinds.items() if name != "filler"}
             found[k] = replace(chunks[k], kinds=kinds) if "go" in kinds else chunks[k]
     return found
-
-
-def _without_contrast(chunks: list[Chunk]) -> list[Chunk]:
-    """The phrases without what is said not to be meant: "to the left, not the right"."""
-    for k, chunk in enumerate(chunks[:-1]):
-        no, after = chunks[k + 1], chunks[k + 2 :]
-        rest = [*chunks[:k], *after]
-        ended = not after or "sep" in after[0].kinds
-        if "neg" in chunk.kinds and set(chunk.kinds) <= {"neg", "clear"} and ended and any(_alike(no, c) for c in rest):
-            return rest[:-1] if rest and "sep" in rest[-1].kinds else rest
-    return chunks
 
 
 def _alike(a: Chunk, b: Chunk) -> bool:
@@ -370,7 +387,10 @@ def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
         return followup_turns.asked(slots, said, frame.name.removeprefix("ask_"))
     if frame.name in TALK:
         return [{"kind": "talk", "about": frame.name}]
-    modules = (followup_edits, followup_parts, followup_sides, followup_teams, followup_turns)
+    modules = (
+        *(followup_edits, followup_moves, followup_parts, followup_sides, followup_teams),
+        *(followup_last, followup_turns),
+    )
     build: Callable[[Slots, Said], Effects] = next(
         getattr(module, frame.name) for module in modules if hasattr(module, frame.name)
     )

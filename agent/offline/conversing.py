@@ -24,10 +24,13 @@ from .standing import Standing
 
 DEICTIC = re.compile(
     r"\b(?:(?:that|this|the|a|an)(?: one| other)? (?:robot|bot|drone|rover)|"
-    r"(?:one|some|most|several|a few|a couple) of (?:the robots|them)|over there|there|this one|that one|the other one|that|this)\b",
+    r"(?:one|some|most|several|a few|a couple) of (?:the robots|them)|"
+    r"over there|there|this one|that one|the other one|that|this)\b",
     re.IGNORECASE,
 )
-ROBOT = re.compile(r"^(?!some|most|several|a few|a couple).*(?:bot|drone|rover|them)", re.IGNORECASE)
+ROBOT = re.compile(
+    r"^(?!some|most|several|a few|a couple).*(?:bot|drone|rover|them)", re.IGNORECASE
+)
 BESIDES = re.compile(
     r"^\W*(?:(?:sorry|oh|ah|well|um|uh|i mean(?:t)?|that would be|"
     r"that is|it'?s|let'?s say|say)\b[ ,.]*)+"
@@ -95,15 +98,25 @@ def _standing(task: Task, before: History) -> Standing | None:
     pointed = tuple(str(p["id"]) for p in task.pointed)
     points = [p["points"][0] for p in task.pointed if p.get("points")]
     place = (points[0][0], points[0][1]) if points else None
+    said = [
+        read_task(m.text).instruction if isinstance(m, User) else m.text
+        for m in before
+        if isinstance(m, User) or (isinstance(m, Result) and m.name == "ask_user" and not m.error)
+    ]
+    begun = next(
+        (read_task(m.text).instruction for m in reversed(before) if isinstance(m, User)), ""
+    )
+    facts = task.standing
+    last: dict[str, Any] = facts.get("last") or {}
+    if said and last.get("words") == begun:  # what was answered to what was asked about them
+        facts = facts | {"last": {**last, "words": said[-1]}}
     return Standing.of(
-        task.standing,
+        facts,
         pointed=pointed,
         place=place,
         size=task.size,
         metres_per_pixel=task.metres_per_pixel,
-        said=next(
-            (read_task(m.text).instruction for m in reversed(before) if isinstance(m, User)), ""
-        ),
+        said=said[-1] if said else "",
     )
 
 

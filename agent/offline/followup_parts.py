@@ -63,19 +63,19 @@ def _teamed(slots: Slots, said: Said, way: str, factor: float, *, exact: bool) -
 
 def allotted(slots: Slots, said: Said) -> Effects:
     """So many about this thing, so many about that one: all that are there, or more of them."""
-    standing, told = said.standing, _told(said)
+    standing, told = said.standing, _roles(said)
     slots.used.update(slots)
     if told is None or not standing.targets:
         return None
     groups = {str(g["targets"][0]): k for k, g in enumerate(standing.groups, 1) if _is_about_one(g)}
     if len(groups) < len(standing.groups):
         return None
-    pairs, more = _paired(told, said, list(groups)), [mode for mode, _ in told if mode in MODES]
+    pairs, more = _matched(told, said, list(groups)), [mode for mode, _ in told if mode in MODES]
     each = ("each", None) in told
     if pairs is None or (more and len(pairs) > 1 and not each):
         return None
     if {*more} & {"more", "add"} or (more == ["too"] and not {t for t, _ in pairs} & {*groups}):
-        return [{"kind": "add", "n": n, **_where(t, groups)} for t, n in pairs]
+        return [{"kind": "add", "n": n, **_group_of(t, groups)} for t, n in pairs]
     if more and more != ["too"]:
         known = all(t in groups for t, _ in pairs)
         return [{"kind": "remove", "n": n, "group": groups[t]} for t, n in pairs] if known else None
@@ -86,14 +86,14 @@ def _is_about_one(group: Mapping[str, Any]) -> bool:
     return len(group.get("targets", ())) == 1 and group["relation"] != "at"
 
 
-def _where(thing: str, groups: Mapping[str, int]) -> Effect:
+def _group_of(thing: str, groups: Mapping[str, int]) -> Effect:
     """The fields of an edit for the group about a thing, or for a new one there."""
     if thing in groups:
         return {"group": groups[thing]} if len(groups) > 1 else {}
     return {"to": thing}
 
 
-def _told(said: Said) -> list[tuple[str, Any]] | None:
+def _roles(said: Said) -> list[tuple[str, Any]] | None:
     """What each phrase is there for, in order; None where one is there for something else."""
     found: list[tuple[str, Any]] = []
     names = ("thing", "current", *VAGUE, "num", "portion", "each", *MODES)
@@ -117,7 +117,7 @@ def _told(said: Said) -> list[tuple[str, Any]] | None:
     return found
 
 
-def _paired(
+def _matched(
     told: Sequence[tuple[str, Any]], said: Said, targets: list[str]
 ) -> list[tuple[str, int]] | None:
     """Things and numbers that are told of them; None where they do not go together."""
@@ -129,7 +129,7 @@ def _paired(
         if named not in ("", len(others)):
             return None
         things = [("thing", t) for t in others]
-    names = _named(things, said, targets)
+    names = _resolved_things(things, said, targets)
     if each and not things:
         names = targets if len(targets) > 1 else [*targets, *said.standing.others()]
     elif not things and len(numbers) == len(targets) > 1:
@@ -147,21 +147,24 @@ def _count(value: Any, said: Said) -> int:
     return int(value) if value == int(value) and value > 0 else 0
 
 
-def _named(
+def _resolved_things(
     things: Sequence[tuple[str, Any]], said: Said, targets: Sequence[str]
 ) -> list[str] | None:
     """The ids of things, of which some are told from the others that are named."""
     found: list[str | None] = [str(v) if kind == "thing" else None for kind, v in things]
-    if len({kind for kind, v in things if kind != "thing"}) < found.count(None):
+    if len({kind for kind, _ in things if kind != "thing"}) < found.count(None):
         return None
     for at, (kind, _) in enumerate(things):
         if kind in VAGUE:
-            rest = [] if kind in HERE else said.standing.others()
+            sought = any(str(t).startswith("?") for t in found)  # the other is one of those known
+            rest = [] if kind in HERE or sought else said.standing.others()
             left = [t for t in (*rest, *targets) if t not in found]
-            sole = left[0] if left else where(Slots({kind: [""]}), said)
-            if not isinstance(sole, str) or (len(left) > 1 and kind in HERE and len(targets) > 1):
+            several = len([t for t in rest if t in left]) != 1 and len(left) > 1
+            if several and kind != "there" and (kind == "other" or len(targets) > 1):
                 return None
-            if kind == "other" and len([t for t in rest if t in left]) > 1:
+            told = several and kind == "there"
+            sole = left[0] if left and not told else where(Slots({kind: [""]}), said)
+            if not isinstance(sole, str):
                 return None
             found[at] = sole
     return [t for t in found if t is not None]

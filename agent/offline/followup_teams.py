@@ -11,11 +11,11 @@ from .followup_edits import (
     Said,
     ask,
     listed,
-    place,
     refuse,
     where,
 )
 from .followup_frames import Slots
+from .followup_moves import place
 from .followup_words import chunks_of
 
 PLACING = re.compile(
@@ -238,7 +238,7 @@ def split(slots: Slots, said: Said) -> Effects:
     if named and not slots.has("rest", "portion", "split"):
         return None if "num" in slots else place(slots, said)
     some = named or _number_going(slots, said)
-    fresh = PLACING.search(said.words) and not slots.has("rest", "here", "stay")
+    fresh = PLACING.search(said.words) and not slots.has("rest", "here", "stay", "portion")
     if some is None or (fresh and not named):
         return None
     if not slots.has("there", "other", "thing"):

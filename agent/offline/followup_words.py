@@ -21,7 +21,9 @@ from .phrases import HEADS, table
 from .phrases import phrase as thing_phrase
 from .standing import Standing
 
-WORD = re.compile(r"\b[tc][0-9]{1,4}\b|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[0-9]+(?:[.,][0-9]+)*|[^\w\s]")
+WORD = re.compile(
+    r"\b[tc][0-9]{1,4}\b|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[0-9]+(?:[.,][0-9]+)*|[^\w\s]"
+)
 POINT = re.compile(
     r"\(?\b(-?[0-9]+(?:\.[0-9]+)?) ?[,/] ?(-?[0-9]+(?:\.[0-9]+)?)\)?(?![0-9%]|\.[0-9]| ?px)"
 )

@@ -193,7 +193,8 @@ def _said(task: Task, history: History) -> str:
             continue  # nothing of it was understood, and it was said in another way since
         odd = alone.unscaled or [q for q in alone.unread if re.search("[0-9]", q)]
         unread = read_instruction(text, task.metres_per_pixel).unread
-        for quote in () if odd or shares(text) else unread:  # an answer counts where it is wholly read
+        kept = odd or shares(text)  # else an answer that is wholly read counts for it
+        for quote in () if kept else unread:
             text = text.replace(quote, " ", 1)
         text = f"{text} . {answer}"
     return text

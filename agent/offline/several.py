@@ -1,4 +1,4 @@
-"""A first instruction about several things: as many robots at each, or so many here and so many there.
+"""A first instruction about several things: as many robots at each, or so many here, so many there.
 
 Its words about all robots are read as those of an instruction about one thing.
 """
@@ -22,7 +22,7 @@ AT = r"a?round|about|at|inside|in|on|by|near|to|over|within"
 EACH = re.compile(
     r"(?P<shared>,? ?\b(?:half|evenly|equally|split|shared|divided|as many)\b"
     r"[a-z ]*? )?"
-    rf"\b(?P<at>{AT}) (?:each|every)\b"
+    rf"\b(?P<at>{AT}) (?:each|every)\b(?! (?:of (?:its|the) )?(?:side|end|edge|flank|way))"
     r"(?: (?:one|single|thing|object|of (?:them|these|those|(?:the|these|those) [a-z]+)))*"
     r"(?: (?!(?:and|at|with|all|in|on|to|from|please|facing|then|but|of)\b)[a-z]+)?(?! ?corners?)",
     re.IGNORECASE,
@@ -31,9 +31,10 @@ EACH = re.compile(
 NUMBER = rf"[0-9]{{1,5}}|{'|'.join(sorted(SMALL, key=len, reverse=True))}"
 ROBOTS = r"(?:robots?|bots?|drones?|rovers?|units?|machines?|agents?)"
 SHARE = re.compile(
-    rf"(?:another |the other |the )?\b(?P<share>{NUMBER}|half|rest|others|remaining(?: {NUMBER})?|"
-    rf"as many|same number)\b(?: more)?(?: of (?:them|those|the {ROBOTS}))?(?: {ROBOTS})?,?"
-    rf"(?: (?:should |must |to )?(?:go|stand|stay|be|get|goes))? "
+    rf"(?:another |the other |other |the )?\b(?P<share>{NUMBER}|half|rest|others|"
+    rf"remaining(?: {NUMBER})?|as many|same number)\b(?: more)?"
+    rf"(?: of (?:them|those|the {ROBOTS}))?(?: {ROBOTS})?,?"
+    rf"(?: (?:should |must |to )?(?:go|stand|stay|be|get|goes)\b)? "
     rf"(?P<at>(?:to )?(?:surround|encircl|guard)(?:e|ing)?|{AT}) "
     r"(?P<thing>(?:(?:the|this|that|these|a|an|my|our) )?[^,;.]+?)"
     r"(?=\s*(?:[,;.!]|\b(?:and|but|plus|then|while|please|with|at least|facing|evenly|each)\b|$))",
@@ -42,6 +43,7 @@ SHARE = re.compile(
 """A share of the robots and where it goes: "half around the big coin", "2 at the other"."""
 BETWEEN = re.compile(r"[\s,;.]*(?:(?:and|plus|then|while|but)\b[\s,]*)*", re.IGNORECASE)
 OTHER = re.compile(r"(?:the )?other(?: one| thing)?", re.IGNORECASE)
+BESIDE = re.compile(r"(?:on|at|to|in|by) (?:the |its )?(?:left|right|top|bottom)\b", re.IGNORECASE)
 SIDE = re.compile(r"(?:the )?(?:left|right|top|bottom|upper|lower|middle)", re.IGNORECASE)
 SHARES = {"half": 2}
 WITH = re.compile(
@@ -50,6 +52,18 @@ WITH = re.compile(
     re.IGNORECASE,
 )
 """The shares of "surround t1 with 5 robots and t2 with 4"."""
+AFTER = re.compile(
+    rf"\b(?P<at>{AT}) (?P<thing>(?:the|this|that|my) [a-z ]+?|t[0-9]+),? "
+    rf"(?P<n>{NUMBER})(?: {ROBOTS})?"
+    r"(?=\s*(?:[,;.]|and\b|$))",
+    re.IGNORECASE,
+)
+"""A share said after its thing: "at the big coin 6 robots"."""
+BARE = re.compile(rf"\b({NUMBER}) (?=t[0-9]+\b)", re.IGNORECASE)
+"""A share of a thing that is called by its id: "6 t1, 6 t2"."""
+SPLITTING = re.compile(r"\b(?:split|divide|share)\b(?: them| the team)?(?: up)?", re.IGNORECASE)
+OTHERS = re.compile(rf"\b(?:{NUMBER}) (?!{ROBOTS}|of\b)[a-z]+s\b", re.IGNORECASE)
+"""A number of things, not of robots: "there are two coins"."""
 
 
 def about_several(task: Task, robots: int | None, history: History) -> Step | None:
@@ -60,15 +74,24 @@ def about_several(task: Task, robots: int | None, history: History) -> Step | No
     """
     if task.standing:
         return None
-    plain = WITH.sub(r"\g<n> robots around \g<a> and \g<m> around \g<b>", task.instruction)
-    task = replace(task, instruction=plain)
+    task = replace(task, instruction=_plain(task.instruction))
     return _about_each(task, robots) or _in_shares(task, robots, history)
+
+
+def _plain(text: str) -> str:
+    """The words with their shares as SHARE knows them."""
+    text = WITH.sub(r"\g<n> robots around \g<a> and \g<m> around \g<b>", text)
+    for pattern, put in ((AFTER, r"\g<n> robots \g<at> \g<thing>"), (BARE, r"\1 around ")):
+        text = pattern.sub(put, text) if len(pattern.findall(text)) > 1 else text
+    return text
 
 
 def shares(text: str) -> list[re.Match[str]]:
     """Where the words say how many go about which of several things."""
-    found = list(SHARE.finditer(text))
-    links = [text[a.end() : b.start()] for a, b in pairwise(found)]
+    found = list(SHARE.finditer(_plain(text)))
+    if any(BESIDE.match(f"{m['at']} {m['thing']}") for m in found):
+        return []  # of one thing two sides
+    links = [a.string[a.end() : b.start()] for a, b in pairwise(found)]
     alike = {m["at"].lower().removeprefix("a") for m in found}
     fits = len(found) > 1 and len(alike) == 1 and all(BETWEEN.fullmatch(link) for link in links)
     return found if fits else []
@@ -99,8 +122,9 @@ def _in_shares(task: Task, robots: int | None, history: History) -> Step | None:
     text, found = task.instruction, shares(task.instruction)
     if not found:
         return None
-    before, after = text[: found[0].start()], text[found[-1].end() :]
-    stated = robots or read_instruction(f"{before} around it{after}", task.metres_per_pixel).robots
+    before, after = SPLITTING.sub("", text[: found[0].start()]), text[found[-1].end() :]
+    about = OTHERS.sub("", f"{before} around it{after}")
+    stated = robots or read_instruction(about, task.metres_per_pixel).robots
     counts = _counts([m["share"].lower() for m in found], stated)
     total = sum(counts)
     if not total or 0 in counts:
@@ -113,6 +137,7 @@ def _in_shares(task: Task, robots: int | None, history: History) -> Step | None:
     if meant is None or isinstance(meant, Step):
         return meant
     ids, prompts = meant
+    before = re.sub(r"^\W*[0-9]+\W*$", "", before)  # the total, said by itself
     one = f"{before}{total} robots {found[0]['at']} it{after}"
     return _proposed(task, one, total, dict(zip(ids, counts, strict=True)), prompts)
 
