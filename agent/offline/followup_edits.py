@@ -14,6 +14,7 @@ from typing import Any
 from ...tools.formation.number_words import SMALL
 from .followup_frames import Slots
 from .followup_words import Chunk
+from .phrases import phrase
 from .standing import Standing
 
 Effect = dict[str, Any]
@@ -118,7 +119,8 @@ def offset(slots: Slots, said: Said) -> Effects:
     ways = set(slots["radial"])
     length = bare_length(slots)
     slots.has("away")
-    if "thing" in slots and not _is_mine(slots["thing"], said):
+    strange = [t for t in slots.get("thing", ()) if t not in said.standing.targets]
+    if strange and not _is_mine(strange, said):
         return None
     if len(ways) > 1 or (slots.has("num", "px") and length is None):
         return None
@@ -133,9 +135,9 @@ def offset(slots: Slots, said: Said) -> Effects:
 
 
 def _is_mine(names: Sequence[Any], said: Said) -> bool:
-    """Whether one noun alone is the thing they stand about: "further from the car"."""
-    plain = len(names) == 1 and re.fullmatch(r"\?[a-z]+", str(names[0])) is not None
-    return plain and len(said.standing.targets) == 1
+    """Whether one known noun alone is the thing they stand about: "further from the car"."""
+    found = phrase([str(names[0])[1:]], 0) if len(names) == 1 and names[0][:1] == "?" else None
+    return found is not None and found.kind == "noun" and len(said.standing.targets) == 1
 
 
 def ratio(slots: Slots, said: Said) -> Effects:

@@ -293,7 +293,7 @@ def merge_to(slots: Slots, said: Said) -> Effects:
     """All around one thing: one team again, where there are several."""
     if len(said.standing.groups) < 2:
         return target(slots, said)
-    slots.has("back", "relation")
+    slots.has("back", "relation", "undo")
     return [{"kind": "merge", "to": slots["thing"][0]}]
 
 

@@ -241,9 +241,9 @@ EDIT_SCHEMA: dict[str, Any] = {
         "factor. add: n, to an id. remove: n or robots (numbers); others close up. count: robots, "
         "a number, needed (to close the ring), held (escape-proof) or fit (px apart). swap: a, b. "
         "skip: robots; places stay empty. side: all to it. sides: only or without, lists. opening: "
-        "towards, px wide or factor. close, open, escape-proof. arrange: demands, fields of a group. target: to an "
-        "id; only robots (a count or numbers), the rest stay. merge. place: robot to [x, y], by "
-        "[dx, dy] or target. heading: to. keep-out: ids. group: else all."
+        "towards, px wide or factor. close, open, escape-proof. arrange: demands, fields of a "
+        "group. target: to an id; only robots (a count or numbers), the rest stay. merge. place: "
+        "robot to [x, y], by [dx, dy] or target. heading: to. keep-out: ids. group: else all."
     ),
     "properties": {"kind": {"type": "string"}, **{name: {} for name in _NAMES}},
     "required": ["kind"],
