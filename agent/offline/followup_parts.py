@@ -173,15 +173,16 @@ def _resolved_things(
 def _moved(wish: dict[str, int], groups: Mapping[str, int], said: Said, *, each: bool) -> Effects:
     """The edits after which so many stand about each thing that is named."""
     now = {t: int(said.standing.groups[k - 1]["robots"]) for t, k in groups.items()}
-    if len(wish) < 2 or {*now} - {*wish}:
+    if len(wish) < 2:
         return None
     if sum(wish.values()) != said.count and each and {*wish} == {*now}:
         return [{"kind": "count", "robots": n, "group": groups[t]} for t, n in wish.items()]
-    if sum(wish.values()) != said.count:
+    among = sum(now.get(t, 0) for t in wish)  # those of the things that are named
+    if sum(wish.values()) not in (among, said.count):
         numbers = " and ".join(map(str, wish.values()))
-        question = f"There are {said.count} robots, not {numbers}. How many go where?"
-        return ask(question) if {*wish} & {*now} else None
-    spare = {t: n - wish[t] for t, n in now.items() if n > wish[t]}
+        return ask(f"There are {said.count} robots, not {numbers}. How many go where?")
+    all_go = sum(wish.values()) == said.count
+    spare = {t: n - wish.get(t, 0) for t, n in now.items() if n > wish.get(t, 0 if all_go else n)}
     edits: list[Effect] = []
     for thing, n in wish.items():
         for source in [*spare]:

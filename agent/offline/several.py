@@ -54,7 +54,7 @@ WITH = re.compile(
 """The shares of "surround t1 with 5 robots and t2 with 4"."""
 AFTER = re.compile(
     rf"\b(?P<at>{AT}) (?P<thing>(?:the|this|that|my) [a-z ]+?|t[0-9]+),? "
-    rf"(?P<n>{NUMBER})(?: {ROBOTS})?"
+    rf"(?!one\b)(?P<n>{NUMBER})(?: {ROBOTS})?"
     r"(?=\s*(?:[,;.]|and\b|$))",
     re.IGNORECASE,
 )
