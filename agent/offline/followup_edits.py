@@ -268,6 +268,8 @@ def heading(slots: Slots, said: Said) -> Effects:
     if "there" in slots or "other" in slots or "thing" in slots:
         named = [c.kinds.get("thing", c.kinds.get("current")) for c, _ in said.phrases]
         last = [name for name in named if name][-1:]  # "those at t1 face t2"
+        if any(str(name).startswith("?") for name in named[:-1] if name not in (None, *last)):
+            return None
         if _is_mine(last, said):
             return [{"kind": "heading", "to": "towards"}]
         to = where(Slots({**slots, "thing": last}) if "thing" in slots else slots, said, "face {}")

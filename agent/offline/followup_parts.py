@@ -179,6 +179,8 @@ def _moved(wish: dict[str, int], groups: Mapping[str, int], said: Said, *, each:
         return [{"kind": "count", "robots": n, "group": groups[t]} for t, n in wish.items()]
     among = sum(now.get(t, 0) for t in wish)  # those of the things that are named
     if sum(wish.values()) not in (among, said.count):
+        if not {*wish} & {*now} and sum(wish.values()) < said.count:
+            return None  # the rest stays
         numbers = " and ".join(map(str, wish.values()))
         return ask(f"There are {said.count} robots, not {numbers}. How many go where?")
     all_go = sum(wish.values()) == said.count
