@@ -8,7 +8,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from . import followup_edits, followup_parts, followup_sides, followup_teams, followup_turns
+from . import (
+    followup_edits,
+    followup_last,
+    followup_moves,
+    followup_parts,
+    followup_sides,
+    followup_teams,
+    followup_turns,
+)
 from .followup_edits import Effect, Effects, Said, ask
 from .followup_frames import Frame, Slots, frames
 from .followup_things import resolved
@@ -78,7 +86,7 @@ class Line:
             found.pop()  # "the lower one, i mean"
         if any({"stay", "except"} & set(c.kinds) for c in found) and not self._leaving(found):
             found = [_as_team(c) if "rest" in c.kinds else c for c in found]
-        self.chunks = self._without_excepted(self._without_lead(found))
+        self.chunks = self._without_excepted(self._without_contrast(self._without_lead(found)))
 
     def _leaving(self, chunks: Sequence[Chunk]) -> bool:
         """Whether robots leave, or the others are said to stay."""
@@ -153,11 +161,30 @@ class Line:
                 return [*chunks[:k], *chunks[k + 2 :]]
         return chunks
 
+    def _without_contrast(self, chunks: list[Chunk]) -> list[Chunk]:
+        """The phrases without what is said not to be meant: "to the left, not the right"."""
+        robots = any("robots" in c.kinds for c in chunks)
+        for k, chunk in enumerate(chunks):
+            no, after, rest = (
+                chunks[k + 1 : k + 2],
+                chunks[k + 2 :],
+                [*chunks[:k], *chunks[k + 2 :]],
+            )
+            denied = "neg" in chunk.kinds and set(chunk.kinds) <= {"neg", "clear"} and no
+            ended = not after or "sep" in after[0].kinds
+            if denied and ended and any(_alike(no[0], c) for c in rest):
+                return rest[:-1] if rest and "sep" in rest[-1].kinds else rest
+            named = self.words[chunk.start : chunk.end].lower().startswith("not ")
+            if robots and named and "other" in chunk.kinds:  # "not that one, number six"
+                return [*chunks[:k], *chunks[k + 1 :]]
+        return chunks
+
     def _framed(self, chunks: Sequence[Chunk], before: tuple[Effect, ...]) -> Clause | None:
         """The clause, where a frame takes it whole and uses all of it."""
         asks, only_asks = self._asks()
         edits = tuple(e for e in before if e["kind"] not in NO_EDITS)
-        said = Said(self.standing, self.words_of(chunks), edits, denies=self.denies)
+        phrases = tuple((c, self.words[c.start : c.end]) for c in chunks)
+        said = Said(self.standing, self.words_of(chunks), edits, self.denies, phrases, self.words)
         for frame in frames():
             if (frame.asks and not asks) or (
                 only_asks and not frame.asks and frame.name not in TALK
@@ -191,9 +218,11 @@ class Line:
     def _of_team(self, effect: Effect, chunks: Sequence[Chunk], words: str) -> Effect:
         """The edit for the group whose thing is named; which one is asked where it has to be."""
         kind, groups = effect["kind"], self.standing.groups
-        if len(groups) < 2 or "group" in effect:
+        if len(groups) < 2 or "group" in effect or (kind == "add" and "to" in effect):
             return effect
         named = [str(c.kinds["current"]) for c in chunks if "current" in c.kinds]
+        if kind == "heading":
+            named = [name for name in named if name != effect["to"]]
         found = [k for k, g in enumerate(groups, 1) if named and named[-1] in g.get("targets", ())]
         if found and kind in (*OF_TEAMS, *OF_A_TEAM):
             return effect | {"group": found[0]}
@@ -207,6 +236,9 @@ class Line:
 
     def _corrected(self) -> list[Clause] | None:
         """What is meant after "no wait", or of what was said last, if this corrects or adds."""
+        own = self.clauses(self.chunks) if self.denies else None
+        if own and all(c.frame == "allotted" and c.settled for c in own):
+            return own
         marks = [k for k, c in enumerate(self.chunks) if k and {"correction", "no"} & set(c.kinds)]
         if marks and marks[-1] < len(self.chunks) - 1:
             first = [c for c in self.chunks[: marks[-1]] if not {"correction", "no"} & set(c.kinds)]
@@ -221,8 +253,12 @@ class Line:
         if robots and self.standing.said not in ("", self.standing.words):
             return self._of_words(self.standing.said, after)
         amounts = bool(after) and all({"px", "angle"} & set(c.kinds) for c in after)
-        if amounts and self.standing.said not in ("", self.standing.words):
-            return self._of_words(self.standing.said, after)
+        if (
+            after
+            and (amounts or self.denies)
+            and self.standing.said not in ("", self.standing.words)
+        ):
+            return self.clauses(after) if self.adds else self._of_words(self.standing.said, after)
         if not self.standing.words or not after or not (self.denies or (too and robots)):
             return None
         if robots and not self.denies:
@@ -241,10 +277,10 @@ class Line:
     def _instead(self, found: list[Clause] | None) -> list[Clause] | None:
         """The clauses as one change that takes the last one back first."""
         kinds = {e["kind"] for c in found or () for e in c.effects}
-        if not found or not self.standing.edits or not kinds & {*followup_turns.RELATIVE}:
+        if not found or not self.standing.edits or not kinds & {*followup_last.RELATIVE}:
             return found
         edits = [e for c in found for e in c.effects]
-        effects = followup_turns.corrected([dict(e) for e in self.standing.edits], edits)
+        effects = followup_last.corrected([dict(e) for e in self.standing.edits], edits)
         return [replace(found[0], effects=tuple(effects), frame="corrected")]
 
     def _for_robots(self, after: Sequence[Chunk]) -> list[Clause] | None:
@@ -285,6 +321,13 @@ def _commanding(chunks: Sequence[Chunk]) -> list[Chunk]:
     return found
 
 
+def _alike(a: Chunk, b: Chunk) -> bool:
+    """Whether two phrases say the same kind of thing, and not the same."""
+    kinds = [k for k in (*REPLACED, *AMOUNTS) if k in a.kinds and k in b.kinds]
+    found = not str(a.kinds.get("thing", "")).startswith("?")
+    return found and bool(kinds) and all(a.kinds[k] != b.kinds[k] for k in kinds)
+
+
 def _as_team(chunk: Chunk) -> Chunk:
     """A phrase for the others as one for all that are not said to stay."""
     return replace(chunk, kinds={"team": ""})
@@ -293,6 +336,11 @@ def _as_team(chunk: Chunk) -> Chunk:
 def is_empty(chunk: Chunk) -> bool:
     """Whether a phrase says nothing by itself."""
     return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= SLIGHT
+
+
+def is_part(chunk: Chunk) -> bool:
+    """Whether a phrase only names what a command is about: a robot, an amount, a side, a thing."""
+    return bool(set(chunk.kinds) & {*REPLACED, *AMOUNTS, *rules()["common"], "yes", "current"})
 
 
 def _is_kind(chunk: Chunk) -> bool:
@@ -308,12 +356,15 @@ def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
     """The phrases of a clause with others put in; None where one has no place there."""
     chunks, changed = list(clause.chunks), False
     for new in after:
-        at = next((k for k in range(len(chunks) - 1, -1, -1) if _stands_for(new, chunks[k])), None)
+        fits = [k for k in range(len(chunks) - 1, -1, -1) if _stands_for(new, chunks[k])]
+        fits.sort(key=lambda k: "much" in chunks[k].kinds)  # "a bit" is no number
+        at = next(iter(fits), None)
         kinds = set(new.kinds)
         if at is not None:
-            unit = next((u for u in ("px", "angle") if u in chunks[at].kinds), "")
-            bare = unit and "num" in kinds
-            chunks[at] = replace(new, kinds={unit: new.kinds["num"]}) if bare else new
+            unit = next((u for u in ("px", "angle", "robots") if u in chunks[at].kinds), "")
+            bare = unit if "num" in kinds else ""
+            value = (int(new.kinds["num"]),) if bare == "robots" else new.kinds.get("num")
+            chunks[at] = replace(new, kinds={bare: value}) if bare else new
             changed = True
         elif kinds & {*AMOUNTS} or (clause.frame == "rotate" and kinds & {"dir", "spin"}):
             chunks.append(new)
@@ -326,6 +377,7 @@ def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
 def _stands_for(new: Chunk, old: Chunk) -> bool:
     """Whether a phrase can be put in the place of another: both say the same kind of thing."""
     amounts = bool(set(new.kinds) & {*AMOUNTS}) and bool(set(old.kinds) & {*AMOUNTS})
+    amounts = amounts or ("num" in new.kinds and "robots" in old.kinds)
     return amounts or bool(set(new.kinds) & set(old.kinds) & {*REPLACED})
 
 
@@ -335,7 +387,10 @@ def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
         return followup_turns.asked(slots, said, frame.name.removeprefix("ask_"))
     if frame.name in TALK:
         return [{"kind": "talk", "about": frame.name}]
-    modules = (followup_edits, followup_parts, followup_sides, followup_teams, followup_turns)
+    modules = (
+        *(followup_edits, followup_moves, followup_parts, followup_sides, followup_teams),
+        *(followup_last, followup_turns),
+    )
     build: Callable[[Slots, Said], Effects] = next(
         getattr(module, frame.name) for module in modules if hasattr(module, frame.name)
     )

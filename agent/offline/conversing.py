@@ -15,19 +15,22 @@ from ..messages import Call, History, Reply, Result, User
 from .accounting import read_instruction
 from .amending import amended
 from .answering import arrived, said_of_edit, said_of_heading, said_of_query, said_of_undo, talk
-from .choosing import Step, agrees, prompts_of
+from .choosing import Step, agrees, calls_in, chosen_candidates, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup_things import UNNAMED
-from .followups import Followup, read_followup
+from .followups import Followup, commands, read_followup
 from .spelling import spelled
 from .standing import Standing
 
 DEICTIC = re.compile(
     r"\b(?:(?:that|this|the|a|an)(?: one| other)? (?:robot|bot|drone|rover)|"
-    r"one of (?:the robots|them)|over there|there|this one|that one|the other one|that|this)\b",
+    r"(?:one|some|most|several|a few|a couple) of (?:the robots|them)|"
+    r"over there|there|this one|that one|the other one|that|this)\b",
     re.IGNORECASE,
 )
-ROBOT = re.compile(r"robot|bot|drone|rover|them", re.IGNORECASE)
+ROBOT = re.compile(
+    r"^(?!some|most|several|a few|a couple).*(?:bot|drone|rover|them)", re.IGNORECASE
+)
 BESIDES = re.compile(
     r"^\W*(?:(?:sorry|oh|ah|well|um|uh|i mean(?:t)?|that would be|"
     r"that is|it'?s|let'?s say|say)\b[ ,.]*)+"
@@ -35,6 +38,12 @@ BESIDES = re.compile(
     re.IGNORECASE,
 )
 """What stands before or after an answer."""
+ALTERNATIVES = re.compile(
+    r"\b(?:robots? |number )?(t?[0-9]+) or (?:robot |number )?t?[0-9]+\b", re.IGNORECASE
+)
+"""One of which an answer chooses: "robot 3 or 4"."""
+LEADING = re.compile(r"\W*(?:(?:robot|number|nr|no)\.? )*(t?[0-9]+)\b[ ,.:]*(.*)", re.IGNORECASE)
+"""The number that an answer begins with, and the rest of it."""
 FEW = 3
 """Robots of which it is measured exactly which is the nearest."""
 LEAST_WAY = 0.02
@@ -49,7 +58,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
     followup = read_followup(words, standing)
     if standing is None and not before and followup.kind != "talk":
         return replace(task, instruction=_typed(words)), turn
-    while followup.kind == "ask":
+    while followup.kind == "ask" or _goes_on(messages, standing):
         answer, messages = _answer_to(messages)
         if answer is None:
             return _calling("ask_user", {"question": _question(followup)})
@@ -89,15 +98,25 @@ def _standing(task: Task, before: History) -> Standing | None:
     pointed = tuple(str(p["id"]) for p in task.pointed)
     points = [p["points"][0] for p in task.pointed if p.get("points")]
     place = (points[0][0], points[0][1]) if points else None
+    said = [
+        read_task(m.text).instruction if isinstance(m, User) else m.text
+        for m in before
+        if isinstance(m, User) or (isinstance(m, Result) and m.name == "ask_user" and not m.error)
+    ]
+    begun = next(
+        (read_task(m.text).instruction for m in reversed(before) if isinstance(m, User)), ""
+    )
+    facts = task.standing
+    last: dict[str, Any] = facts.get("last") or {}
+    if said and last.get("words") == begun:  # what was answered to what was asked about them
+        facts = facts | {"last": {**last, "words": said[-1]}}
     return Standing.of(
-        task.standing,
+        facts,
         pointed=pointed,
         place=place,
         size=task.size,
         metres_per_pixel=task.metres_per_pixel,
-        said=next(
-            (read_task(m.text).instruction for m in reversed(before) if isinstance(m, User)), ""
-        ),
+        said=said[-1] if said else "",
     )
 
 
@@ -107,6 +126,16 @@ def _answer_to(messages: History) -> tuple[str | None, History]:
         if isinstance(message, Result) and message.name == "ask_user" and not message.error:
             return message.text, messages[k + 1 :]
     return None, messages
+
+
+def _goes_on(messages: History, standing: Standing | None) -> bool:
+    """Whether the answer to which thing is meant chooses none, and is a command of its own."""
+    answer, later = _answer_to(messages)
+    until = messages[: len(messages) - len(later)]
+    asked = [c for c in calls_in(until) if c.name == "ask_user"]
+    if answer is None or standing is None or not asked[-1].arguments.get("candidates"):
+        return False
+    return not chosen_candidates(until, 1) and commands(answer, standing)
 
 
 def _question(followup: Followup) -> str:
@@ -122,10 +151,22 @@ def _words_meant(words: str, followup: Followup, answer: str, standing: Standing
         return followup.options[int(number[1]) - 1]
     if len(followup.options) == 1 and agrees(answer):
         return followup.options[0]
+    if standing and commands(answer, standing):
+        return answer
     answer = BESIDES.sub("", answer) or answer
+    said = set(re.findall(r"\w+", answer.lower()))
+    fitting = [option for option in followup.options if said <= {*option.lower().split()}]
+    if len(fitting) == 1:
+        return fitting[0]
+    joined: list[str] = []
+    lead, either = LEADING.match(answer), ALTERNATIVES.search(words)
     shown = DEICTIC.search(words)
-    named = f"robot {number[1]}" if number and shown and ROBOT.search(shown[0]) else answer
-    joined = [DEICTIC.sub(named, words, count=1)] if shown else []
+    if lead and either:
+        joined = [f"{words[: either.start(1)]}{lead[1]}{words[either.end() :]} {lead[2]}"]
+    elif lead and shown and ROBOT.search(shown[0]):
+        joined = [f"{DEICTIC.sub(f'robot {lead[1]}', words, count=1)} {lead[2]}"]
+    elif shown:
+        joined = [DEICTIC.sub(answer, words, count=1)]
     for attempt in (*joined, f"{words} {answer}", f"{answer} {words}"):
         if read_followup(attempt, standing).kind not in ("ask", "refuse", "instruction"):
             return attempt

@@ -126,7 +126,8 @@ class Fields:
         return relation == "around" and self._only([demand.sides[0]])
 
     def _half(self, demand: Demand) -> bool:
-        self.reading.meanings = [("around", 1.0), *self.reading.meanings]
+        if any(q.whole is None or not self._robots_are(q.whole) for q in demand.numbers):
+            return False
         return self._only([f"{demand.sides[0]} half"])
 
     def _only(self, sides: list[str]) -> bool:
@@ -134,7 +135,8 @@ class Fields:
         return self._set("sides", sides)
 
     def _heading(self, demand: Demand) -> bool:
-        return self._other(demand) is None and self._set("heading", demand.value)
+        sole = [i.symbol for i in self.items].count("<t>") < 2
+        return (sole or self._other(demand) is None) and self._set("heading", demand.value)
 
     def _heading_side(self, demand: Demand) -> bool:
         return self._set("heading", DEGREES[demand.sides[0]])

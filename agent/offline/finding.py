@@ -11,6 +11,9 @@ from .phrases import table
 from .references import described
 from .standing import Standing
 
+CLEARLY = 0.7
+"""Of the share of a colour that the most coloured has: what has less of it is not meant by it."""
+
 
 def known_thing(phrase: str, standing: Standing, messages: History) -> str | Step | None:
     """The one known thing, none of the plan's, that fits words; what to do first, or None."""
@@ -29,8 +32,13 @@ def one_at(
     reply = located(query or None, messages)
     if reply is None:
         return Step("locate_object", {"query": query} if query else {})
-    ids = (measured_at(c["id"], centres, messages) for c in reply["candidates"])
-    fitting = list(dict.fromkeys(i for i in ids if i is not None))
+    shares: dict[str, float] = {}
+    for candidate in reply["candidates"]:
+        name = measured_at(candidate["id"], centres, messages)
+        share = max((candidate["colours"].get(c, 0.0) for c in query.get("colours", ())), default=1)
+        if name is not None:
+            shares[name] = max(share, shares.get(name, 0.0))
+    fitting = [name for name, share in shares.items() if share >= CLEARLY * max(shares.values())]
     return fitting[0] if len(fitting) == 1 else None
 
 

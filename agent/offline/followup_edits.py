@@ -13,6 +13,8 @@ from typing import Any
 
 from ...tools.formation.number_words import SMALL
 from .followup_frames import Slots
+from .followup_words import Chunk
+from .phrases import phrase
 from .standing import Standing
 
 Effect = dict[str, Any]
@@ -21,11 +23,6 @@ FACTOR = {"bit": 1.25, "": 1.5, "big": 2.0}
 """Of distances, spacings and sizes."""
 TURN = {"bit": 15.0, "": 45.0, "big": 90.0}
 """Degrees."""
-WAY = {"bit": 0.05, "": 0.1, "big": 0.2}
-"""Of the picture's shorter side."""
-TEAM = re.compile(
-    r"\b(?:them|they|all|every\w*|robots|ring|circle|row|team|formation|whole)\b", re.IGNORECASE
-)
 ADDED_LENGTH = re.compile(r"[,;:]\s*[\w.]+ ?(?:px|pix|m\b|met|cm)\w*\W*$", re.IGNORECASE)
 """A length said after the change, "further out, 6 m": so far it is then."""
 STEP = re.compile(r"\b(?:position|place|spot|slot|step|seat)s?\b", re.IGNORECASE)
@@ -34,9 +31,10 @@ EXACT = re.compile(
     rf"\bto (?:exactly |about |just |only |some )?(?:[0-9]|(?:{'|'.join(SMALL)})\b)", re.IGNORECASE
 )
 """The whole of it, not a change: "increase it to 60 px"."""
+LESSER = re.compile(r"\W*(?:not (?:so|as|that|quite)|less)\b", re.IGNORECASE)
+"""Takes a part of the last change back: "not so tight"."""
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
-VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
 SIDES = ("left", "right", "top", "bottom")
 SIDE_OF = {"up": "top", "down": "bottom", **dict(zip(SIDES, SIDES, strict=True))}
 ALIKE = {"long": "long", "short": "short"}
@@ -57,12 +55,16 @@ class Said:
         words: of the clause.
         before: effects of the clauses before it in the same line.
         denies: whether the line begins with "no".
+        phrases: of the clause, each with its words.
+        line: all that was said.
     """
 
     standing: Standing
     words: str = ""
     before: tuple[Mapping[str, Any], ...] = ()
     denies: bool = False
+    phrases: tuple[tuple[Chunk, str], ...] = ()
+    line: str = ""
 
     @property
     def last(self) -> list[Effect]:
@@ -117,6 +119,9 @@ def offset(slots: Slots, said: Said) -> Effects:
     ways = set(slots["radial"])
     length = bare_length(slots)
     slots.has("away")
+    strange = [t for t in slots.get("thing", ()) if t not in said.standing.targets]
+    if strange and not _is_mine(strange, said):
+        return None
     if len(ways) > 1 or (slots.has("num", "px") and length is None):
         return None
     kind = ways.pop()
@@ -127,6 +132,12 @@ def offset(slots: Slots, said: Said) -> Effects:
         share = float(slots["share"][0])
         return [{"kind": "in", "factor": rounded(1 / (1 - share))}] if 0 < share < 1 else None
     return [{"kind": kind, "factor": rounded(factor_of(slots))}]
+
+
+def _is_mine(names: Sequence[Any], said: Said) -> bool:
+    """Whether one known noun alone is the thing they stand about: "further from the car"."""
+    found = phrase([str(names[0])[1:]], 0) if len(names) == 1 and names[0][:1] == "?" else None
+    return found is not None and found.kind == "noun" and len(said.standing.targets) == 1
 
 
 def ratio(slots: Slots, said: Said) -> Effects:
@@ -147,6 +158,8 @@ def ratio(slots: Slots, said: Said) -> Effects:
 def distance(slots: Slots, said: Said) -> Effects:
     """Exactly so far from the thing; at least, or at most, is so far too."""
     slots.has("bound")
+    if any(r != said.standing.relation for r in slots.get("relation", ())):
+        return None
     length = float(slots["px"][0]) if "px" in slots else bare_length(slots)
     return None if length is None else [{"kind": "distance", "px": length}]
 
@@ -236,96 +249,15 @@ def resized(slots: Slots, said: Said) -> Effects:
 def snug(slots: Slots, said: Said) -> Effects:
     """Tighter, looser: from robot to robot, in a row or after a word about that."""
     apart = bool(said.last) and said.last[-1]["kind"] == "spacing"
+    if apart and LESSER.match(said.words) and "factor" in said.last[-1] and len(slots) == 1:
+        last = said.last[-1]["factor"]
+        if (last < 1) == (slots["snug"][0] == "wide"):
+            return [{"kind": "spacing", "factor": rounded((1 + last) / 2 / last)}]
     if not apart and said.standing.relation not in ROWS:
         return None
     factor = factor_of(slots)
     wide = slots["snug"][0] == "wide"
     return [{"kind": "spacing", "factor": rounded(factor if wide else 1 / factor)}]
-
-
-def way(slots: Slots, said: Said) -> tuple[float, float] | None:
-    """How far left, right, up or down, px."""
-    vectors = [VECTOR[d] for d in slots["dir"]]
-    length = bare_length(slots)
-    if (
-        len(vectors) > 2
-        or len({abs(x) for x, _ in vectors}) < len(vectors)
-        or (slots.has("num", "px") and length is None)
-    ):
-        return None
-    share = float(slots["share"][0]) if "share" in slots else WAY[much_of(slots)]
-    length = round(share * min(said.standing.size)) if length is None else length
-    return sum(x for x, _ in vectors) * length, sum(y for _, y in vectors) * length
-
-
-def shift(slots: Slots, said: Said) -> Effects:
-    """All of it left, right, up or down; after a word about one robot, that one."""
-    by = way(slots, said)
-    if by is None:
-        return None
-    placed = [e["robot"] for e in said.last if e["kind"] == "place"]
-    if placed and len(placed) == len(said.last) and not TEAM.search(said.words):
-        return [{"kind": "place", "robot": r, "by": list(by)} for r in placed]
-    return [{"kind": "shift", "dx": by[0], "dy": by[1]}]
-
-
-def approach(slots: Slots, said: Said) -> Effects:
-    """All of it some way towards a thing."""
-    current = slots.get("current")
-    to = str(current[-1]) if current else where(slots, said, "towards {}")
-    if isinstance(to, list):
-        return to
-    slots.has("all")
-    centres = said.standing.centre or {}
-    now = [centres[t] for t in said.standing.targets if t in centres]
-    if to not in centres or not now:
-        return None
-    x, y = (centres[to][k] - sum(c[k] for c in now) / len(now) for k in (0, 1))
-    far = (x * x + y * y) ** 0.5
-    if not far:
-        return None
-    px = bare_length(slots) or WAY[much_of(slots)] * min(said.standing.size)
-    return [{"kind": "shift", "dx": round(x / far * px, 1), "dy": round(y / far * px, 1)}]
-
-
-def place(slots: Slots, said: Said) -> Effects:
-    """One robot elsewhere: to a point, at a thing, or some way on."""
-    robots = [r for named in slots["robots"] for r in named]
-    point = (
-        slots["point"][0] if "point" in slots else said.standing.place if "there" in slots else None
-    )
-    if point is not None and not (len(robots) > 1 and "there" in slots and said.standing.pointed):
-        if len(robots) > 1:
-            return ask(f"Only one robot can stand at a point. Which of {listed(robots)}?")
-        return [{"kind": "place", "robot": robots[0], "to": list(point)}]
-    if slots.has("there", "other", "thing"):
-        if "there" in slots and not (said.standing.pointed or said.standing.others()):
-            return ask(f'Which place is meant in "{said.words}"? Point at it, or say it as x,y.')
-        to = where(slots, said, f"robot {robots[0]} to {{}}")
-        if isinstance(to, list):
-            return to
-        alone: Effect = {"kind": "place", "robot": robots[0], "target": to}
-        return [{"kind": "target", "to": to, "robots": robots} if len(robots) > 1 else alone]
-    slots.has("away")
-    if slots.has("dir") and slots.has("radial"):
-        return None
-    if "dir" in slots:
-        by = way(slots, said)
-        return (
-            None if by is None else [{"kind": "place", "robot": r, "by": list(by)} for r in robots]
-        )
-    ways, length = set(slots.get("radial", ())), bare_length(slots)
-    if len(ways) != 1 or (length is None and slots.has("num", "px")):
-        return None
-    way_on = str(ways.pop())
-    by = _some_way(way_on, slots, said) if length is None else {way_on: length}
-    return [{"kind": "place", "robot": r, "by": by} for r in robots]
-
-
-def _some_way(way: str, slots: Slots, said: Said) -> dict[str, float]:
-    """A share of the robot's distance, and the way that is at most."""
-    most = round(WAY[much_of(slots)] * min(said.standing.size))
-    return {way: most, "factor": FACTOR[much_of(slots)]}
 
 
 def heading(slots: Slots, said: Said) -> Effects:
@@ -334,7 +266,13 @@ def heading(slots: Slots, said: Said) -> Effects:
     if "unface" in slots or "current" in slots:
         return [{"kind": "heading", "to": "towards" if "current" in slots else None}]
     if "there" in slots or "other" in slots or "thing" in slots:
-        to = where(slots, said, "face {}")
+        named = [c.kinds.get("thing", c.kinds.get("current")) for c, _ in said.phrases]
+        last = [name for name in named if name][-1:]  # "those at t1 face t2"
+        if any(str(name).startswith("?") for name in named[:-1] if name not in (None, *last)):
+            return None
+        if _is_mine(last, said):
+            return [{"kind": "heading", "to": "towards"}]
+        to = where(Slots({**slots, "thing": last}) if "thing" in slots else slots, said, "face {}")
         return to if isinstance(to, list) else [{"kind": "heading", "to": to}]
     for name in ("dir", "side"):
         if name in slots and slots[name][0] in DEGREES:

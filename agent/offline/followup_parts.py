@@ -1,12 +1,21 @@
 """From a frame to edits of how much, of a quantity that is named, and of how many go where."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from .followup_edits import EXACT, Effect, Effects, Said, ask, factor_of, rounded, where
 from .followup_frames import Slots
-from .followup_teams import how_many_fewer, how_many_more, whole
+from .followup_teams import SHARES, how_many_fewer, how_many_more, whole
+from .followup_things import known
 
 HERE = ("here", "stay")
 VAGUE = (*HERE, "there", "other")
 """Kinds of phrases for a thing that is told from the others that are named."""
+MODES = ("more", "add", "less", "remove", "too")
+PLACING = frozenset(
+    ("filler", "sep", "team", "it", "move", "about", "towards", "side_of", "robotword", "make")
+) | {"relation", "again", "split", "lone", "back", "same", "instead", "onword"}
+"""Kinds of phrases that say nothing of how many go where."""
 
 
 def changed(slots: Slots, said: Said) -> Effects:
@@ -52,61 +61,136 @@ def _teamed(slots: Slots, said: Said, way: str, factor: float, *, exact: bool) -
     return None if fewer and n >= said.count else [{"kind": "remove" if fewer else "add", "n": n}]
 
 
-def parted(slots: Slots, said: Said) -> Effects:
-    """So many about one thing, so many about another: all of them are named."""
-    numbers = [int(n) for n in slots["num"]]
-    slots.has("relation", "make", "portion", "split")
-    if not said.standing.targets:
+def allotted(slots: Slots, said: Said) -> Effects:
+    """So many about this thing, so many about that one: all that are there, or more of them."""
+    standing, told = said.standing, _roles(said)
+    slots.used.update(slots)
+    if told is None or not standing.targets:
         return None
-    told = [(k, str(v)) for k in slots if k in (*VAGUE, "thing", "current") for v in slots[k]]
-    names = [name for kind, name in told if kind not in VAGUE] if told else said.standing.targets
-    for at, (kind, _) in enumerate(told):
-        if kind in VAGUE:
-            known = said.standing.targets
-            if kind not in HERE and not any(name.startswith("?") for name in names):
-                known = [*said.standing.others(), *known]
-            left = [t for t in known if t not in names]
-            found = left[0] if left else where(Slots({kind: [""]}), said)
-            if not isinstance(found, str) or len(left) > 2:
-                return None
-            names.insert(at, found)
-    vague = [kind for kind, _ in told if kind in VAGUE]
-    if len({*names}) != 2 or len({*vague}) < len(vague) or len(numbers) != 2:
+    groups = {str(g["targets"][0]): k for k, g in enumerate(standing.groups, 1) if _is_about_one(g)}
+    if len(groups) < len(standing.groups):
         return None
-    if sum(numbers) != said.count:
-        if not {*names} & {*said.standing.targets}:
+    pairs, more = _matched(told, said, list(groups)), [mode for mode, _ in told if mode in MODES]
+    each = ("each", None) in told
+    if pairs is None or (more and len(pairs) > 1 and not each):
+        return None
+    if {*more} & {"more", "add"} or (more == ["too"] and not {t for t, _ in pairs} & {*groups}):
+        return [{"kind": "add", "n": n, **_group_of(t, groups)} for t, n in pairs]
+    if more and more != ["too"]:
+        known = all(t in groups for t, _ in pairs)
+        return [{"kind": "remove", "n": n, "group": groups[t]} for t, n in pairs] if known else None
+    return _moved(dict(pairs), groups, said, each=each)
+
+
+def _is_about_one(group: Mapping[str, Any]) -> bool:
+    return len(group.get("targets", ())) == 1 and group["relation"] != "at"
+
+
+def _group_of(thing: str, groups: Mapping[str, int]) -> Effect:
+    """The fields of an edit for the group about a thing, or for a new one there."""
+    if thing in groups:
+        return {"group": groups[thing]} if len(groups) > 1 else {}
+    return {"to": thing}
+
+
+def _roles(said: Said) -> list[tuple[str, Any]] | None:
+    """What each phrase is there for, in order; None where one is there for something else."""
+    found: list[tuple[str, Any]] = []
+    names = ("thing", "current", *VAGUE, "num", "portion", "each", *MODES)
+    for chunk, words in said.phrases:
+        name = next((n for n in names if n in chunk.kinds), "")
+        value = chunk.kinds.get(name)
+        if "rest" in chunk.kinds:
+            name, value = "other", ""
+        if name == "there" and words.lower().startswith("this"):
+            name = "here"
+        if name == "thing" and str(value).startswith("?"):
+            value = known(str(value)[1:], said.standing)
+        if name == "num" and found and found[-1][0] == "other":
+            found[-1] = ("other", value)  # "the other two"
+        elif name in ("thing", "current", "num", *VAGUE):
+            found.append(("thing" if name == "current" else name, value))
+        elif name:
+            found.append((name, value if name == "portion" else None))
+        elif not {*chunk.kinds} & PLACING:
             return None
-        a, b = numbers
-        return ask(f"There are {said.count} robots, not {a} and {b}. How many go where?")
-    now = {t: g["robots"] for g in said.standing.groups for t in g.get("targets", ())}
-    if {*now} - {*names}:
+    return found
+
+
+def _matched(
+    told: Sequence[tuple[str, Any]], said: Said, targets: list[str]
+) -> list[tuple[str, int]] | None:
+    """Things and numbers that are told of them; None where they do not go together."""
+    things = [(kind, value) for kind, value in told if kind in ("thing", *VAGUE)]
+    numbers = [_count(value, said) for kind, value in told if kind in ("num", "portion")]
+    each = ("each", None) in told
+    if each and [kind for kind, _ in things] == ["other"]:
+        others, named = said.standing.others(), things[0][1]
+        if named not in ("", len(others)):
+            return None
+        things = [("thing", t) for t in others]
+    names = _resolved_things(things, said, targets)
+    if each and not things:
+        names = targets if len(targets) > 1 else [*targets, *said.standing.others()]
+    elif not things and len(numbers) == len(targets) > 1:
+        names = targets
+    if names is None or len({*names}) < len(names) or not all(numbers):
         return None
-    more = {t: n - now.get(t, 0) for t, n in zip(names, numbers, strict=True)}
-    edits: list[Effect] = [
-        {"kind": "target", "to": t, "robots": n} for t, n in more.items() if n > 0
-    ]
+    numbers = numbers * len(names) if each and len(numbers) == 1 else numbers
+    return list(zip(names, numbers, strict=True)) if len(numbers) == len(names) > 0 else None
+
+
+def _count(value: Any, said: Said) -> int:
+    """A number of robots or a share of them; 0 for what is none."""
+    if isinstance(value, str):
+        return said.count // SHARES[value]
+    return int(value) if value == int(value) and value > 0 else 0
+
+
+def _resolved_things(
+    things: Sequence[tuple[str, Any]], said: Said, targets: Sequence[str]
+) -> list[str] | None:
+    """The ids of things, of which some are told from the others that are named."""
+    found: list[str | None] = [str(v) if kind == "thing" else None for kind, v in things]
+    if len({kind for kind, _ in things if kind != "thing"}) < found.count(None):
+        return None
+    for at, (kind, _) in enumerate(things):
+        if kind in VAGUE:
+            sought = any(str(t).startswith("?") for t in found)  # the other is one of those known
+            rest = [] if kind in HERE or sought else said.standing.others()
+            left = [t for t in (*rest, *targets) if t not in found]
+            several = len([t for t in rest if t in left]) != 1 and len(left) > 1
+            if several and kind != "there" and (kind == "other" or len(targets) > 1):
+                return None
+            told = several and kind == "there"
+            sole = left[0] if left and not told else where(Slots({kind: [""]}), said)
+            if not isinstance(sole, str):
+                return None
+            found[at] = sole
+    return [t for t in found if t is not None]
+
+
+def _moved(wish: dict[str, int], groups: Mapping[str, int], said: Said, *, each: bool) -> Effects:
+    """The edits after which so many stand about each thing that is named."""
+    now = {t: int(said.standing.groups[k - 1]["robots"]) for t, k in groups.items()}
+    if len(wish) < 2:
+        return None
+    if sum(wish.values()) != said.count and each and {*wish} == {*now}:
+        return [{"kind": "count", "robots": n, "group": groups[t]} for t, n in wish.items()]
+    among = sum(now.get(t, 0) for t in wish)  # those of the things that are named
+    if sum(wish.values()) not in (among, said.count):
+        if not {*wish} & {*now} and sum(wish.values()) < said.count:
+            return None  # the rest stays
+        numbers = " and ".join(map(str, wish.values()))
+        return ask(f"There are {said.count} robots, not {numbers}. How many go where?")
+    all_go = sum(wish.values()) == said.count
+    spare = {t: n - wish.get(t, 0) for t, n in now.items() if n > wish.get(t, 0 if all_go else n)}
+    edits: list[Effect] = []
+    for thing, n in wish.items():
+        for source in [*spare]:
+            going = min(n - now.get(thing, 0), spare[source])
+            if going > 0:
+                group = {"group": groups[source]} if len(groups) > 2 else {}
+                edits.append({"kind": "target", "to": thing, "robots": going, **group})
+                now[thing], spare[source] = now.get(thing, 0) + going, spare[source] - going
     return edits or [{"kind": "talk", "about": "already"}]
-
-
-def to_each(slots: Slots, said: Said) -> Effects:
-    """So many about each of several things: more or fewer there, in all, or shared out evenly."""
-    groups, n = said.standing.groups, whole(slots)
-    slots.has("relation", "make", "same", "again")
-    if not all(str(name).startswith("?") for name in slots.get("thing", ())):
-        return None
-    if "portion" in slots or n is None:
-        half = "split" in slots or list(slots.get("portion", ())) == ["half"]
-        n = said.count // 2 if half and "num" not in slots else None
-    if n is None:
-        return None
-    kind = "add" if slots.has("add", "more") else "remove" if slots.has("remove", "less") else ""
-    if len(groups) > 1 and kind:
-        return [{"kind": kind, "n": n, "group": k} for k in range(1, len(groups) + 1)]
-    others = said.standing.others()
-    if kind or len(groups) + len(others) != 2:
-        return None
-    if len(groups) > 1:
-        return [{"kind": "count", "robots": n, "group": k} for k in (1, 2)]
-    if 2 * n != said.count:
-        return ask(f"There are {said.count} robots, not twice {n}. How many go where?")
-    return [{"kind": "target", "to": others[0], "robots": n}]

@@ -6,6 +6,7 @@ from .followup_edits import (
     OPPOSITE,
     RINGS,
     SIDE_OF,
+    SIDES,
     Effect,
     Effects,
     Said,
@@ -155,6 +156,8 @@ def close(slots: Slots, said: Said) -> Effects:
     if slots.has("back", "undo") and said.standing.changes:
         opened = [e["kind"] for e in said.standing.edits] == ["opening"]
         return [{"kind": "undo", "steps": 1}] if opened else [{"kind": "close"}]
+    if said.standing.relation == "inside":
+        return [{"kind": "arrange", "demands": {"relation": "around"}}]
     return [{"kind": "close"}]
 
 
@@ -163,6 +166,20 @@ def opened(slots: Slots, said: Said) -> Effects:
     return [{"kind": "open"}] if said.standing.relation == "cage" else [{"kind": "opening"}]
 
 
+def widened(slots: Slots, said: Said) -> Effects:
+    """The one side that was left free is stood on too."""
+    side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]), "")
+    taken = list(said.standing.groups[0].get("sides") or ())
+    slots.has("add", "again", "close", "back", "too")
+    filled = {*slots.get("relation", ())} <= {"inside", "around"}
+    return [{"kind": "close"}] if filled and {*taken, side} == {*SIDES} != {*taken} else None
+
+
 def cage(slots: Slots, said: Said) -> Effects:
-    """Nothing gets out."""
+    """Nothing gets out, as close in as that takes."""
+    if "radial" in slots and "asclose" not in slots:
+        return None
+    if "asclose" in slots:
+        near = {"relation": "cage", "closure": "escape-proof", "clearance": None}
+        return [{"kind": "arrange", "demands": near}]
     return [{"kind": "escape-proof"}]

@@ -11,11 +11,11 @@ from .followup_edits import (
     Said,
     ask,
     listed,
-    place,
     refuse,
     where,
 )
 from .followup_frames import Slots
+from .followup_moves import place
 from .followup_words import chunks_of
 
 PLACING = re.compile(
@@ -24,6 +24,7 @@ PLACING = re.compile(
 )
 """Robots, a number of them, a thing and such a word make a new instruction."""
 EACH_CORNER = re.compile(r"\b(?:each|every)\b.*\bcorner", re.IGNORECASE)
+ALIKE = re.compile(r"\b(?:same|too|also|as well|likewise)\b", re.IGNORECASE)
 SHARES = {"half": 2, "third": 3, "quarter": 4}
 LIKE_A_RING = ("around", "cage", "corners", "shape")
 """Arrangements about a thing, which "around" the next one keeps."""
@@ -44,7 +45,13 @@ def add_some(slots: Slots, said: Said) -> Effects:
         return refuse(
             f"{said.count + n:,} robots are too many; at most {MAX_ROBOTS:,} can be placed."
         )
-    return None if n is None else [{"kind": "add", "n": n}]
+    between = slots.get("relation", ()) or slots.get("spacing", ())
+    if n is None or (between and "between" not in said.words.lower().split()):
+        return None
+    if between and said.standing.relation == "corners":
+        ring: Effect = {"kind": "arrange", "demands": {"relation": "around"}}
+        return [ring, {"kind": "count", "robots": said.count + n}]
+    return [{"kind": "add", "n": n}]
 
 
 def remove_some(slots: Slots, said: Said) -> Effects:
@@ -79,6 +86,38 @@ def leave_others(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "robots": others}] if others else None
 
 
+def leave_side(slots: Slots, said: Said) -> Effects:
+    """The row on one side leaves."""
+    side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]))
+    rows = [(k, g) for k, g in enumerate(said.standing.groups, 1) if g.get("side") == side]
+    slots.has("leave", "remove", "off", "away", "radial")
+    if len(rows) != 1 or len(said.standing.groups) < 2:
+        return None
+    return [{"kind": "remove", "n": rows[0][1]["robots"], "group": rows[0][0]}]
+
+
+def leave_rest(slots: Slots, said: Said) -> Effects:
+    """The rest leaves, where it was said before how many there are to be."""
+    counted = any(e["kind"] == "count" for e in said.before)
+    return [{"kind": "talk", "about": "already"}] if counted else None
+
+
+def emptied(slots: Slots, said: Said) -> Effects:
+    """Nobody about one of several things: its team leaves."""
+    named = str((slots.get("current") or [""])[0])
+    groups = list(enumerate(said.standing.groups, 1))
+    here = [(k, g) for k, g in groups if g.get("targets") == [named]]
+    if len(here) != 1 or len(groups) < 2:
+        return None
+    return [{"kind": "remove", "n": here[0][1]["robots"], "group": here[0][0]}]
+
+
+def some(slots: Slots, said: Said) -> Effects:
+    """Some of them go elsewhere: how many is asked."""
+    slots.used.update(slots)
+    return ask(f'How many of them, in "{said.words}"? Say a number.')
+
+
 def count(slots: Slots, said: Said) -> Effects:
     """So many in all; as many as needed, or as fit."""
     slots.has("toomany", "back", "remove", "less", "only")
@@ -91,13 +130,14 @@ def count(slots: Slots, said: Said) -> Effects:
         return refuse(f"{n:,} robots are too many; at most {MAX_ROBOTS:,} can be placed.")
     if n == said.count:
         return [{"kind": "talk", "about": "already"}]
-    return None if n is None else [{"kind": "count", "robots": n}]
+    kept = re.match(r"\W*keep\b", said.words, re.IGNORECASE) is None or (n or 0) <= said.count
+    return None if n is None or not kept else [{"kind": "count", "robots": n}]
 
 
 def needed(slots: Slots, said: Said) -> Effects:
     """As many as close the ring."""
-    slots.has("add", "close", "closeq")
-    return [{"kind": "count", "robots": "needed"}]
+    slots.has("add", "close", "closeq", "relation", "again")
+    return [{"kind": "count", "robots": "held" if slots.has("escape") else "needed"}]
 
 
 def fit(slots: Slots, said: Said) -> Effects:
@@ -163,6 +203,9 @@ def target(slots: Slots, said: Said) -> Effects:
             else None
         )
     moved: Effect = {"kind": "target", "to": to}
+    last = said.last[0] if len(said.last) == 1 else {}
+    if "to" in last and last["kind"] == "add" and ALIKE.search(said.words):
+        return [last | {"to": to}]
     relation = slots.get("relation", ["around"])[0]
     kept = relation == said.standing.relation or (
         relation == "around" and said.standing.relation in LIKE_A_RING
@@ -195,7 +238,7 @@ def split(slots: Slots, said: Said) -> Effects:
     if named and not slots.has("rest", "portion", "split"):
         return None if "num" in slots else place(slots, said)
     some = named or _number_going(slots, said)
-    fresh = PLACING.search(said.words) and not slots.has("rest", "here", "stay")
+    fresh = PLACING.search(said.words) and not slots.has("rest", "here", "stay", "portion")
     if some is None or (fresh and not named):
         return None
     if not slots.has("there", "other", "thing"):
@@ -250,7 +293,7 @@ def merge_to(slots: Slots, said: Said) -> Effects:
     """All around one thing: one team again, where there are several."""
     if len(said.standing.groups) < 2:
         return target(slots, said)
-    slots.has("back", "relation")
+    slots.has("back", "relation", "undo")
     return [{"kind": "merge", "to": slots["thing"][0]}]
 
 
@@ -324,7 +367,8 @@ def arranged(slots: Slots, said: Said) -> Effects:
         return made
     edits = [e for e in made if e["kind"] != "talk"]
     counted: list[Effect] = [] if n == said.count else [{"kind": "count", "robots": n}]
-    return [*edits, *counted] or made
+    fewer = n < said.count and any(e["demands"].get("relation") == "corners" for e in edits)
+    return ([*counted, *edits] if fewer else [*edits, *counted]) or made
 
 
 def _group(relation: str, slots: Slots) -> Effect:

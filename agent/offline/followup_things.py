@@ -42,6 +42,11 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
     return replace(chunk, kinds=kinds)
 
 
+def known(phrase: str, standing: Standing) -> str:
+    """The id of a thing that words mean among all that are known, or the words after "?"."""
+    return _id_of(phrase, False, replace(standing, contract={"groups": []}))
+
+
 def _is_shown(chunk: Chunk, text: str) -> bool:
     """Whether a phrase means what is pointed at: "this house", "the house over here"."""
     first, *rest = text[chunk.start : chunk.end].lower().split()

@@ -1,35 +1,23 @@
 """From a frame to what a turn does beside edits, and to edits that follow from the last ones."""
 
 import re
-from collections.abc import Sequence
-from typing import Any
 
 from .followup_edits import (
-    FACTOR,
-    OPPOSITE,
-    TURN,
-    WAY,
     Effect,
     Effects,
     Said,
     ask,
-    factor_of,
-    much_of,
-    offset,
     refuse,
-    rounded,
-    shift,
 )
 from .followup_frames import Slots
+from .followup_teams import count
+from .followup_words import chunks_of
 
-RELATIVE = (
-    *("out", "in", "rotate", "shift", "scale", "spacing", "place", "add", "remove"),
-    *("mirror", "swap"),
-)
-"""Kinds that are done again on top of themselves."""
 BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
-STATED = 2.0
-"""Widest range, px, of a distance that was stated."""
+STATED, WIDEST = 2.0, 0.11
+"""Widest range of a distance that was stated: so many px, or this share of it."""
+CHOSEN = re.compile(r"\bnot\b|\b(?:then|sorry|i mean(?:t)?|rather|instead)\W*$", re.IGNORECASE)
+"""What says that something is chosen: "six then", "7, not 5"."""
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
@@ -66,6 +54,15 @@ def returned(slots: Slots, said: Said) -> Effects:
     return None
 
 
+def unadded(slots: Slots, said: Said) -> Effects:
+    """Those that were added last leave again."""
+    slots.used.update(slots)
+    counts = [e for e in said.last if e["kind"] in ("add", "count")]
+    named = re.search(r"\b(?:those|them|these|they)\b", said.words, re.IGNORECASE)
+    fewer = not said.standing.past or said.standing.past[0][1] < said.count
+    return undo(Slots(), said) if counts and named and fewer else None
+
+
 def dont(slots: Slots, said: Said) -> Effects:
     """ "No, don't: like before"; "don't undo" is another matter."""
     called_off = re.match(r"\W*(?:don'?t|do not)\W*[,.;:!-]", said.words, re.IGNORECASE)
@@ -75,6 +72,8 @@ def dont(slots: Slots, said: Said) -> Effects:
 def redo(slots: Slots, said: Said) -> Effects:
     """So many steps forward again."""
     steps = _times(slots, said)
+    if said.standing.redo < steps and said.words.lower().split()[:2] == ["undo", "undo"]:
+        return undo(Slots(num=[2]), said)
     if said.standing.redo < steps:
         return refuse("There is nothing to make again: nothing was taken back. Say what to change.")
     return [{"kind": "undo", "steps": -steps}]
@@ -115,14 +114,6 @@ def rest_stays(slots: Slots, said: Said) -> Effects:
     return [{"kind": "rest"}]
 
 
-def again(slots: Slots, said: Said) -> Effects:
-    """The last change once more; what was taken back, made again."""
-    if said.standing.redo and not said.before and not said.last:
-        return [{"kind": "undo", "steps": -1}]
-    edits = [e for e in said.last if e["kind"] in RELATIVE and "to" not in e]
-    return edits or None
-
-
 def keep(slots: Slots, said: Said) -> Effects:
     """It stays as it is."""
     return [{"kind": "talk", "about": "already"}]
@@ -131,202 +122,6 @@ def keep(slots: Slots, said: Said) -> Effects:
 def steps(slots: Slots, said: Said) -> Effects:
     """How many steps can be taken back."""
     return [{"kind": "talk", "about": "steps"}]
-
-
-def more(slots: Slots, said: Said) -> Effects:
-    """More of the last change; without an amount as much again."""
-    last = next(
-        (e for e in reversed(said.last) if e["kind"] in (*RELATIVE, "opening", "distance")), None
-    )
-    if last is None:
-        return ask("More of what?", "a bit further out", "a bit closer", "one more robot")
-    amount = _again(last, slots, said)
-    return None if amount is None else [amount]
-
-
-def _again(last: Effect, slots: Slots, said: Said) -> Effect | None:
-    kind, size = last["kind"], min(said.standing.size)
-    much = much_of(slots)
-    length = float(slots["px"][0]) if "px" in slots else None
-    if kind in ("out", "in"):
-        if length is None and not much and "share" not in slots:
-            return last
-        return (offset(Slots({**slots, "radial": [kind]}), said) or [None])[0]
-    if kind == "distance":
-        return None if length is None else {"kind": "out", "px": length}
-    if kind == "rotate":
-        sign = 1 if last["degrees"] > 0 else -1
-        turned = slots.get(
-            "angle", slots.get("num", [TURN[much] if much else abs(last["degrees"])])
-        )[0]
-        return {"kind": "rotate", "degrees": sign * float(turned)}
-    if kind in ("shift", "place") and ("to" not in last and "target" not in last):
-        way = length if length is not None else round(WAY[much] * size) if much else None
-        return _further(last, way)
-    if kind in ("scale", "spacing") and "factor" in last:
-        factor = FACTOR[much] if much else None
-        up = last["factor"] > 1
-        return {
-            "kind": kind,
-            "factor": last["factor"] if factor is None else rounded(factor if up else 1 / factor),
-        }
-    if kind == "opening":
-        return {"kind": kind, "factor": factor_of(slots)} if length is None else None
-    number = slots.get("num", [None])[0]
-    if kind in ("add", "remove") and "n" in last and length is None:
-        return last if number is None else {"kind": kind, "n": int(number)}
-    return None
-
-
-def _further(last: Effect, way: float | None) -> Effect | None:
-    """As far again in the direction of a move, or so far."""
-    if way is None:
-        return last
-    by: Any = last.get("by")
-    if isinstance(by, dict):
-        return last | {"by": {name: way for name in ("out", "in") if name in by}}
-    dx, dy = (last["dx"], last["dy"]) if last["kind"] == "shift" else last["by"]
-    length = max(abs(dx), abs(dy))
-    if not length:
-        return None
-    x, y = rounded(dx / length * way), rounded(dy / length * way)
-    return last | ({"dx": x, "dy": y} if last["kind"] == "shift" else {"by": [x, y]})
-
-
-def less_by(slots: Slots, said: Said) -> Effects:
-    """So many px less: of the distance, unless the last change was of something else."""
-    distances = ("distance", "out", "in")
-    if said.last and said.last[-1]["kind"] not in distances:
-        return None
-    return [{"kind": "in", "px": float(slots["px"][0])}]
-
-
-def less(slots: Slots, said: Said) -> Effects:
-    """Half of the last change taken back, however it is said."""
-    slots.has("much", "ratio", "back")
-    kinds = (*RELATIVE, "opening")
-    last = next((e for e in reversed(said.last) if e["kind"] in kinds), None)
-    halved = None if last is None else _scaled(last, -0.5)
-    if halved is None:
-        return ask("Less of what?", "a bit closer", "take one robot away")
-    return [halved]
-
-
-def _scaled(edit: Effect, share: float) -> Effect | None:
-    """An edit that does a share of another; a negative one takes so much of it back."""
-    kind = edit["kind"]
-    if kind in ("out", "in", "scale", "spacing", "opening"):
-        back = {"out": "in", "in": "out"}.get(kind, kind)
-        if "factor" not in edit:
-            return (
-                {"kind": back, "px": rounded(edit["px"] * abs(share))}
-                if "px" in edit and kind in ("out", "in")
-                else None
-            )
-        factor = edit["factor"]
-        if kind == "in":
-            kept = 1 / factor
-            return {"kind": back, "factor": rounded((kept + (1 - kept) * -share) / kept)}
-        left = 1 + (factor - 1) * (1 + share)
-        return {"kind": back, "factor": rounded(factor / left if kind == "out" else left / factor)}
-    names = {"rotate": ("degrees",), "shift": ("dx", "dy")}.get(kind)
-    if names:
-        return {"kind": kind, **{n: rounded(edit[n] * share) for n in names}}
-    if kind == "place" and "by" in edit:
-        by: Any = edit["by"]
-        if isinstance(by, dict):
-            given: dict[str, float] = edit["by"]
-            ways = {k: v for k, v in given.items() if k in ("out", "in")}
-            back = {"out": "in", "in": "out"}
-            return edit | {"by": {back[k]: rounded(v * -share) for k, v in ways.items()}}
-        return edit | {"by": [rounded(v * share) for v in by]}
-    if kind in ("add", "remove") and edit.get("n", 0) > 1:
-        return {"kind": {"add": "remove", "remove": "add"}[kind], "n": edit["n"] // 2}
-    return None
-
-
-def otherway(slots: Slots, said: Said) -> Effects:
-    """The last change the other way; with an amount, so much of it back."""
-    turning = (*RELATIVE, "opening", "sides", "heading")
-    last = next((e for e in reversed(said.last) if e["kind"] in turning), None)
-    if last is None:
-        return ask('"The other way" of what?', "turn it left", "turn it right")
-    if "much" in slots:
-        return less(slots, said)
-    other = _turned(last)
-    if other is None:
-        return None
-    return corrected([last], [other]) if last["kind"] in RELATIVE else [other]
-
-
-def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
-    """Edits in the place of the last ones: those are taken back first, as part of one change."""
-    back = [inverse(e) for e in reversed(last)]
-    found = [e for e in back if e is not None]
-    if len(found) < len(back):
-        return [{"kind": "undo", "steps": 1}, *edits]
-    if len(found) == len(edits) == 1:
-        return _merged(found[0], edits[0])
-    return [*found, *edits]
-
-
-def _merged(first: Effect, then: Effect) -> list[Effect]:
-    """Two edits as one where they are of one kind."""
-    if first["kind"] != then["kind"] or first.get("robot") != then.get("robot"):
-        return [first, then]
-    if "factor" in first and "factor" in then:
-        return [first | {"factor": rounded(first["factor"] * then["factor"])}]
-    names = {"rotate": ("degrees",), "shift": ("dx", "dy")}.get(first["kind"], ("none",))
-    if names[0] in then:
-        return [then | {n: rounded(first[n] + then[n]) for n in names}]
-    if isinstance(first.get("by"), list) and isinstance(then.get("by"), list):
-        (x, y), (u, v) = first["by"], then["by"]
-        return [then | {"by": [rounded(x + u), rounded(y + v)]}]
-    return [first, then]
-
-
-def inverse(edit: Effect) -> Effect | None:
-    """The edit that takes another back; None where there is none."""
-    if edit["kind"] in ("mirror", "swap"):
-        return edit
-    if edit["kind"] in ("add", "remove"):
-        other = {"add": "remove", "remove": "add"}[edit["kind"]]
-        return {"kind": other, "n": edit["n"]} if "n" in edit else None
-    return _scaled(edit, -1.0) if edit["kind"] in RELATIVE else None
-
-
-def _turned(edit: Effect) -> Effect | None:
-    """An edit the other way round."""
-    kind = edit["kind"]
-    if kind in ("out", "in"):
-        return edit | {"kind": {"out": "in", "in": "out"}[kind]}
-    if kind == "mirror":
-        return edit | {
-            "axis": {"left-right": "top-bottom", "top-bottom": "left-right"}[edit["axis"]]
-        }
-    if kind in ("scale", "spacing") and "factor" in edit:
-        return edit | {"factor": rounded(1 / edit["factor"])}
-    if kind == "opening" and edit.get("towards") in OPPOSITE:
-        return {"kind": kind, "towards": OPPOSITE[edit["towards"]]}
-    if kind == "sides" and len(edit.get("only", ())) == 1 and edit["only"][0] in OPPOSITE:
-        return edit | {"only": [OPPOSITE[edit["only"][0]]]}
-    if kind == "heading" and edit["to"] in ("towards", "away"):
-        return edit | {"to": {"towards": "away", "away": "towards"}[edit["to"]]}
-    return _scaled(edit, -1.0) if kind in ("rotate", "shift", "place") else None
-
-
-def toofar(slots: Slots, said: Said) -> Effects:
-    """Too far, too close: half of the last change back, where it went there; else a bit."""
-    if "dir" in slots:
-        back = {"left": "right", "right": "left", "up": "down", "down": "up"}[slots["dir"][0]]
-        return shift(Slots({"dir": [back], "much": ["bit"]}), said)
-    last = next((e for e in reversed(said.last) if e["kind"] in RELATIVE), None)
-    way = {"far": "out", "near": "in"}[slots["toofar"][0]]
-    if last is not None and (
-        last["kind"] == way or (way == "out" and last["kind"] in ("rotate", "shift", "place"))
-    ):
-        return less(slots, said)
-    return [{"kind": {"out": "in", "in": "out"}[way], "factor": FACTOR["bit"]}]
 
 
 def bare(slots: Slots, said: Said) -> Effects:
@@ -340,17 +135,28 @@ def bare(slots: Slots, said: Said) -> Effects:
     last = said.last[-1] if len(said.last) == 1 else {}
     if "num" in slots and "px" in last and last["kind"] in ("distance", "spacing", "opening"):
         return [last | {"px": float(slots["num"][0])}]
+    if "num" in slots and _is_count(said):
+        return count(Slots(num=slots["num"]), said)
     if "num" in slots:
         n = f"{slots['num'][0]:g}"
         return ask(f"{n} of what?", f"make it {n} in all", f"{n} more", f"turn it {n} degrees")
     return ask(f'What should change, in "{said.words}"?', *MOVES[1:])
 
 
+def _is_count(said: Said) -> bool:
+    """Whether a bare number is one of robots: they were counted last, or it corrects the first."""
+    if any("howmany" in c.kinds for c in chunks_of(said.standing.said, said.standing)):
+        return True
+    counted = {e["kind"] for e in said.last} <= {"count"}
+    chosen = said.denies or CHOSEN.search(said.line) is not None
+    return counted and chosen and len(said.standing.groups) < 2
+
+
 def _is_at_length(said: Said) -> bool:
     """Whether robots keep a distance that was stated, and nothing else was said since."""
     bounds = [g.get("clearance") or (0, 0) for g in said.standing.groups]
     others = {e["kind"] for e in said.last} - {"distance", "count", "add", "remove"}
-    return not others and all(high > 0 and high - low <= STATED for low, high in bounds)
+    return not others and all(0 < high <= low + max(STATED, WIDEST * high) for low, high in bounds)
 
 
 def refuse_checks(slots: Slots, said: Said) -> Effects:

@@ -21,7 +21,9 @@ from .phrases import HEADS, table
 from .phrases import phrase as thing_phrase
 from .standing import Standing
 
-WORD = re.compile(r"[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[0-9]+(?:[.,][0-9]+)*|[^\w\s]")
+WORD = re.compile(
+    r"\b[tc][0-9]{1,4}\b|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[0-9]+(?:[.,][0-9]+)*|[^\w\s]"
+)
 POINT = re.compile(
     r"\(?\b(-?[0-9]+(?:\.[0-9]+)?) ?[,/] ?(-?[0-9]+(?:\.[0-9]+)?)\)?(?![0-9%]|\.[0-9]| ?px)"
 )
@@ -31,6 +33,7 @@ NUMBERED = re.compile(
 )
 ARTICLES = frozenset(("the", "a", "an"))
 NOT_PLACING = frozenset(("to", "of", "about", "each", "every"))
+EACH, PART = ("one", "ones"), ("even", "odd")
 PRONOUNS = frozenset(("them", "it", "they", "us", "you"))
 SIDE_WORDS = ("left", "right", "top", "bottom", "upper", "lower", "leftmost", "rightmost", "middle")
 
@@ -149,9 +152,8 @@ class _Reader:
         place, things = table_of("ordinals").get(self.plain[start]), self.standing.things
         named = self.plain[start + 1 : start + 2]
         end = start + 1 + (named in (["one"], ["thing"], ["object"]))
-        led = (
-            at > 0 and self.plain[at - 1] in word_set("before_things") - NOT_PLACING
-        )  # "at the first"
+        placing = word_set("before_things") - NOT_PLACING | {"for"}
+        led = at > 0 and self.plain[at - 1] in placing  # "at the first"
         after = {*lexicon().get(tuple(named), ())}
         idle = not named or not named[0][0].isalpha() or {"filler", "sep"} & after
         plain = end == start + 1 and (start == at or not idle)
@@ -167,8 +169,10 @@ class _Reader:
         place = table_of("ordinals").get(self.plain[at])
         if place is not None and after in word_set("robots"):
             return {"robots": (place if place > 0 else len(self.standing.robots),)}, at + 2
-        if self.plain[at] == "the" and after in (*table_of("ordinals"), *word_set("robots")):
+        if self.plain[at] == "the" and after in (*table_of("ordinals"), *word_set("robots"), *PART):
             return self._robots(at + 1)
+        if self.plain[at] in ("every", *PART):
+            return self._every(at)
         if self.plain[at] not in word_set("robots"):
             return None
         numbers: list[int] = []
@@ -195,6 +199,17 @@ class _Reader:
             ):
                 k += 1
         return ({"robots": tuple(numbers)}, end) if numbers else None
+
+    def _every(self, at: int) -> tuple[dict[str, Any], int] | None:
+        """Every second robot, every third one, the odd ones."""
+        step = 2 if self.plain[at] != "every" else table_of("ordinals").get(self.plain[at + 1], 0)
+        step = 2 if self.plain[at : at + 2] == ["every", "other"] else step
+        end = at + 1 + (self.plain[at] == "every")
+        end += self.plain[end : end + 1] == ["numbered"]
+        if step < 2 or self.plain[end : end + 1] not in [[w] for w in (*EACH, *word_set("robots"))]:
+            return None
+        first = step if self.plain[at] != "odd" else 1
+        return {"robots": tuple(map(int, self.standing.robots[first - 1 :: step]))}, end + 1
 
     def _number(self, k: int) -> int | None:
         """A number of a robot: plain digits or a small number word, and no unit after it."""
@@ -228,7 +243,7 @@ class _Reader:
         """A phrase for a thing, such as "the left tree" or "the big oak"."""
         start = at + (self.plain[at] in (*ARTICLES, "this", "that", "other"))
         if start == at and not self._may_open(at):
-            return None
+            return self._colour(at)
         if start >= len(self.words) or (start > at and self.plain[start] in ARTICLES):
             return None
         other = self.plain[at] == "other" or self.plain[start] == "other"
@@ -253,6 +268,13 @@ class _Reader:
         if start > at or led:
             return self._stranger(start, other)
         return None
+
+    def _colour(self, at: int) -> tuple[dict[str, Any], int] | None:
+        """The colour of a known thing in its place: "brown gets none"."""
+        found = thing_phrase(self.plain, at)
+        labels = {w for _, label in self.standing.things for w in label.lower().split()}
+        colour = found is not None and found.kind == "colours" and self.plain[at] in labels
+        return ({"thing": self.plain[at]}, at + 1) if colour else None
 
     def _may_open(self, at: int) -> bool:
         """Whether a phrase for a thing may begin here without an article: "left tree"."""

@@ -11,12 +11,12 @@ from typing import Literal
 
 from .accounting import read_instruction
 from .asides import without_asides
-from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty
+from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty, is_part
 from .drafting import contract_of
 from .drawn_forms import form_in
 from .followup_edits import Effect, listed
+from .followup_last import RELATIVE, corrected
 from .followup_things import impossible
-from .followup_turns import RELATIVE, corrected
 from .followup_words import Chunk, rules
 from .spelling import spelled
 from .standing import Standing
@@ -136,6 +136,17 @@ def _read(words: str, standing: Standing | None) -> Followup:
     return _not_framed(line) if clauses is None else _gathered(line, clauses)
 
 
+def commands(words: str, standing: Standing) -> bool:
+    """Whether words are a command of their own, not only what another one leaves open."""
+    line = Line(words, standing)
+    verbs = (c for c in line.chunks if {"make", "move"} & set(c.kinds) or not is_part(c))
+    return any(verbs) and read_followup(words, standing).kind not in (
+        "ask",
+        "refuse",
+        "instruction",
+    )
+
+
 def _afresh(line: Line) -> str:
     """The instruction after "start over", if there is one."""
     if not line.chunks or "restart" not in line.chunks[0].kinds:
@@ -218,7 +229,7 @@ def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
     waved = [c for c in kept if waving & set(line.words_of(c.chunks).lower().split())]
     lessened = [c for c in kept if c.frame in ("less", "toofar")]
     gaps = any(e["kind"] == "opening" for c in kept if c not in lessened for e in c.effects)
-    other = len(kept) > len(lessened)
+    other = any(c not in lessened and c.frame not in TALK for c in kept)
     doubtful = [c for c in lessened if gaps or (other and not c.settled)]
     moot = [*waved, *lessened[1:], *doubtful]
     return [c for c in kept if c not in moot] or kept
@@ -233,7 +244,9 @@ def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
     stated = [k for k in ("distance", "count", "sides", "side") if alone.count(k) > 1]
     if stated:
         return _questioned(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
-    parted = [e["to"] for e in edits if e["kind"] == "target" and e.get("robots")]
+    parted = [
+        e["to"] for e in edits if e["kind"] == "target" and e.get("robots") and "group" not in e
+    ]
     if len(set(parted)) < len(parted):
         return _questioned(line, f'"{line.words}": which robots are to go, and where? Name them.')
     if alone.count("target") > 1:

@@ -21,18 +21,10 @@ from .drafting import contract_of, place_of, question_of, things_needed, would_d
 from .pointed import narrowed
 from .reading import Reading
 from .references import described
+from .several import about_several, shares
 from .spelling import instructed, spelled
 
 MAX_LABEL = 100
-EACH = re.compile(
-    r"(?P<shared>,? ?\b(?:half|evenly|equally|split|shared|divided|as many)\b"
-    r"[a-z ]*? )?"
-    r"\b(?P<at>a?round|about|at|inside|in|on|by|near|to|over|within) (?:each|every)\b"
-    r"(?: (?:one|single|thing|object|of (?:them|these|those|(?:the|these|those) [a-z]+)))*"
-    r"(?: (?!(?:and|at|with|all|in|on|to|from|please|facing|then|but|of)\b)[a-z]+)?(?! ?corners?)",
-    re.IGNORECASE,
-)
-"""What says that each of several things is meant: "half round each", "inside each court"."""
 READING = "The rules account for every word; the rest of them says which thing is meant."
 """Answers a doubt, which comes of single words."""
 
@@ -77,9 +69,6 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if isinstance(chosen, Reply):
         return chosen
     shown, task = task.pointed, chosen
-    shared = _about_each(task, history)
-    if shared is not None:
-        return shared
     reading = read_instruction(task.instruction, task.metres_per_pixel)
     wording = reading.robots or (reading.form.robots if reading.form else None)
     robots = task.robots or wording or _number_answered(history) or _standing_count(task)
@@ -109,29 +98,6 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     return _call("propose_formation", {"contract": contract, "targets": prompts})
 
 
-def _about_each(task: Task, history: History) -> Reply | None:
-    """As many robots about each of several things that were pointed at, or what to ask first."""
-    each, ids = EACH.search(task.instruction), _target_ids(task)
-    if each is None or len(ids) < 2 or task.standing:
-        return None
-    at = task.instruction[: each.start()], task.instruction[each.end() :]
-    one = replace(task, instruction=f"{at[0]} {each['at']} it{at[1]}", pointed=task.pointed[:1])
-    reading = read_instruction(one.instruction, task.metres_per_pixel)
-    robots = task.robots or reading.robots or _number_answered(history)
-    question = question_of(one, reading, robots)
-    if question or robots is None:
-        return _call("ask_user", {"question": question or "How many robots?"})
-    whole, rest = divmod(robots, len(ids)) if each["shared"] else (robots, 0)
-    if whole < 1:
-        few = f"{robots} robots are too few for {len(ids)} things. How many robots?"
-        return _call("ask_user", {"question": few})
-    group = contract_of(reading, whole, [], [])["groups"][0]
-    groups = [group | {"targets": [t], "robots": whole + (k < rest)} for k, t in enumerate(ids)]
-    contract = _in_unit(task, {"groups": groups})
-    contract |= {"reading": READING} if _was_doubted(history) else {}
-    return _call("propose_formation", {"contract": contract, "targets": list(task.pointed)})
-
-
 def _found(
     task: Task, reading: Reading, named: list[str], history: History, *, pointed: bool
 ) -> list[Found] | Step:
@@ -155,7 +121,13 @@ def _narrowed(task: Task, history: History) -> Task | Reply:
     agreed = _agreed(task, history)
     if agreed is not None:
         return agreed
-    chosen = narrowed(replace(task, instruction=_said(task, history)), history)
+    task = replace(task, instruction=_said(task, history))
+    several = about_several(task, task.robots or _number_answered(history), history)
+    if several is not None:
+        if several.name == "propose_formation" and _was_doubted(history):
+            several.arguments["contract"] |= {"reading": READING}
+        return _call(several.name, several.arguments)
+    chosen = narrowed(task, history)
     return _call(chosen.name, chosen.arguments) if isinstance(chosen, Step) else chosen
 
 
@@ -221,7 +193,8 @@ def _said(task: Task, history: History) -> str:
             continue  # nothing of it was understood, and it was said in another way since
         odd = alone.unscaled or [q for q in alone.unread if re.search("[0-9]", q)]
         unread = read_instruction(text, task.metres_per_pixel).unread
-        for quote in () if odd else unread:  # an answer counts where it is wholly read
+        kept = odd or shares(text)  # else an answer that is wholly read counts for it
+        for quote in () if kept else unread:
             text = text.replace(quote, " ", 1)
         text = f"{text} . {answer}"
     return text

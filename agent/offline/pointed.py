@@ -31,6 +31,12 @@ OFF = re.compile(
     re.IGNORECASE,
 )
 """What comes before a thing that is to be kept clear of."""
+NOT = re.compile(
+    r"[,;]?\s*(?:(?:and|but)\s+)?(?:not|rather than|instead of)\s+"
+    r"(?:(?:a?round|about|at)\s+)?(?:the\s+)?$",
+    re.IGNORECASE,
+)
+"""What comes before a thing that is said not to be meant."""
 SEVERAL = re.compile(
     r"\b(?:each|every|both|all)\b(?: of)?(?: the| these| those)?\s*$", re.IGNORECASE
 )
@@ -49,11 +55,7 @@ def narrowed(task: Task, history: History) -> Task | Step:
             task, instruction=SHOWING.sub("", ONE_SHOWN.sub("this one", task.instruction))
         )
     centres = {str(p["id"]): _centre(p) for p in task.pointed}
-    things = tuple((str(p["id"]), str(p.get("label") or UNNAMED[0])) for p in task.pointed)
-    contract: dict[str, Any] = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}
-    standing = Standing("", contract, (), things=things, centre=centres)
-    found = [resolved(c, task.instruction, standing) for c in chunks_of(task.instruction, standing)]
-    named = [(c, str(c.kinds["thing"])) for c in found if "thing" in c.kinds]
+    task, named = _things_named(task, centres)
     if not named:
         return task
     if len(task.pointed) == 1 and _shows(task.instruction, named[0][0]):
@@ -80,6 +82,23 @@ def narrowed(task: Task, history: History) -> Task | Step:
     words = f"{text[:start]}{THE_THING}{text[chunk.end :]}"
     chosen = tuple(p for p in task.pointed if p["id"] == name)
     return replace(task, instruction=words, pointed=chosen)
+
+
+def _things_named(
+    task: Task, centres: dict[str, tuple[float, float]]
+) -> tuple[Task, list[tuple[Chunk, str]]]:
+    """The phrases for things, each with its id or words; without those said not to be meant."""
+    things = tuple((str(p["id"]), str(p.get("label") or UNNAMED[0])) for p in task.pointed)
+    contract: dict[str, Any] = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}
+    standing = Standing("", contract, (), things=things, centre=centres)
+    found = [resolved(c, task.instruction, standing) for c in chunks_of(task.instruction, standing)]
+    named = [(c, str(c.kinds["thing"])) for c in found if "thing" in c.kinds]
+    for chunk, name in named[1:] if len(centres) > 1 else ():
+        denied = NOT.search(task.instruction[: chunk.start])
+        if denied and name != named[0][1]:  # "t1, not t2"
+            text = f"{task.instruction[: denied.start()]}{task.instruction[chunk.end :]}"
+            return _things_named(replace(task, instruction=text), centres)
+    return task, named
 
 
 def _looked(

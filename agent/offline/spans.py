@@ -30,7 +30,11 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     for start, end in _runs(found, "thing"):
         while start < end - 1 and (words[start] in _lists()["leading"] or _is_verb(words, start)):
             found[start], start = "command", start + 1
-        found[start:end] = _thing_labels(words, start, end)
+        while end > start and words[end - 1] in _lists()["trailing"]:
+            found[end - 1], end = "demand", end - 1
+        cut = _passive(words, start, end)
+        found[cut:end] = ["command"] * (end - cut)
+        found[start:cut] = _thing_labels(words, start, cut) if cut > start else []
     for start, end in _runs(found, "demand"):
         for k in range(max(start, 4), end):
             lead = words[k - 4 : k]
@@ -44,7 +48,20 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
                 stop = next((n for n in range(k, end) if _ends_thing(words[n])), end)
                 if not {*_lists()["picture"]} & {*words[k:stop]}:
                     found[k:stop] = ["thing"] * (stop - k)
+    _mark_beside(words, found)
     return tuple(found)
+
+
+def _mark_beside(words: Sequence[str], found: list[str]) -> None:
+    """Label as a thing what follows a determiner behind "above", "below" and the like."""
+    after = _lists()["after"]
+    for k in range(1, len(words) - 1):
+        if words[k - 1] not in _lists()["beside"] or words[k] not in _lists()["determiners"]:
+            continue
+        rest = range(k + 1, len(words))
+        stop = next((n for n in rest if _ends_thing(words[n]) or words[n] in after), len(words))
+        if k + 1 < stop and "thing" not in found[k:stop]:
+            found[k:stop] = ["thing"] * (stop - k)
 
 
 def _is_verb(words: Sequence[str], at: int) -> bool:
@@ -89,6 +106,13 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
                 k -= not words[start + k - 1][0].isalnum()
                 return found[:k] + [label] * (count - k)
     return found
+
+
+def _passive(words: Sequence[str], start: int, end: int) -> int:
+    """Where "encircled by nine drones" begins in a phrase for a thing; its end where nowhere."""
+    verbs = (k for k in range(start + 1, end - 2) if words[k].endswith("ed"))
+    by = (k for k in verbs if words[k + 1] == "by" and numbers_in(" ".join(words[k + 2 : k + 4])))
+    return next(by, end)
 
 
 def _runs(labels: Sequence[str], label: str) -> list[tuple[int, int]]:

@@ -47,11 +47,15 @@ def _names(word: re.Match[str]) -> bool:
 
 def instructed(text: str) -> str:
     """A first instruction as its rules know it: short forms, and slips in words that arrange."""
-    text = re.sub(r"(?i)\bw/ ?(?=\w)", "with ", text)
-    text = re.sub(
-        r"(?i)([,;.]|\band|\bbut) (gap|opening) (?=on|at|to|towards)", r"\1 with a \2 ", text
-    )
+    for pattern, put in _short_forms():
+        text = pattern.sub(put, text)
     return re.sub(r"[^\W\d_]+", lambda m: _arranging(m[0].lower()) or m[0], text)
+
+
+@cache
+def _short_forms() -> list[tuple[re.Pattern[str], str]]:
+    """Short forms of first instructions, of followups.yaml, and what each becomes."""
+    return [(re.compile(pattern), put) for pattern, put in rules()["short_forms"]]
 
 
 @cache
@@ -72,7 +76,9 @@ def _rewritten() -> list[tuple[re.Pattern[str], str]]:
         [rf"(?i)\b(?:(?:an?|one) )?{part}{turn}", f"turn {degrees} degrees"]
         for part, degrees in rules()["parts"].items()
     ]
-    return [(re.compile(p), put) for p, put in [*rules()["rewritten"], *parts]]
+    return [
+        (re.compile(p), put) for p, put in [*rules()["short_forms"], *rules()["rewritten"], *parts]
+    ]
 
 
 @cache

@@ -130,3 +130,27 @@ def test_words_choose_among_several_things_pointed_at(picture: Picture) -> None:
         run = Agent().run(picture, words, settings=PLAN, pointed=pointed)
         assert run.report.status == "planned"
         assert max(distances(run, centre)) < 100
+
+
+@pytest.mark.parametrize(
+    ("words", "answer", "robots"),
+    [
+        ("zorvel", "make it nine", 9),
+        ("20", "in all", 20),
+        ("more robots", "two", 10),
+        ("20", "further out", 8),
+    ],
+)
+def test_an_answer_may_be_a_command_of_its_own(
+    ring: Run, words: str, answer: str, robots: int
+) -> None:
+    asked = say(ring, words)
+    assert isinstance(asked.outcome, Paused)
+    assert len(Agent().resume(asked, answer=answer).report.positions or ()) == robots
+
+
+def test_an_answer_chooses_one_of_two(ring: Run) -> None:
+    asked = say(ring, "move robot 3 or 4 a bit")
+    moved = Agent().resume(asked, answer="3, outwards")
+    far = [k for k, d in enumerate(distances(moved)) if d > max(distances(ring)) + 2]
+    assert [(moved.report.robots or ())[k] for k in far] == ["3"]

@@ -69,7 +69,7 @@ ASKED = [
     ("so that it can get away", "can get away"),
     ("not too close", "not"),
     ("never on its left", "never"),
-    ("except at the bottom", "except"),
+    ("except under the lamp", "except"),
 ]
 
 

@@ -102,10 +102,11 @@ class Scale(_GroupEdit):
 
 
 class Add(_GroupEdit):
-    """More robots; they take the last numbers of their group."""
+    """More robots; they take the last numbers of their group, or stand so around another thing."""
 
     kind: Literal["add"] = "add"
     n: Number
+    to: str | None = None
 
 
 class Remove(_GroupEdit):
@@ -118,10 +119,10 @@ class Remove(_GroupEdit):
 
 
 class Count(_GroupEdit):
-    """So many robots in all; as many as close the ring, or as fit so far apart where they are."""
+    """So many robots in all; as many as close the ring, hold what is in it for sure, or fit."""
 
     kind: Literal["count"] = "count"
-    robots: Number | Literal["needed", "fit"]
+    robots: Number | Literal["needed", "held", "fit"]
     px: Positive | None = None
 
     @model_validator(mode="after")
@@ -237,12 +238,12 @@ EDIT_SCHEMA: dict[str, Any] = {
     "description": (
         "Kinds: out, in: px or factor. distance: px from the outline. spacing: px or factor. "
         "rotate: degrees clockwise. mirror: axis left-right or top-bottom. shift: dx, dy. scale: "
-        "factor. add: n. remove: n or robots (numbers); others close up. count: robots, a number, "
-        "needed (to close the ring) or fit (px apart). swap: a, b. skip: robots; places stay "
-        "empty. side: all to it. sides: only or without, lists. opening: towards, px wide or "
-        "factor. close, open, escape-proof. arrange: demands, fields of a group. target: to an "
-        "id; only robots (a count or numbers), the rest stay. merge. place: robot to [x, y], by "
-        "[dx, dy] or target. heading: to. keep-out: ids. group: else all."
+        "factor. add: n, to an id. remove: n or robots (numbers); others close up. count: robots, "
+        "a number, needed (to close the ring), held (escape-proof) or fit (px apart). swap: a, b. "
+        "skip: robots; places stay empty. side: all to it. sides: only or without, lists. opening: "
+        "towards, px wide or factor. close, open, escape-proof. arrange: demands, fields of a "
+        "group. target: to an id; only robots (a count or numbers), the rest stay. merge. place: "
+        "robot to [x, y], by [dx, dy] or target. heading: to. keep-out: ids. group: else all."
     ),
     "properties": {"kind": {"type": "string"}, **{name: {} for name in _NAMES}},
     "required": ["kind"],

@@ -119,7 +119,8 @@ def _to_side(part: Part, edit: SideOnly) -> Part:
     other = {"relation": "along", "side": edit.side, "edges": None, "facing": None}
     gone = dict.fromkeys((*RING, "max_gap"))
     along = group.model_copy(update={**other, **gone, **without_pitch(group)})
-    return part.evenly_at(along, part.offset)
+    there = part.evenly_at(along, part.offset)
+    return there if there.certified else part.anew(along)
 
 
 RULES: Mapping[str, Callable[..., Part]] = {

@@ -161,6 +161,24 @@ def targeted(draft: Draft, edit: Target) -> Draft:
     return draft.with_parts((*others, _as_near(_beside_others(coming, others), group)))
 
 
+def added_about(draft: Draft, number: int, n: int, to: str) -> Draft:
+    """With n new robots that stand around another thing as those of a group, from 1, do.
+
+    Raises:
+        ToolError: there is no such thing or group.
+    """
+    if number > len(draft.parts):
+        raise ToolError(f"There is no group {number}: they go from 1 to {len(draft.parts)}.")
+    first = draft.parts[number - 1]
+    new = np.full(n, -1, dtype=np.intp)
+    coming = replace(first, points=np.resize(first.points, (n, 2)), was=new)
+    group = coming.demanding(_retargeted(coming, to))
+    for k, part in enumerate(draft.parts):
+        if (part.group.relation, part.group.targets) == (group.relation, group.targets):
+            return draft.with_each((k,), lambda part: more_of(part, n))
+    return draft.with_parts((*draft.parts, _as_near(_beside_others(coming, draft.parts), group)))
+
+
 def _beside_others(part: Part, others: Sequence[Part]) -> Part:
     return replace(part, beside=tuple(Stand(p.group, p.points) for p in others))
 

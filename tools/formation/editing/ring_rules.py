@@ -183,7 +183,8 @@ def _opened(part: Part, edit: Opening) -> Part:
     ring = ringed(part, radius=group.radius, opening=px or 0.0, opening_towards=towards)
     opened = part.on_ring(ring)
     left = float(_steps(opened).max()) - 2 * part.radius
-    if group.opens and px and px < NARROWER * now and left > NARROWER * now:
+    narrows = edit.px is not None or edit.factor is not None
+    if narrows and group.opens and px and px < NARROWER * now and left > NARROWER * now:
         raise ToolError(
             f"The opening is {part.site.length(now)} wide; narrower it would be as the other gaps. "
             "Close it, take more robots, or leave it."

@@ -35,8 +35,8 @@ from .edit_kinds import (
     Swap,
 )
 from .moving import carried_out
-from .part import ON_CURVE, Part, check_known, closed_up, skipped
-from .regrouping import arranged, left_of, merged, more_of, targeted, without
+from .part import ON_CURVE, Part, check_known, closed_up, skipped, without_pitch
+from .regrouping import added_about, arranged, left_of, merged, more_of, targeted, without
 from .ring_rules import closed, ringed
 from .staying import alone
 
@@ -81,11 +81,15 @@ def _fewer(draft: Draft, k: int, n: int) -> Draft:
 
 
 def _added(draft: Draft, edit: Add) -> Draft:
+    if edit.to is not None:
+        return added_about(draft, edit.group or 1, edit.n, edit.to)
     return draft.with_each(draft.chosen(edit), lambda part: more_of(part, edit.n))
 
 
 def _counted(draft: Draft, edit: Count) -> Draft:
     k = draft.chosen(edit)[0]
+    if edit.robots == "held":
+        return _with_as_many_as_hold(draft, k)
     if edit.robots != "needed":
         if edit.robots == "fit":
             return _with_as_many_as_fit(draft, k, edit.px)
@@ -98,6 +102,16 @@ def _counted(draft: Draft, edit: Count) -> Draft:
         draft = draft.with_each((k,), lambda part: part.on_ring(ringed(part)))
     draft = _with_count(draft, k, _needed(draft.parts[k]))
     return draft.with_each((k,), lambda part: closed(part, Closure(kind="close")))
+
+
+def _with_as_many_as_hold(draft: Draft, k: int) -> Draft:
+    def held(part: Part) -> Part:
+        rest = without_pitch(part.group)
+        return replace(part, group=ringed(part, "cage", closure="escape-proof", **rest))
+
+    draft = draft.with_each((k,), held)
+    draft = _with_count(draft, k, _needed(draft.parts[k]))
+    return draft.with_each((k,), lambda part: part.anew(part.group))
 
 
 def _with_count(draft: Draft, k: int, count: int) -> Draft:

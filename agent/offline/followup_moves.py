@@ -1,0 +1,108 @@
+"""From a frame to edits that move robots as they stand: all of them, or one elsewhere."""
+
+import re
+
+from .followup_edits import (
+    FACTOR,
+    Effect,
+    Effects,
+    Said,
+    ask,
+    bare_length,
+    listed,
+    much_of,
+    where,
+)
+from .followup_frames import Slots
+
+WAY = {"bit": 0.05, "": 0.1, "big": 0.2}
+"""Of the picture's shorter side."""
+TEAM = re.compile(
+    r"\b(?:them|they|all|every\w*|robots|ring|circle|row|team|formation|whole)\b", re.IGNORECASE
+)
+VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
+
+
+def way(slots: Slots, said: Said) -> tuple[float, float] | None:
+    """How far left, right, up or down, px."""
+    vectors = [VECTOR[d] for d in slots["dir"]]
+    length = bare_length(slots)
+    if (
+        len(vectors) > 2
+        or len({abs(x) for x, _ in vectors}) < len(vectors)
+        or (slots.has("num", "px") and length is None)
+    ):
+        return None
+    share = float(slots["share"][0]) if "share" in slots else WAY[much_of(slots)]
+    length = round(share * min(said.standing.size)) if length is None else length
+    return sum(x for x, _ in vectors) * length, sum(y for _, y in vectors) * length
+
+
+def shift(slots: Slots, said: Said) -> Effects:
+    """All of it left, right, up or down; after a word about one robot, that one."""
+    by = way(slots, said)
+    if by is None:
+        return None
+    placed = [e["robot"] for e in said.last if e["kind"] == "place"]
+    if placed and len(placed) == len(said.last) and not TEAM.search(said.words):
+        return [{"kind": "place", "robot": r, "by": list(by)} for r in placed]
+    return [{"kind": "shift", "dx": by[0], "dy": by[1]}]
+
+
+def approach(slots: Slots, said: Said) -> Effects:
+    """All of it some way towards a thing."""
+    current = slots.get("current")
+    to = str(current[-1]) if current else where(slots, said, "towards {}")
+    if isinstance(to, list):
+        return to
+    slots.has("all")
+    centres = said.standing.centre or {}
+    now = [centres[t] for t in said.standing.targets if t in centres]
+    if to not in centres or not now:
+        return None
+    x, y = (centres[to][k] - sum(c[k] for c in now) / len(now) for k in (0, 1))
+    far = (x * x + y * y) ** 0.5
+    if not far:
+        return None
+    px = bare_length(slots) or WAY[much_of(slots)] * min(said.standing.size)
+    return [{"kind": "shift", "dx": round(x / far * px, 1), "dy": round(y / far * px, 1)}]
+
+
+def place(slots: Slots, said: Said) -> Effects:
+    """One robot elsewhere: to a point, at a thing, or some way on."""
+    robots = [r for named in slots["robots"] for r in named]
+    point = (
+        slots["point"][0] if "point" in slots else said.standing.place if "there" in slots else None
+    )
+    if point is not None and not (len(robots) > 1 and "there" in slots and said.standing.pointed):
+        if len(robots) > 1:
+            return ask(f"Only one robot can stand at a point. Which of {listed(robots)}?")
+        return [{"kind": "place", "robot": robots[0], "to": list(point)}]
+    if slots.has("there", "other", "thing"):
+        if "there" in slots and not (said.standing.pointed or said.standing.others()):
+            return ask(f'Which place is meant in "{said.words}"? Point at it, or say it as x,y.')
+        to = where(slots, said, f"robot {robots[0]} to {{}}")
+        if isinstance(to, list):
+            return to
+        alone: Effect = {"kind": "place", "robot": robots[0], "target": to}
+        return [{"kind": "target", "to": to, "robots": robots} if len(robots) > 1 else alone]
+    slots.has("away")
+    if slots.has("dir") and slots.has("radial"):
+        return None
+    if "dir" in slots:
+        by = way(slots, said)
+        return (
+            None if by is None else [{"kind": "place", "robot": r, "by": list(by)} for r in robots]
+        )
+    ways, length = set(slots.get("radial", ())), bare_length(slots)
+    if len(ways) != 1 or (length is None and slots.has("num", "px")):
+        return None
+    way_on = str(ways.pop())
+    by = _some_way(way_on, slots, said) if length is None else {way_on: length}
+    return [{"kind": "place", "robot": r, "by": by} for r in robots]
+
+
+def _some_way(way: str, slots: Slots, said: Said) -> dict[str, float]:
+    """A share of the robot's distance, and the way that is at most."""
+    most = round(WAY[much_of(slots)] * min(said.standing.size))
+    return {way: most, "factor": FACTOR[much_of(slots)]}
