@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from formup.tools.errors import ToolError
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.editing.edit_kinds import Edit
 from formup.tools.formation.editing.edits import Edited, edited
@@ -115,3 +116,15 @@ def test_so_far_from_what_they_are_gathered_in_is_round_it() -> None:
     away = distances(BOX.filled, found.plan.formation.points) - RADIUS
     assert away == pytest.approx(np.full(5, 20.0), abs=1)
     assert found.plan.verdict.certified
+
+
+def test_more_robots_stand_around_another_thing_as_those_that_are_there() -> None:
+    plan = standing()
+    found = after(plan, {"kind": "add", "n": 3, "to": "t2"})
+    assert found.plan.verdict.certified
+    assert groups(found) == [("around", ("t1",), 8), ("around", ("t2",), 3)]
+    assert np.array_equal(found.plan.formation.points[:8], plan.formation.points)
+    joined = after(found.plan, {"kind": "add", "n": 2, "to": "t2"})
+    assert groups(joined) == [("around", ("t1",), 8), ("around", ("t2",), 5)]
+    with pytest.raises(ToolError, match="no group 4"):
+        after(found.plan, {"kind": "add", "n": 1, "to": "t2", "group": 4})

@@ -387,18 +387,6 @@ def test_what_makes_no_sense_says_why(edit: dict[str, Any], said: str) -> None:
         after(standing(), edit)
 
 
-def test_more_robots_stand_around_another_thing_as_those_that_are_there() -> None:
-    plan = standing()
-    found = after(plan, {"kind": "add", "n": 3, "to": "t2"})
-    assert found.plan.verdict.certified
-    assert groups(found) == [("around", ("t1",), 8), ("around", ("t2",), 3)]
-    assert unmoved(found, plan, set(places(plan)))
-    joined = after(found.plan, {"kind": "add", "n": 2, "to": "t2"})
-    assert groups(joined) == [("around", ("t1",), 8), ("around", ("t2",), 5)]
-    with pytest.raises(ToolError, match="no group 4"):
-        after(found.plan, {"kind": "add", "n": 1, "to": "t2", "group": 4})
-
-
 def test_as_many_as_hold_a_thing_for_sure() -> None:
     found = after(standing(n=4), {"kind": "count", "robots": "held"})
     assert found.plan.verdict.certified
