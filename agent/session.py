@@ -6,7 +6,6 @@ written down before anything follows from it, so that the log opens again after 
 
 import gc
 import io
-import re
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from ..tools.formation.plan import Plan
 from ..tools.perception.image import Picture, load_picture, picture_file, picture_from_file
 from ..tools.perception.target_prompt import TargetPrompt
 from ..tools.world import Step, Target, World
+from .answers import says_yes
 from .calls import refused
 from .first_message import check_text
 from .fold import State, fold, stepped
@@ -35,12 +35,6 @@ from .store.folder_store import FolderSession
 from .store.protocol import StoredSession
 
 Show = Callable[[Message], None]
-AGREED = re.compile(
-    r"(?:(?:y|yes|yep|yeah|ok|okay|sure|right|correct|exactly|please)[ ,.!]*)+"
-    r"(?:(?:it|that)(?:'s| is| looks)? ?(?:right|correct|good|fine|it)?|use (?:it|that))?[ .!]*",
-    re.IGNORECASE,
-)
-"""A plain yes."""
 
 
 class SayOptions(TypedDict, total=False):
@@ -245,7 +239,7 @@ def believed(world: World, messages: Sequence[Message], answer: Result) -> World
     """The world after an answer: a yes to a doubtful outline that was shown makes it a target."""
     last = next((m for m in reversed(messages) if isinstance(m, Result)), None)
     asked = last is not None and last.cause == "low_confidence"
-    if world.doubted is None or not asked or not AGREED.fullmatch(answer.text.strip()):
+    if world.doubted is None or not asked or not says_yes(answer.text):
         return world
     return world.with_doubted().having(doubted=None)
 

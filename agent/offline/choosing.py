@@ -122,6 +122,14 @@ EXTREMES: dict[str, tuple[str, int]] = {
 """Words of an answer that choose by place or size, and what is least or greatest then."""
 
 
+DECLINED = ("no", "nope", "nothing", "none", "no thanks", "never mind", "leave it")
+
+
+def declines(answer: str) -> bool:
+    """Whether an answer is a plain no."""
+    return answer.lower().strip(" .!") in DECLINED
+
+
 def agrees(answer: str) -> bool:
     """Whether an answer is a plain yes."""
     words = re.findall(r"[a-z']+", answer.lower())

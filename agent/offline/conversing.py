@@ -15,7 +15,7 @@ from ..messages import Call, History, Reply, Result, User
 from .accounting import read_instruction
 from .amending import amended
 from .answering import arrived, said_of_edit, said_of_heading, said_of_query, said_of_undo, talk
-from .choosing import Step, agrees, calls_in, chosen_candidates, prompts_of
+from .choosing import Step, agrees, calls_in, chosen_candidates, declines, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup_things import UNNAMED
 from .followups import Followup, commands, read_followup
@@ -48,7 +48,6 @@ FEW = 3
 """Robots of which it is measured exactly which is the nearest."""
 LEAST_WAY = 0.02
 """Of the picture's shorter side: the least way that "a bit" is."""
-DECLINED = ("no", "nope", "nothing", "none", "no thanks", "never mind", "leave it")
 
 
 def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task, History]:
@@ -62,7 +61,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
         answer, messages = _answer_to(messages)
         if answer is None:
             return _calling("ask_user", {"question": _question(followup)})
-        if answer.lower().strip(" .!") in DECLINED:
+        if declines(answer):
             return Reply(text="Nothing was changed.")
         words = _words_meant(words, followup, answer, standing)
         followup = read_followup(words, standing)
@@ -321,7 +320,10 @@ class _Steps:
         undos = sum(isinstance(m, Result) and m.name == "undo" for m in self.messages)
         if taken_back and undos == 1:
             return _calling("undo", {"steps": -self.followup.undo})
-        return _calling("report_impossible", {"reason": failed.text})
+        said = (failed.facts or {}).get("plain", failed.text)
+        if failed.cause == "low_confidence":
+            return _calling("ask_user", {"question": said})
+        return _calling("report_impossible", {"reason": said})
 
     def _after(self, made: Result) -> Reply:
         data = json.loads(made.text)
@@ -347,7 +349,7 @@ class _Steps:
         """The second step of a sequence, once it is confirmed; or what is said instead of it."""
         assert self.standing is not None
         confirmed = agrees(answer) or answer.strip(" .") == "1"
-        if answer.lower().strip(" .!") in (*DECLINED, "2"):
+        if declines(answer) or answer.strip(" .") == "2":
             return Reply(text=f"{told} Nothing more was changed.")
         words = self.followup.rest if confirmed else answer
         now = replace(self.standing, edits=self.followup.edits, words="")

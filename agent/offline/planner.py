@@ -6,15 +6,17 @@ asks when the words do not settle what to do. It is no language model: it sees m
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..answers import says_yes
 from ..first_message import Task, read_task
-from ..messages import Call, History, Reply, Result, User, turn_of
+from ..messages import Call, History, Message, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
 from .answering import arrived
-from .choosing import Found, Step, agrees, calls_in, find, located_reasons, prompts_of
+from .choosing import Found, Step, agrees, calls_in, declines, find, located_reasons, prompts_of
 from .conversing import conversed
 from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, would_do
@@ -49,6 +51,9 @@ def _next_step(turn: History, before: History) -> Reply:
     first = turn[0]
     assert isinstance(first, User)
     task = read_task(first.text)
+    turn = _without_agreed(turn)
+    if isinstance(turn[-1], Result) and _asks_of_outline(turn[:-1]):
+        return _of_outline(turn[-1])
     spoken = conversed(task, turn, before)
     if isinstance(spoken, Reply):
         return spoken
@@ -61,6 +66,34 @@ def _next_step(turn: History, before: History) -> Reply:
     if isinstance(last, Result) and last.error:
         return Reply(text=_left_off(last, turn))
     return _begin(task, turn, before)
+
+
+def _without_agreed(turn: History) -> History:
+    """A turn without the calls that an outline was doubted in, where a person has agreed to it."""
+    kept: list[Message] = []
+    for message in turn:
+        agreed = isinstance(message, Result) and says_yes(message.text)
+        if agreed and _asks_of_outline(kept):
+            del kept[-3:]
+        else:
+            kept.append(message)
+    return tuple(kept)
+
+
+def _of_outline(answer: Message) -> Reply:
+    """What an answer to the question about a doubtful outline comes to that is no yes."""
+    reason = "Nothing was placed, as you said no."
+    if not declines(answer.text):
+        said = f'"{answer.text.strip()}" does not say whether the outline shown is right'
+        reason = f"Nothing was placed: {said}. Say it once more, best with a rough outline."
+    return _call("report_impossible", {"reason": reason})
+
+
+def _asks_of_outline(messages: Sequence[Message]) -> bool:
+    """Whether they end in a question about an outline whose confidence was too low."""
+    refused, asked = (None, None, *messages)[-2:]
+    doubted = isinstance(refused, Result) and refused.cause == "low_confidence"
+    return doubted and isinstance(asked, Reply) and [c.name for c in asked.calls] == ["ask_user"]
 
 
 def _begin(task: Task, history: History, before: History) -> Reply:
@@ -143,7 +176,7 @@ def _agreed(task: Task, history: History) -> Reply | None:
     answer = next((m for m in history if isinstance(m, Result) and m.call_id == asked[-1].id), None)
     if answer is None or not answer.text.strip():
         return None
-    if answer.text.strip().lower().rstrip(".!") in ("no", "nope", "no thanks"):
+    if declines(answer.text):
         return _call("report_impossible", {"reason": "Nothing was placed, as you said no."})
     if not agrees(answer.text):
         return None

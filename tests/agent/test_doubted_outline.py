@@ -32,7 +32,7 @@ def test_a_yes_makes_the_outline_shown_the_target(coins: Picture, answer: str) -
     shown = run.world.doubted
     assert shown is not None and run.view() is not None
     done = Agent().resume(run, answer=answer)
-    assert done.report.status == "planned", done.report.message
+    assert done.report.status == "deployed", done.report.message
     (target,) = done.world.targets
     assert target.outline == shown.outline
     assert done.world.doubted is None
@@ -41,15 +41,24 @@ def test_a_yes_makes_the_outline_shown_the_target(coins: Picture, answer: str) -
 @pytest.mark.parametrize("answer", ["no", "yes but the smaller one", "hm", "the left one"])
 def test_anything_else_does_not(coins: Picture, answer: str) -> None:
     done = Agent().resume(asked(coins), answer=answer)
-    assert done.report.status != "planned"
+    assert done.report.status not in ("deployed", "planned", "stopped", "failed")
     assert done.world.plans == {}
 
 
-def test_a_yes_holds_for_that_outline_alone(coins: Picture) -> None:
+def test_a_no_ends_the_turn(coins: Picture) -> None:
+    done = Agent().resume(asked(coins), answer="no")
+    assert done.report.message == "Nothing was placed, as you said no."
+
+
+@pytest.mark.parametrize(("answer", "targets"), [("yes", ["t1", "t2"]), ("no", ["t1"])])
+def test_a_later_turn_asks_so_too(coins: Picture, answer: str, targets: list[str]) -> None:
     done = Agent().resume(asked(coins), answer="yes")
-    other = TargetPrompt(box=(30, 30, 150, 160))
-    more = Agent().say(done, "Surround it", pointed=[other], settings=STRICT)
+    penny = TargetPrompt(box=(166, 301, 237, 371))
+    more = Agent().say(done, "Now around this one", pointed=[penny], settings=STRICT)
     assert more.report.status == "question"
+    last = Agent().resume(more, answer=answer)
+    assert [t.id for t in last.world.targets] == targets
+    assert (last.report.plan_id == done.report.plan_id) == (answer == "no")
 
 
 def test_a_yes_is_in_the_log(coins: Picture, tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def mended(vertices: Sequence[tuple[float, float]]) -> tuple[Polygon, str] | Non
         return None
     orders = _swapped(vertices) if len(vertices) <= MOST_SWAPPED else []
     near = [p for p in orders if p.length <= AS_SHORT * orders[0].length]
-    if near and all(_overlap(near[0], other) >= ALIKE for other in near):
+    if near and all(_shared_area(near[0], other) >= ALIKE for other in near):
         return near[0], "it crossed itself, and two vertices changed places"
     faces = shapely.polygonize([shapely.node(Polygon(vertices).exterior)])
     whole = largest_part(faces)
@@ -58,5 +58,5 @@ def _swapped(vertices: Sequence[tuple[float, float]]) -> list[Polygon]:
     return sorted((p for p in made if p.is_valid), key=lambda p: p.length)
 
 
-def _overlap(one: Polygon, other: Polygon) -> float:
+def _shared_area(one: Polygon, other: Polygon) -> float:
     return float(one.intersection(other).area / one.union(other).area)
