@@ -3,6 +3,8 @@
 import re
 
 from ...tools.formation.number_words import SMALL
+from .accounting import read_instruction
+from .spelling import spelled
 
 NUMBER = rf"(?:[0-9]{{1,5}}|{'|'.join(sorted(SMALL, key=len, reverse=True))})"
 ROBOTS = r"(?:robots?|bots?|drones?|rovers?|units?|machines?|agents?|of them)"
@@ -29,3 +31,12 @@ def amended(words: str) -> str:
         return words
     rest = words[: again.start()] + words[again.end() :]
     return rest[: first.start()] + again["count"] + rest[first.end("count") :]
+
+
+def typed(words: str) -> str:
+    """An instruction, with slips of the fingers put right where it is understood then."""
+    words = amended(words)
+    corrected = spelled(words)
+    if corrected != words and read_instruction(words).unread:
+        return words if read_instruction(corrected).unread else corrected
+    return words

@@ -12,14 +12,12 @@ from typing import Any
 
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User
-from .accounting import read_instruction
-from .amending import amended
+from .amending import typed
 from .answering import arrived, said_of_edit, said_of_heading, said_of_query, said_of_undo, talk
 from .choosing import Step, agrees, calls_in, chosen_candidates, declines, prompts_of
 from .finding import found_thing, known_thing, measured_at
-from .followup_things import UNNAMED
+from .followup_things import UNNAMED, pointing_at
 from .followups import Followup, commands, read_followup
-from .spelling import spelled
 from .standing import Standing
 
 DEICTIC = re.compile(
@@ -53,10 +51,11 @@ LEAST_WAY = 0.02
 def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task, History]:
     """The next step of a turn, or the task and messages of a whole new instruction."""
     standing = _standing(task, before)
-    words, messages = task.instruction, turn[1:]
+    new = standing is not None and any(p["id"] not in task.targets for p in task.pointed)
+    words, messages = pointing_at(task.instruction) if new else task.instruction, turn[1:]
     followup = read_followup(words, standing)
     if standing is None and not before and followup.kind != "talk":
-        return replace(task, instruction=_typed(words)), turn
+        return replace(task, instruction=typed(words)), turn
     while followup.kind == "ask" or _goes_on(messages, standing):
         answer, messages = _answer_to(messages)
         if answer is None:
@@ -68,7 +67,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
     if followup.kind == "instruction":
         fresh = words != task.instruction
         said = followup.text if standing else words
-        return replace(task, instruction=_typed(said)), (turn[0], *messages) if fresh else turn
+        return replace(task, instruction=typed(said)), (turn[0], *messages) if fresh else turn
     return _told(followup, _Steps(task, standing, followup, messages, before).next())
 
 
@@ -79,15 +78,6 @@ def _told(followup: Followup, reply: Reply) -> Reply:
     quoted = ", ".join(f'"{words}"' for words in followup.background)
     said = f"Read as background, which changes nothing: {quoted}."
     return reply.model_copy(update={"text": f"{reply.text} {said}"})
-
-
-def _typed(words: str) -> str:
-    """An instruction, with slips of the fingers put right where it is understood then."""
-    words = amended(words)
-    corrected = spelled(words)
-    if corrected != words and read_instruction(words).unread:
-        return words if read_instruction(corrected).unread else corrected
-    return words
 
 
 def _standing(task: Task, before: History) -> Standing | None:

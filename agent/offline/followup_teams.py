@@ -367,7 +367,7 @@ def arranged(slots: Slots, said: Said) -> Effects:
         return made
     edits = [e for e in made if e["kind"] != "talk"]
     counted: list[Effect] = [] if n == said.count else [{"kind": "count", "robots": n}]
-    fewer = n < said.count and any(e["demands"].get("relation") == "corners" for e in edits)
+    fewer = n < said.count and any(e.get("demands", {}).get("relation") == "corners" for e in edits)
     return ([*counted, *edits] if fewer else [*edits, *counted]) or made
 
 

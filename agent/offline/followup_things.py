@@ -17,6 +17,12 @@ UNNAMED = ("thing pointed at", "the thing pointed at")
 SIDES = {"upper": "top", "lower": "bottom", "leftmost": "left", "rightmost": "right"}
 
 
+def pointing_at(words: str) -> str:
+    """Words said while something new is pointed at, where "it" is that: as "this"."""
+    shown = re.search(r"\b(?:this|that|here|there|these|t[0-9]+)\b", words, re.IGNORECASE)
+    return words if shown else re.sub(r"\bit\b", "this", words, count=1)
+
+
 def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
     """A phrase with its thing as an id, where it is known; one of the plan's as `current`."""
     kinds = dict(chunk.kinds)

@@ -79,7 +79,7 @@ def pointing(task: Task, mode: Mode, number: int) -> Pointing:
 @cache
 def _drawings() -> dict[str, dict[str, Any]]:
     """Outlines drawn by hand, by task."""
-    return json.loads((PHOTOS / "drawn.json").read_text(encoding="utf-8"))
+    return json.loads((PHOTOS / "outlines/drawn.json").read_text(encoding="utf-8"))
 
 
 def _true_target(thing: Thing, index: int) -> Target:

@@ -59,8 +59,8 @@ async def propose_formation(
             Metres per pixel is told; places are px. keep_out: further ids no robot may touch.
             reading: only after a doubt, why this is meant.
         targets: things meant, not measured yet or to correct.
-        positions: (x, y) of all robots in order of the groups, to place them yourself.
-        samples: names of samples (s1, ...) to place them at.
+        positions: (x, y) of all robots in order of the groups, to place them.
+        samples: names of samples (s1, ...) to use.
         tell: to the person, where Deploy is false; ends the turn.
     """
     if positions is not None and samples is not None:
@@ -201,8 +201,8 @@ async def deploy(
     """Move the robots to a certified plan; says where they arrived.
 
     Args:
-        plan_id: left out: the one of this reply, else the one that stood when the turn began.
-        tell: to the person once all have arrived; ends the turn.
+        plan_id: left out: of this reply, else as stood before.
+        tell: to the person on arrival; ends the turn.
     """
     plan_id, made = plan_id or _standing_id(context), context.proposed
     node = context.world.plan(plan_id or made)

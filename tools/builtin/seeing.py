@@ -94,10 +94,9 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
     """Find things in the picture by how they look and where they are; code does the comparing.
 
     Without a query it measures what the person pointed at, or else lists all that stands out.
-    With one the reply has every match with numeric reasons. A noun counts where a network is set
-    that knows it; else `not_looked_for` names it: say "round", not "coin". Only when settled is
-    true is there exactly one; doubt and lacking say why not. Absent is true only where not even a
-    part of a thing has the look asked for.
+    With one, every match with numeric reasons. Nouns count where a network knows them,
+    else `not_looked_for` names them: say "round", not "coin". Only when settled is true is there
+    exactly one; doubt and lacking say why not. Absent: not even a part of a thing has that look.
 
     Args:
         query: colours, shade, shapes, traits, superlatives and relations that tell it apart.
@@ -159,20 +158,20 @@ def segment(
     outline: tuple[Point, ...] | None = None,
     straight: bool = False,
 ) -> ToolResult:
-    """Measure the exact outline of one thing; needs an outline, box, points, text or a candidate.
+    """Measure the exact outline of one thing; needs an outline, box, points, text or candidate.
 
-    A doubtful mask is shown; a bad one is refused with "Insufficient segmentation accuracy".
+    A doubtful mask is shown or refused.
 
     Args:
-        id: target id to give it, t1, t2, ...; an id in use is replaced.
+        id: t1, t2, ...; one in use is replaced.
         label: what it is, in a few words.
-        candidate: id of a numbered candidate, such as c3.
+        candidate: its id, such as c3.
         text: a bare noun, where nouns are found.
         box: x0, y0, x1, y1 close around it, px.
-        points: points (x, y) on it, px; beside an outline or box they correct it.
-        negative: points (x, y) that are not part of it, px.
-        outline: rough outline, 3 to 30 vertices (x, y) in order around it, px; the surest way.
-        straight: whether the outline's sides are straight lines between its vertices.
+        points: (x, y) on it, px; they correct an outline or box.
+        negative: points off it, px.
+        outline: vertices (x, y) in order around it, px; the surest way.
+        straight: its sides are.
     """
     prompt = parse_prompt(
         {

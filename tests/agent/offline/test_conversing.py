@@ -154,3 +154,16 @@ def test_an_answer_chooses_one_of_two(ring: Run) -> None:
     moved = Agent().resume(asked, answer="3, outwards")
     far = [k for k, d in enumerate(distances(moved)) if d > max(distances(ring)) + 2]
     assert [(moved.report.robots or ())[k] for k in far] == ["3"]
+
+
+@pytest.mark.parametrize("words", ["surround it", "cage it", "now around it", "surround this"])
+def test_it_is_what_is_pointed_at_in_the_same_turn(ring: Run, words: str) -> None:
+    pointed = [TargetPrompt(points=(BLUE,))]
+    after = Agent().say(ring, words, settings=PLAN, pointed=pointed)
+    assert after.report.status == "planned", after.report.message
+    assert np.allclose(distances(after, BLUE), distances(after, BLUE)[0], atol=3)
+
+
+def test_it_is_the_things_that_stands_where_nothing_is_pointed_at(ring: Run) -> None:
+    after = say(ring, "cage it")
+    assert max(distances(after, RED)) < 100

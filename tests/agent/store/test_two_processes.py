@@ -107,8 +107,10 @@ def test_a_conversation_that_another_process_deleted_is_forgotten(
         here, there = Service(Agent(), store), Service(Agent(), store)
         name = opened(here, picture)
         await here.say(name, "Surround it")
-        following = asyncio.ensure_future(anext(here.follow(name, 99), None))
-        await asyncio.sleep(0)
+        stream, last = here.follow(name), len(here.events(name))
+        while getattr(await anext(stream), "number", 0) < last:
+            pass  # it has begun, and waits for what comes next
+        following = asyncio.ensure_future(anext(stream, None))
         await there.delete(name)
         assert await following is None, "its stream ends"
         for command in (here.fresh, here.stop, here.waits, here.undo, here.go, here.edit):

@@ -79,12 +79,14 @@ def test_a_right_answer_scores_1_and_no_understanding_little(name: str, split: s
 def test_what_ships() -> None:
     assert shipped() == [
         "dialogues",
+        "exact",
         "formation-dev",
         "frontier",
         "infeasible",
         "injection",
         "many",
         "photos",
+        "photos-added",
         "scenes",
         "smoke",
         "zerocap15",

@@ -11,9 +11,8 @@ from .drawn_outline import segment_corrected
 from .protocol import Pixels, PromptKind, Segmentation
 from .segment import segment_box, segment_points
 
-# Points mean parts as often as whole things, so only the clearest masks are taken; drawn outlines
-# are mostly right.
-THRESHOLDS = MappingProxyType({"point": 0.65, "box": 0.55, "outline": 0.5, "candidate": 0.5})
+# Below these most formations were wrong on the photographs; a yes to what is shown uses any other.
+THRESHOLDS = MappingProxyType({"point": 0.55, "box": 0.35, "outline": 0.35, "candidate": 0.5})
 
 
 class GrabCutSegmenter:

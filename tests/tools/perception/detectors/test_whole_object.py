@@ -49,7 +49,7 @@ def test_any_point_on_the_car_finds_the_car(point: tuple[int, int]) -> None:
     truth = mask_of_outline(car.outline, picture.width, picture.height)
     found = segment_points(picture.pixels, [point])
     assert (found.mask & truth).sum() / (found.mask | truth).sum() > 0.8
-    assert found.confidence > 0.75
+    assert found.confidence > 0.4
 
 
 def test_what_may_be_a_part_is_doubted() -> None:
