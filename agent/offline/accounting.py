@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from .demand_fields import LENGTHS, Fields
-from .demands import Item, demands_in, items_of, says_more, sentences, stops_in
+from .demands import Item, demands_in, items_of, says_inside, says_more, sentences, stops_in
 from .drawn_forms import form_in
 from .languages import foreign_language
 from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
@@ -225,10 +225,15 @@ class _Reader:
                 first = phrase.lower().split()[0]
                 if k in self.prevented and self.reading.relation == "cage":
                     self.taken[k] = False
-                elif says_more(phrase) or (self.reading.things and not may_open(first)):
+                elif self._demands(phrase) or (self.reading.things and not may_open(first)):
                     self.reading.unread.append(phrase)
                 else:
                     self.reading.things.append(phrase)
+
+    def _demands(self, phrase: str) -> bool:
+        """Whether a phrase for a thing says more than which, or where else robots stand."""
+        outside = self.reading.relation not in ("inside", "centre")
+        return says_more(phrase) or (outside and says_inside(phrase))
 
     def _place(self) -> str:
         """What stands before the thing says where a form is drawn."""

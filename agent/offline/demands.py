@@ -155,12 +155,17 @@ def word_list(name: str) -> frozenset[str]:
 
 def says_more(phrase: str) -> bool:
     """Whether a phrase for a thing says more than which thing, such as "every coin"."""
-    return any(pattern.search(phrase.lower()) for pattern in _in_things())
+    return any(pattern.search(phrase.lower()) for pattern in _patterns("in_things"))
+
+
+def says_inside(phrase: str) -> bool:
+    """Whether a phrase for a thing is about its inside: "the inside of the box"."""
+    return any(pattern.search(phrase.lower()) for pattern in _patterns("insides"))
 
 
 @cache
-def _in_things() -> tuple[re.Pattern[str], ...]:
-    return tuple(re.compile(pattern) for pattern in _table()["in_things"])
+def _patterns(name: str) -> tuple[re.Pattern[str], ...]:
+    return tuple(re.compile(pattern) for pattern in _table()[name])
 
 
 def sentences(items: Sequence[Item]) -> list[list[Item]]:

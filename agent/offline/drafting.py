@@ -33,14 +33,14 @@ def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
         or _not_understood(reading, robots)
         or _unsettled(reading)
         or _how_many(reading, robots)
-        or _which_things(task, reading)
+        or which_things(task, reading)
     )
 
 
 def would_do(task: Task, reading: Reading) -> bool:
     """Whether all but words that were left unread is settled, so that a contract can be shown."""
     settled = not (reading.stops or reading.unscaled or _unsettled(reading))
-    settled = settled and not (reading.others or reading.faced or _which_things(task, reading))
+    settled = settled and not (reading.others or reading.faced or which_things(task, reading))
     return settled and bool(reading.unread)
 
 
@@ -195,7 +195,8 @@ def _how_many(reading: Reading, robots: int | None) -> str | None:
     return None if robots else "How many robots? Say a number."
 
 
-def _which_things(task: Task, reading: Reading) -> str | None:
+def which_things(task: Task, reading: Reading) -> str | None:
+    """What to ask where more or fewer things are pointed at than the arrangement is about."""
     pointed = list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))
     needed = things_needed(reading)
     if reading.others and len(pointed) == needed + len(reading.others):

@@ -19,8 +19,8 @@ from .answering import arrived
 from .choosing import Found, Step, agrees, calls_in, declines, find, located_reasons, prompts_of
 from .conversing import conversed
 from .descriptions import Reference
-from .drafting import contract_of, place_of, question_of, things_needed, would_do
-from .pointed import narrowed
+from .drafting import contract_of, place_of, question_of, things_needed, which_things, would_do
+from .pointed import chosen_by_answer, narrowed
 from .reading import Reading
 from .references import described
 from .several import about_several, shares
@@ -154,7 +154,8 @@ def _narrowed(task: Task, history: History) -> Task | Reply:
     agreed = _agreed(task, history)
     if agreed is not None:
         return agreed
-    task = replace(task, instruction=_said(task, history))
+    task, answers = _told_which(task, history)
+    task = replace(task, instruction=_said(task, answers))
     several = about_several(task, task.robots or _number_answered(history), history)
     if several is not None:
         if several.name == "propose_formation" and _was_doubted(history):
@@ -162,6 +163,18 @@ def _narrowed(task: Task, history: History) -> Task | Reply:
         return _call(several.name, several.arguments)
     chosen = narrowed(task, history)
     return _call(chosen.name, chosen.arguments) if isinstance(chosen, Step) else chosen
+
+
+def _told_which(task: Task, history: History) -> tuple[Task, list[str]]:
+    """The task about what answers have chosen of what is pointed at, and the other answers."""
+    left: list[str] = []
+    for question, answer in _answered(history):
+        reading = read_instruction(_said(task, left), task.metres_per_pixel)
+        asked = question == which_things(task, reading)
+        chosen = chosen_by_answer(task, answer, history) if asked else None
+        task = chosen or task
+        left += [] if chosen else [answer]
+    return task, left
 
 
 def _in_unit(task: Task, contract: dict[str, Any]) -> dict[str, Any]:
@@ -213,10 +226,9 @@ def _left_off(result: Result, history: History) -> str:
     return f"{wording} {result.text}"
 
 
-def _said(task: Task, history: History) -> str:
+def _said(task: Task, said: Sequence[str]) -> str:
     """The instruction with the answers to questions about it, which stand for what was unread."""
     text = instructed(task.instruction)
-    said = _answered(history)
     for k, answer in enumerate(said):
         if answer.isdecimal():
             continue  # how many robots
@@ -233,16 +245,21 @@ def _said(task: Task, history: History) -> str:
     return text
 
 
-def _answered(history: History) -> list[str]:
-    """What the person answered to questions that offered no candidates."""
-    offered = {c.id for c in calls_in(history) if c.arguments.get("candidates")}
-    asked = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
-    return [spelled(m.text.strip()) for m in asked if m.call_id not in offered]
+def _answered(history: History) -> list[tuple[str, str]]:
+    """The questions that offered no candidates, each with what the person answered."""
+    asked = {c.id: c.arguments for c in calls_in(history) if not c.arguments.get("candidates")}
+    answers = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
+    return [
+        (str(asked[m.call_id]["question"]), spelled(m.text.strip()))
+        for m in answers
+        if m.call_id in asked
+    ]
 
 
 def _number_answered(history: History) -> int | None:
     """The number of robots that an answer gives alone."""
-    return next((int(t) for t in _answered(history) if t.isascii() and t.isdecimal()), None)
+    answers = (answer for _, answer in _answered(history))
+    return next((int(t) for t in answers if t.isascii() and t.isdecimal()), None)
 
 
 def _standing_count(task: Task) -> int | None:

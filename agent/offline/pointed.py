@@ -41,6 +41,9 @@ SEVERAL = re.compile(
     r"\b(?:each|every|both|all)\b(?: of)?(?: the| these| those)?\s*$", re.IGNORECASE
 )
 """What comes before a thing where more than one is meant."""
+BARE = re.compile(r"left|right|upper|lower|top|bottom|first|second|third|last", re.IGNORECASE)
+"""An answer that says which and not what."""
+POLITE = re.compile(r"[ ,]*(?:please|thanks|thank you)?[ .!]*$", re.IGNORECASE)
 THE_THING = "the thing"
 """Stands in the instruction for the one that is chosen."""
 
@@ -82,6 +85,20 @@ def narrowed(task: Task, history: History) -> Task | Step:
     words = f"{text[:start]}{THE_THING}{text[chunk.end :]}"
     chosen = tuple(p for p in task.pointed if p["id"] == name)
     return replace(task, instruction=words, pointed=chosen)
+
+
+def chosen_by_answer(task: Task, answer: str, history: History) -> Task | None:
+    """The task about the one of several things pointed at that an answer names, as "t1" does.
+
+    None where it names none or more than one, or says more than that.
+    """
+    alone = POLITE.sub("", answer)
+    spoken = f"the {alone} one" if BARE.fullmatch(alone) else alone
+    found = narrowed(replace(task, instruction=f"surround {spoken}"), history)
+    if not isinstance(found, Task) or len(found.pointed) != 1:
+        return None
+    whole = found.instruction.strip(" .!") == f"surround {THE_THING}"
+    return replace(task, pointed=found.pointed) if whole else None
 
 
 def _things_named(

@@ -235,3 +235,23 @@ def test_the_first_use_says_what_is_downloaded(
     assert "licence: apache-2.0" in err
     assert checkpoint_folder("facebook/sam-vit-base@main") == kept
     assert capsys.readouterr().err == ""
+
+
+def test_weights_that_a_checkpoint_lacks_are_named(
+    checkpoints: Path,
+    two_red: Picture,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    safetensors = import_module("safetensors.torch")
+    folder = tmp_path / "sam"
+    shutil.copytree(checkpoints / "sam", folder)
+    weights = safetensors.load_file(folder / "model.safetensors")
+    lost = sorted(weights)[0]
+    safetensors.save_file(
+        {name: value for name, value in weights.items() if name != lost},
+        folder / "model.safetensors",
+        metadata={"format": "pt"},
+    )
+    segmenter_named(f"sam:{folder}").segment(two_red.pixels, BOX)
+    assert f"lacks weights, which are random: {lost}" in caplog.text

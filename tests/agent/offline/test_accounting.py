@@ -360,3 +360,23 @@ def test_instructions_of_the_suites_are_read_as_their_rules_mean_them(
         if reading.relation != meant or reading.robots not in (None, task.robots):
             wrong.append(f"{task.instruction} {reading.relation} {reading.robots}")
     assert wrong == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Line the inside of the pale patch with 11 robots",
+        "Ring the inside of the court with 8 robots",
+        "Surround the inside edge of the pool with 6 robots",
+        "Guard the interior of the fence with 4 robots",
+    ],
+)
+def test_the_inside_of_a_thing_is_not_its_surroundings(words: str) -> None:
+    reading, question = read(words)
+    assert reading.unread
+    assert question is not None
+
+
+def test_the_inside_of_a_thing_is_filled_where_the_command_says_so() -> None:
+    reading, question = read("Fill the inside of the box with 6 robots")
+    assert (reading.relation, question) == ("inside", None)

@@ -167,3 +167,26 @@ def test_it_is_what_is_pointed_at_in_the_same_turn(ring: Run, words: str) -> Non
 def test_it_is_the_things_that_stands_where_nothing_is_pointed_at(ring: Run) -> None:
     after = say(ring, "cage it")
     assert max(distances(after, RED)) < 100
+
+
+@pytest.mark.parametrize(
+    ("answer", "at"),
+    [("t1", RED), ("t2", BLUE), ("t2 please", BLUE), ("the first", RED), ("right", BLUE)],
+)
+def test_an_answer_says_which_of_several_things_is_meant(
+    picture: Picture, answer: str, at: tuple[int, int]
+) -> None:
+    pointed = [TargetPrompt(id="t1", points=(RED,)), TargetPrompt(id="t2", points=(BLUE,))]
+    words = "post nine sentries about the gizmo, 14 px off its edge"
+    asked = Agent().run(picture, words, settings=PLAN, pointed=pointed)
+    assert isinstance(asked.outcome, Paused)
+    done = Agent().resume(asked, answer=answer)
+    assert done.report.status == "planned", done.report.message
+    assert np.allclose(distances(done, at), distances(done, at)[0], atol=4)
+
+
+def test_an_answer_that_chooses_none_of_them_is_asked_about(picture: Picture) -> None:
+    pointed = [TargetPrompt(id="t1", points=(RED,)), TargetPrompt(id="t2", points=(BLUE,))]
+    asked = Agent().run(picture, "surround the gizmo", settings=PLAN, pointed=pointed)
+    done = Agent().resume(asked, answer="the purple hat")
+    assert done.report.status == "question"

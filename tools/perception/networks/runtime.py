@@ -5,6 +5,7 @@ Where and how exactly networks run is the machine's matter: see `settings`.
 
 import hashlib
 import json
+import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
@@ -24,6 +25,9 @@ from .settings import DEVICE, device_name, dtype_name
 Floats = NDArray[np.float32]
 MISSING = 0.05
 """The share of a network's weights that a checkpoint may lack: names change between releases."""
+NAMED = 5
+"""Weights that are named where they are missing."""
+LOG = logging.getLogger(__name__)
 REMEMBERED = 4
 """Pictures whose embeddings are kept: one takes some MB, on a GPU of its memory."""
 
@@ -113,6 +117,9 @@ def load_network(name: str, classes: Mapping[str, str], *, processor: bool) -> N
         raise InputError(f"The checkpoint {name} cannot be loaded: {why}.") from None
     if len(report["missing_keys"]) > MISSING * len(model.state_dict()):
         raise InputError(f"The checkpoint {name} lacks weights of its network; fetch it again.")
+    if report["missing_keys"]:
+        lacking = ", ".join(sorted(report["missing_keys"])[:NAMED])
+        LOG.warning("The checkpoint %s lacks weights, which are random: %s.", name, lacking)
     return Network(model, words, device, dtype)
 
 
