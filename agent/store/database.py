@@ -15,6 +15,7 @@ from typing import Any
 
 from pydantic_core import from_json, to_json
 from sqlalchemy import Connection, delete, func, insert, select, text, update
+from sqlalchemy.event import listen
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from ...tools.errors import StorageError
@@ -116,7 +117,8 @@ class DatabaseStore:
             connection.execute(delete(SESSIONS).where(SESSIONS.c.id == session))
 
     def close(self) -> None:
-        """See `Store.close`."""
+        """See `Store.close`; what a thread still reads with is closed when it has done."""
+        listen(self._engine.pool, "checkin", lambda _, record: record.invalidate())
         self._engine.dispose()
 
     def lock(self, name: str) -> ExitStack | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from formup.agent.store.copies import fork
-from formup.agent.store.database import DatabaseFiles
+from formup.agent.store.database import DatabaseFiles, DatabaseStore
 from formup.agent.store.places import data_folder, store_at
 from formup.agent.store.protocol import Store, StoredSession
 from formup.tools.errors import InputError, StorageError
@@ -333,6 +333,18 @@ def test_what_is_no_store_is_refused_without_showing_a_password(address: str) ->
     with pytest.raises(InputError, match="A store is a folder, sqlite:///FILE or postgresql") as e:
         store_at(address)
     assert "secret" not in str(e.value)
+
+
+@databases
+def test_a_connection_in_use_when_its_store_closes_is_closed_after_it(store: Store) -> None:
+    assert isinstance(store, DatabaseStore)
+    with store.reading() as connection:
+        inner = connection.connection.dbapi_connection
+        store.close()
+        assert connection.scalar(text("SELECT 1")) == 1
+    assert inner is not None
+    with pytest.raises(Exception, match="closed"):
+        inner.cursor().execute("SELECT 1")
 
 
 def test_a_server_that_is_not_there_is_one_sentence() -> None:
