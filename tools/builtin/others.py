@@ -14,7 +14,7 @@ from ..formation.encounters import Encounter, encounters_of
 from ..formation.plan import Plan
 from ..geometry.outline import MIN_AREA, FloatArray, Outline, outline_of
 from ..motion.avoiding import routes_off
-from ..motion.motion import obstacles
+from ..motion.routes import obstacles
 from ..perception.target_prompt import TargetPrompt
 from ..world import KeepOut, World
 from .targets import measured_all

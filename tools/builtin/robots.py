@@ -30,7 +30,7 @@ from ..formation.encounters import notes_of
 from ..formation.plan import Plan
 from ..formation.site import Other
 from ..geometry.outline import FloatArray
-from ..motion.motion import obstacles
+from ..motion.routes import obstacles
 from ..tool import in_thread, to_its_end
 from ..world import PlanNode, World
 from .others import met_by

@@ -19,7 +19,7 @@ from ..formation.value import Value
 from ..geometry.assignment import assign
 from ..geometry.outline import FloatArray
 from ..motion.avoiding import routes_off
-from ..motion.motion import obstacles
+from ..motion.routes import obstacles
 from .protocol import (
     Fleet,
     FleetBusyError,

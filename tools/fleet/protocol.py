@@ -4,7 +4,7 @@ A package adds one by an entry point of the group `formup.fleets` that names a `
 `conformance` holds the checks that every fleet has to pass. Frame: image pixels, x right, y down.
 """
 
-from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from collections.abc import AsyncGenerator, Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import FleetError
 from ..geometry.outline import FloatArray
+from ..motion.motion import Motion
 
 
 class FleetStoppedError(FleetError):
@@ -69,21 +70,6 @@ class Pose:
     y: float
     heading: float | None = None
     seen: float = 0.0
-
-
-@dataclass(frozen=True)
-class Motion:
-    """What robots are to drive, all in step: each has covered the same share of its path.
-
-    Attributes:
-        paths: polyline, (k, 2) px with k >= 2, by robot id; it begins where the robot stands.
-            Robots that are not in it stay where they are.
-        headings: which way robots look at the end, radians clockwise from the x axis, by id;
-            only for a fleet that turns.
-    """
-
-    paths: Mapping[str, FloatArray]
-    headings: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 class Fleet(Protocol):

@@ -15,7 +15,7 @@ from ..geometry.curves import Curve, Frame
 from ..geometry.interior import inside
 from ..geometry.outline import FloatArray, distances, largest_part, outline_of
 from ..geometry.sampling import along_curve
-from ..motion.motion import along
+from ..motion.routes import along
 from .protocol import (
     FleetBusyError,
     FleetClosedError,

@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 from ..formation.encounters import room_of
 from ..formation.site import Other, Site
 from ..geometry.outline import FloatArray, distances
-from .motion import NOBODY, NoRouteError, routes
+from .routes import NOBODY, NoRouteError, routes
 
 STANDING = 1.1
 """A robot whose centre is no further from a thing than so many radii stands on it."""

@@ -1,267 +1,69 @@
-"""From where robots are to where they shall stand: on which path.
+"""What robots are to drive: a path for each, when it is where, and who passes where first.
 
-Paths are shortest ones around the targets on a visibility graph (Lozano-Perez and Wesley 1979).
-Frame: image pixels. Robots do not yet avoid each other.
+Robots that keep to the order of passage never touch, however late any of them is: this is the
+action dependency graph of Hoenig et al. (2019) with arc lengths for vertices. Frame: image pixels.
 """
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
-from shapely.geometry import LineString, Polygon
-from shapely.geometry.base import BaseGeometry
 
-from ..errors import FleetError
-from ..formation.contract import MIN_SPACING, Contract
-from ..formation.placement.place import Site
-from ..geometry.curves import Frame
-from ..geometry.outline import FloatArray, distances
+from ..geometry.outline import FloatArray
 
-MAX_NODES, EACH_NODES = 60, 8
-"""Vertices kept of obstacles, and of each further part of them: enough for a path within a percent
-of the shortest."""
-BEND_SEGMENTS = 2
-"""Segments of a quarter circle around an obstacle's corner."""
-ROOM_SHARES = (0.7, 0.3, 0.03)
-"""How much of the smallest clearance at starts and goals paths keep: well away where there is
-room, squeezing past where not."""
-LEAST_EXIT = 1.0
-"""Robots that stand on an obstacle go at least so far off it, px."""
-ROUND_SEGMENTS = 16
-"""Segments of a quarter circle where distances are to be exact."""
-ROUND_DIP = math.cos(math.pi / 4 / ROUND_SEGMENTS)
-"""How near the middle of such a segment comes, as a share of the radius."""
-SPARE = 1.02
-"""Share of a body that is left free where robots leave obstacles, so that all of it is kept off."""
-NOBODY = np.empty((0, 2))
-
-Bodies = NDArray[np.object_]
+Indices = NDArray[np.intp]
 
 
-class NoRouteError(FleetError):
-    """Places that no path leads to: those of `robots`, indices of starts and goals."""
-
-    def __init__(self, text: str, robots: NDArray[np.intp]) -> None:
-        super().__init__(text)
-        self.robots = robots
-
-
-def obstacles(contract: Contract, site: Site) -> BaseGeometry:
-    """What robots have to drive around: targets no group of the contract stands on."""
-    solid = [site.outlines[t].filled for t in contract.solid_targets]
-    return shapely.union_all(np.asarray(solid, dtype=object)) if solid else Polygon()
-
-
-def routes(
-    starts: FloatArray,
-    goals: FloatArray,
-    solid: BaseGeometry,
-    radius: float,
-    frame: Frame,
-    *,
-    idle: FloatArray = NOBODY,
-) -> list[FloatArray]:
-    """Shortest paths that keep robots of a radius off obstacles and idle robots, start i to goal i.
-
-    Paths stay in the frame where they can, and leave it only where there is no other way. A robot
-    that stands on an obstacle first leaves it by the shortest way.
-
-    Args:
-        starts: (n, 2).
-        goals: (n, 2); one on an obstacle's edge is driven to straight from just off it.
-        solid: the obstacles' union.
-        radius: of a robot, px.
-        frame: the picture.
-        idle: (m, 2) where robots stand that do not move.
-
-    Returns:
-        n polylines, (k, 2) each.
-
-    Raises:
-        NoRouteError: a goal is walled off.
-    """
-    ground = _Ground(solid, radius, frame)
-    ends = np.concatenate([starts, goals])
-    wider = _bodies(idle, ends, SPARE * radius)
-    exits, entries = ground.exits(starts, goals, wider), ground.exits(goals, goals, wider)
-    bodies = _bodies(idle, np.concatenate([ends, exits, entries]), radius)
-    paths = ground.paths(exits, entries, bodies)
-    leaving = np.flatnonzero((exits != starts).any(axis=1))
-    ways_out = _Ground(Polygon(), radius, frame).paths(starts[leaving], exits[leaving], bodies)
-    for i, way_out in zip(leaving, ways_out, strict=True):
-        paths[i] = np.concatenate([way_out[:-1], paths[i]])
-    for i in np.flatnonzero((entries != goals).any(axis=1)):
-        paths[i] = np.concatenate([paths[i], goals[i : i + 1]])
-    return paths
-
-
-def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
-    """Discs, (m,), that the centres of others keep out of; smaller where a path ends near."""
-    if not len(idle):
-        return np.empty(0, dtype=object)
-    nearest = np.linalg.norm(idle[:, None] - ends, axis=2).min(axis=1)
-    body = max(2 * radius, MIN_SPACING)
-    reach = np.where(nearest > body / ROUND_DIP, body, np.minimum(body, 0.99 * nearest)) / ROUND_DIP
-    discs = shapely.buffer(shapely.points(idle), reach, quad_segs=ROUND_SEGMENTS)
-    return np.asarray(discs, dtype=object)
-
-
-def _clusters(bodies: Bodies) -> NDArray[np.intp]:
-    """The number of the cluster each body belongs to, (m,); nobody fits between its members."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    pairs = shapely.STRtree(bodies).query(bodies, predicate="intersects")
-    graph = coo_array((np.ones(pairs.shape[1]), pairs), shape=(len(bodies), len(bodies)))
-    return np.asarray(connected_components(graph)[1], dtype=np.intp)
+def _none() -> Indices:
+    return np.empty(0, dtype=np.intp)
 
 
 @dataclass(frozen=True)
-class _Ground:
-    """Obstacles, and the picture around which robots of a radius drive."""
+class Passages:
+    """Who waits for whom: g rows, in the order of `waiting` and then of `at`.
 
-    solid: BaseGeometry
-    radius: float
-    frame: Frame
+    Attributes:
+        waiting: (g,) the robot that waits, by its place among the paths of a motion.
+        at: (g,) arc length along its path, px, that it may not pass before
+        first: (g,) this robot
+        past: (g,) has come to this arc length along its own path, px.
+    """
 
-    def exits(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> FloatArray:
-        """Starts, (n, 2), those on the obstacles moved off them as far as the goals are."""
-        if self.solid.is_empty:
-            return starts
-        on = distances(self.solid, starts) <= self.radius
-        if not on.any():
-            return starts
-        away = max(float(distances(self.solid, goals).min()), LEAST_EXIT)
-        rim = self.solid.buffer(away / ROUND_DIP, quad_segs=ROUND_SEGMENTS)
-        free = shapely.difference(rim.boundary, shapely.union_all(bodies))
-        inside = shapely.intersection(free, self.frame.box)
-        line = next(part for part in (inside, free, rim.boundary) if not part.is_empty)
-        exits = starts.copy()
-        shortest = shapely.shortest_line(shapely.points(starts[on]), line)
-        exits[on] = shapely.get_coordinates(shortest)[1::2]
-        return exits
+    waiting: Indices = field(default_factory=_none)
+    at: FloatArray = field(default_factory=lambda: np.empty(0))
+    first: Indices = field(default_factory=_none)
+    past: FloatArray = field(default_factory=lambda: np.empty(0))
 
-    def paths(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> list[FloatArray]:
-        """Shortest paths past the obstacles and those bodies that would be in the way."""
-        paths = self._paths_around(starts, goals, bodies[:0])
-        if not len(bodies) or not len(paths):
-            return paths
-        tree, cluster = shapely.STRtree(bodies), _clusters(bodies)
-        in_the_way = np.zeros(len(bodies), dtype=bool)
-        while True:
-            lines = np.asarray([LineString(path) for path in paths], dtype=object)
-            blocked, hit = tree.query(lines, predicate="intersects")
-            if not len(hit):
-                return paths
-            again = np.unique(blocked)
-            in_the_way |= np.isin(cluster, cluster[hit])
-            try:
-                found = self._paths_around(starts[again], goals[again], bodies[in_the_way])
-            except NoRouteError as error:
-                raise NoRouteError(str(error), again[error.robots]) from None
-            for i, path in zip(again, found, strict=True):
-                paths[i] = path
-
-    def _paths_around(
-        self, starts: FloatArray, goals: FloatArray, bodies: Bodies
-    ) -> list[FloatArray]:
-        """Shortest paths around the obstacles and around all of some bodies."""
-        ways = np.stack([starts, goals], axis=1)
-        paths = list(ways)
-        straight = np.asarray(shapely.linestrings(ways), dtype=object)
-        left = np.arange(len(paths))
-        keeps = self._keeps(np.concatenate([starts, goals]))
-        for keep, bounded in [*((keep, True) for keep in keeps), (keeps[-1], False)]:
-            barrier = self._barrier(keep, bodies)
-            left = left[shapely.intersects(straight[left], barrier)]
-            if not len(left):
-                return paths
-            nodes = _nodes(self.solid, keep, bodies, barrier)
-            if bounded:
-                nodes = nodes[shapely.intersects_xy(self.frame.box, nodes)]
-            graph = _Visibility(nodes, barrier)
-            bent = {int(i): graph.path(*ways[i]) for i in left}
-            for i, path in bent.items():
-                paths[i] = paths[i] if path is None else path
-            left = np.array([i for i, path in bent.items() if path is None], dtype=np.intp)
-        if len(left):
-            what = "the target and the robots that stay" if len(bodies) else "the target"
-            x, y = goals[left[0]]
-            raise NoRouteError(f"There is no way around {what} to place ({x:.0f}, {y:.0f}).", left)
-        return paths
-
-    def _keeps(self, ends: FloatArray) -> list[float]:
-        """Distances to keep from the obstacles, px, the one that is tried first at the front."""
-        near = 0.0 if self.solid.is_empty else float(distances(self.solid, ends).min())
-        if near <= self.radius:
-            return [0.99 * near]
-        return [self.radius + share * (near - self.radius) for share in ROOM_SHARES]
-
-    def _barrier(self, keep: float, bodies: Bodies) -> BaseGeometry:
-        """What paths must not touch: the obstacles grown by nearly what is kept, and bodies."""
-        barrier = self.solid.buffer(keep * 0.999)
-        if len(bodies):
-            barrier = shapely.union_all([barrier, *bodies])
-        shapely.prepare(barrier)
-        return barrier
+    def __len__(self) -> int:
+        return len(self.waiting)
 
 
-def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
-    """Where robots are when each has covered its share of its path, (n, 2)."""
-    lines = np.asarray([LineString(path) for path in paths], dtype=object)
-    return shapely.get_coordinates(shapely.line_interpolate_point(lines, shares, normalized=True))
+@dataclass(frozen=True)
+class Motion:
+    """What robots are to drive.
+
+    Attributes:
+        paths: polyline, (k, 2) px with k >= 2, by robot id; it begins where the robot stands.
+            Robots that are not in it stay where they are.
+        headings: which way robots look at the end, radians clockwise from the x axis, by id;
+            only for a fleet that turns.
+        times: (k,) when a robot is at each vertex of its path if nothing delays it, seconds from
+            the start, by id; where it waits a vertex comes twice. Empty where nobody planned it.
+        passages: the order in which robots pass each other; to be kept, whatever the time.
+    """
+
+    paths: Mapping[str, FloatArray]
+    headings: Mapping[str, float] = field(default_factory=dict[str, float])
+    times: Mapping[str, FloatArray] = field(default_factory=dict[str, FloatArray])
+    passages: Passages = field(default_factory=Passages)
+
+    @property
+    def makespan(self) -> float:
+        """Seconds until the last robot arrives if nothing delays any."""
+        return max((float(times[-1]) for times in self.times.values()), default=0.0)
 
 
-def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeometry) -> FloatArray:
-    """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
-    dip = math.cos(math.pi / (4 * BEND_SEGMENTS))
-    grown = solid.buffer((1.01 * keep + 0.05) / dip, quad_segs=BEND_SEGMENTS)
-    tolerance, most = 0.0, MAX_NODES + EACH_NODES * (shapely.get_num_geometries(grown) - 1)
-    while True:
-        coarse = grown.simplify(tolerance).buffer(1.05 * tolerance, join_style="mitre")
-        coordinates = shapely.get_coordinates(coarse)
-        if len(coordinates) <= most:
-            break
-        tolerance = max(1.5 * tolerance, 0.25)
-    x0, _, x1, _ = shapely.bounds(bodies).reshape(-1, 4).T
-    reach = (1.01 * (x1 - x0) / 2 + 0.05) / dip
-    corners = shapely.buffer(shapely.centroid(bodies), reach, quad_segs=BEND_SEGMENTS)
-    bends = shapely.get_coordinates(corners)
-    free = bends[~shapely.intersects_xy(barrier, bends)]
-    return np.unique(np.concatenate([coordinates, free]), axis=0)
-
-
-class _Visibility:
-    """All-pairs shortest paths among nodes that see each other past a barrier."""
-
-    def __init__(self, nodes: FloatArray, barrier: BaseGeometry) -> None:
-        from scipy.sparse.csgraph import shortest_path
-
-        self._nodes, self._barrier = nodes, barrier
-        if not len(nodes):
-            return
-        lengths = np.stack([self._sight(node) for node in nodes])
-        self._length, self._before = shortest_path(lengths, return_predecessors=True)
-
-    def path(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
-        """The shortest path, (k, 2), or None where there is none."""
-        if not len(self._nodes):
-            return None
-        total = self._sight(start)[:, None] + self._length + self._sight(goal)[None, :]
-        first, last = np.unravel_index(int(np.argmin(total)), total.shape)
-        if not np.isfinite(total[first, last]):
-            return None
-        chain = [int(last)]
-        while chain[-1] != first:
-            chain.append(int(self._before[first, chain[-1]]))
-        return np.concatenate([[start], self._nodes[chain[::-1]], [goal]])
-
-    def _sight(self, point: FloatArray) -> FloatArray:
-        """Distance to every node that is seen from a point, infinite to the others."""
-        ends = np.broadcast_to(point, self._nodes.shape)
-        lines = shapely.linestrings(np.stack([ends, self._nodes], axis=1))
-        distance = np.linalg.norm(self._nodes - point, axis=1)
-        return np.where(shapely.intersects(lines, self._barrier), np.inf, distance)
+def arc_lengths(path: FloatArray) -> FloatArray:
+    """How far along a polyline, (k, 2), each of its vertices is, (k,), px."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])

@@ -15,7 +15,7 @@ from formup.tools.fleet.protocol import (
     RobotsFailedError,
     check_ages,
 )
-from formup.tools.motion.motion import along
+from formup.tools.motion.routes import along
 
 PERIOD_S, SPEED = 0.005, 800.0
 

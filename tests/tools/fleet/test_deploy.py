@@ -31,7 +31,7 @@ from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import FloatArray, distances, make_outline
-from formup.tools.motion.motion import obstacles
+from formup.tools.motion.routes import obstacles
 from shapely.geometry.base import BaseGeometry
 
 CUP = [(200, 150), (240, 150), (240, 270), (380, 270), (380, 150), (420, 150), (420, 330),

@@ -7,7 +7,7 @@ from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.placement.place import Site
 from formup.tools.geometry.curves import Frame
 from formup.tools.geometry.outline import FloatArray, distances, make_outline
-from formup.tools.motion.motion import NoRouteError, along, obstacles, routes
+from formup.tools.motion.routes import NoRouteError, along, obstacles, routes
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
