@@ -1,6 +1,5 @@
 """A kinematic simulator: robots that follow their paths but slip, so that arrival is earned."""
 
-import asyncio
 import math
 from collections.abc import AsyncGenerator, Sequence
 from itertools import count, islice
@@ -16,6 +15,7 @@ from ..geometry.interior import inside
 from ..geometry.outline import FloatArray, distances, largest_part, outline_of
 from ..geometry.sampling import along_curve
 from ..motion.routes import along
+from .pace import Pace
 from .protocol import (
     FleetBusyError,
     FleetClosedError,
@@ -59,7 +59,7 @@ class SimulatedFleet:
     def __init__(
         self, poses: Sequence[Pose], *, speed: float, radius: float | None = None, seed: int = 0
     ) -> None:
-        self.radius, self.stopped = radius, False
+        self.radius, self.stopped, self.pace = radius, False, Pace()
         self._ids = tuple(pose.id for pose in poses)
         self._points = points_of(poses)
         self._headings = [pose.heading for pose in poses]
@@ -98,7 +98,7 @@ class SimulatedFleet:
                         self._headings[i] = begin + turn * step / steps * float(share)
                 self._now += PERIOD
                 yield self._seen()
-                await asyncio.sleep(0)  # unpaced, but whoever wants to stop it gets a turn
+                await self.pace.step(PERIOD)
                 self._check_open()
                 if self._stops != stops:
                     raise FleetStoppedError("The simulated fleet was stopped on the way.")
