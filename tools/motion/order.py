@@ -114,8 +114,12 @@ def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
         better = found
         for circle in found.circles:
             for i in circle:
-                ends = [found.paths[j][[0, -1]] for j in circle if j != i]
-                better = _best(better, _past(better, int(i), np.concatenate(ends), ways, apart))
+                for others in (range(len(found.paths)), circle):
+                    ends = [found.paths[j][[0, -1]] for j in others if j != i]
+                    other = _past(better, int(i), np.concatenate(ends), ways, apart)
+                    if other is not None:
+                        break
+                better = _best(better, other)
         if better is found or not better.circles:
             return better
         found = better

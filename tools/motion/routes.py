@@ -88,11 +88,12 @@ def routes(
     Raises:
         NoRouteError: a goal is walled off.
     """
-    ends = np.concatenate([starts, goals]) if ends is None else ends
+    own = np.concatenate([starts, goals])
+    ends = own if ends is None else ends
     ground = _Ground(solid, radius, frame, ends)
-    wider = _bodies(idle, ends, SPARE * radius)
+    wider = _bodies(idle, own, SPARE * radius)
     exits, entries = ground.exits(starts, goals, wider), ground.exits(goals, goals, wider)
-    bodies = _bodies(idle, np.concatenate([ends, exits, entries]), radius)
+    bodies = _bodies(idle, np.concatenate([own, exits, entries]), radius)
     ground = replace(ground, ends=np.concatenate([ends, exits, entries]))
     paths = ground.paths(exits, entries, bodies)
     leaving = np.flatnonzero((exits != starts).any(axis=1))
