@@ -234,7 +234,7 @@ class _Drive:
         self._goals, self._headings = goals
         self._contract, self._site = contract, site
         self._fleet, self._robots, self._watch = fleet, tuple(robots), watch
-        self._radius = max(contract.robot_radius, fleet.radius or 0.0)
+        self._radius = max(contract.robot_radius, fleet.radius)
         self._tolerance = tolerance(site.room)
         self._poses: dict[str, Pose] = {}
         self._frames: list[FloatArray] = []
