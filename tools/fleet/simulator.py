@@ -199,7 +199,7 @@ class Simulator:
             following.limits(self._progress) - ahead, following.room(ahead, self._stops)
         )
         room = np.maximum(room - np.einsum("ij,ij->i", off, along), 0.0)
-        reach = _size(rates) if not self._wheels else rates[:, 0]
+        reach = _norms(rates) if not self._wheels else rates[:, 0]
         reach = np.maximum(LOOK_AHEAD * PERIOD * reach, 2 * self.physics.radius)
         left = np.einsum("ij,ij->i", ends - following.at(ahead), along)
         aims = following.at(ahead) + along * np.minimum(reach, left)[:, None]
@@ -208,10 +208,10 @@ class Simulator:
     def _mark(self, seen: _Seen) -> None:
         """Note who is at the end; noise does not take robots from it, a push does."""
         assert self._following is not None
-        noise, off = self.physics.noise.sensing, _size(seen.off)
+        noise, off = self.physics.noise.sensing, _norms(seen.off)
         ended = self._progress >= self._following.lengths - EXACT
-        turned = np.isnan(seen.looks) | (abs(_turn(seen.looks - seen.headings)) <= LOOKING)
-        slow = _size(seen.rates) <= self._push * PERIOD
+        turned = np.isnan(seen.looks) | (abs(_wrapped(seen.looks - seen.headings)) <= LOOKING)
+        slow = _norms(seen.rates) <= self._push * PERIOD
         self._there &= off <= SETTLED + 2 * SPREAD * noise
         self._there |= ended & turned & slow & (off <= SETTLED + 3 * noise)
 
@@ -220,7 +220,7 @@ class Simulator:
         most, change = self.physics.speed, self._push * PERIOD
         before = np.einsum("ij,ij->i", seen.rates, seen.along)
         across = seen.rates - before[:, None] * seen.along
-        size = _size(seen.off)
+        size = _norms(seen.off)
         back = np.minimum(_braking(size, self._push, self._smoothing), most / 2)
         wanted = -seen.off * _ratio(back, size)[:, None]
         wanted -= np.einsum("ij,ij->i", wanted, seen.along)[:, None] * seen.along
@@ -228,22 +228,23 @@ class Simulator:
         fast = np.minimum(_braking(seen.room, self._push, self._smoothing), most)
         fast = np.clip(fast, before - change, before + change)
         told = fast[:, None] * seen.along + across
-        return told * np.minimum(_ratio(most, _size(told)), 1.0)[:, None]
+        return told * np.minimum(_ratio(most, _norms(told)), 1.0)[:, None]
 
     def _steered(self, seen: _Seen) -> FloatArray:
         """Speeds on and about that robots with wheels are told, px and radians per second."""
         radius, most, change = self.physics.radius, self.physics.speed, self._push * PERIOD
-        ended, size = _size(seen.along) == 0.0, _size(seen.off)
+        ended, size = _norms(seen.along) == 0.0, _norms(seen.off)
         settled = ended & (size <= SETTLED + 3 * self.physics.noise.sensing)
         aim = np.where(ended[:, None], -seen.off, seen.aims - seen.points)
-        turn = _turn(np.arctan2(aim[:, 1], aim[:, 0]) - seen.headings)
-        turn = np.where(settled, np.nan_to_num(_turn(seen.looks - seen.headings)), turn)
-        turn[~settled & (_size(aim) < NEAR / 4)] = 0.0
+        turn = _wrapped(np.arctan2(aim[:, 1], aim[:, 0]) - seen.headings)
+        turn = np.where(settled, np.nan_to_num(_wrapped(seen.looks - seen.headings)), turn)
+        turn[~settled & (_norms(aim) < NEAR / 4)] = 0.0
         about = _braking(abs(turn) * radius, self._push, self._smoothing) * np.sign(turn)
         about = np.clip(about, -most / 2, most / 2)
         before = seen.rates[:, 1] * radius
         about = np.clip(about, before - change, before + change)
-        room = np.where(settled, 0.0, np.where(ended, size, seen.room))
+        room = np.where(ended, size, seen.room)
+        room[settled] = 0.0
         fast = np.minimum(_braking(room, self._push, self._smoothing), most - abs(about))
         fast *= np.clip(1 - abs(turn) / ASKEW, 0.0, 1.0)
         fast = np.clip(fast, seen.rates[:, 0] - change, seen.rates[:, 0] + change)
@@ -255,7 +256,7 @@ class Simulator:
         if self._wheels:
             scale = np.array([1.0, self.physics.radius])
             return rates + np.clip(change * scale, -most, most) / scale
-        size = _size(change)
+        size = _norms(change)
         return rates + change * np.minimum(_ratio(most, size), 1.0)[:, None]
 
     def _move(self, rows: Indices, told: FloatArray) -> None:
@@ -266,7 +267,7 @@ class Simulator:
         else:  # all of the acceleration: across and along have been kept apart
             change = told - self._rates[rows]
             most = self.physics.acceleration * PERIOD
-            share = np.minimum(_ratio(most, _size(change)), 1.0)
+            share = np.minimum(_ratio(most, _norms(change)), 1.0)
             rates = self._rates[rows] + change * share[:, None]
         rates[stuck] = 0.0
         self._rates[rows] = rates
@@ -293,7 +294,7 @@ class Simulator:
             begun = np.nan_to_num(headings[wanted])
             most = self.physics.speed / self.physics.radius * PERIOD
             headings = headings.copy()
-            turn = np.clip(_turn(self._looks[wanted] - begun), -most, most)
+            turn = np.clip(_wrapped(self._looks[wanted] - begun), -most, most)
             headings[wanted] = begun + turn
         return points + rates * PERIOD, headings
 
@@ -312,7 +313,7 @@ class Simulator:
         askew = noise[:, 1:] - 1
         turned = np.stack([-rates[:, 1], rates[:, 0]], axis=1)
         done = rates * noise[:, :1] + turned * askew
-        return done * np.minimum(_ratio(most, _size(done)), 1.0)[:, None]
+        return done * np.minimum(_ratio(most, _norms(done)), 1.0)[:, None]
 
     def _sense(self, dropped: Mask) -> None:
         seen = np.flatnonzero(~(dropped | self._out_of_order(self._lost)))
@@ -339,7 +340,7 @@ def _braking(room: FloatArray, deceleration: float, step: float) -> FloatArray:
     return np.asarray(change * (whole / 2 + unit / (whole + 1)))
 
 
-def _size(vectors: FloatArray) -> FloatArray:
+def _norms(vectors: FloatArray) -> FloatArray:
     """Their lengths, (n,)."""
     return np.hypot(vectors[:, 0], vectors[:, 1])
 
@@ -349,6 +350,6 @@ def _ratio(a: FloatArray | float, b: FloatArray) -> FloatArray:
     return np.divide(a, b, out=np.ones(len(b)), where=b > 0)
 
 
-def _turn(angle: FloatArray) -> FloatArray:
+def _wrapped(angle: FloatArray) -> FloatArray:
     """Angles between -pi and pi, (n,)."""
     return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)

@@ -75,11 +75,11 @@ class Following:
         limits[held] = rows.at[self._next[held]]
         return limits
 
-    def waits_for(self, progress: FloatArray) -> dict[str, str]:
-        """Robots that stand before a passage, by id, and the robot that each waits for."""
+    def waits_for(self, progress: FloatArray, slack: float = EXACT) -> dict[str, str]:
+        """Robots within `slack` px of a closed passage, by id, and whom each waits for."""
         held = np.flatnonzero(self._next < self._last)
         rows = self._next[held]
-        there = progress[held] >= self._passages.at[rows] - EXACT
+        there = progress[held] >= self._passages.at[rows] - slack
         pairs = zip(held[there], self._passages.first[rows[there]], strict=True)
         return {self.ids[i]: self.ids[j] for i, j in pairs}
 

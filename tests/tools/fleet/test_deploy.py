@@ -3,18 +3,14 @@
 import asyncio
 import math
 from collections.abc import AsyncGenerator, Callable
-from contextlib import aclosing
 
 import numpy as np
 import pytest
 import shapely
 from formup.tools.errors import FleetError, ToolError
-from formup.tools.fleet.deploy import (
-    TRACK_FRAMES,
-    Deployment,
-    assign_robots,
-    deploy,
-)
+from formup.tools.fleet.arrival import Deployment
+from formup.tools.fleet.assigning import assign_robots
+from formup.tools.fleet.deploy import TRACK_FRAMES, deploy
 from formup.tools.fleet.protocol import (
     Fleet,
     FleetBusyError,
@@ -143,27 +139,6 @@ def test_what_happens_is_fixed_by_the_seed_and_only_by_it() -> None:
     assert frames == again
     assert other != frames
     assert third.arrival.arrived
-
-
-class StopsShort(SimulatedFleet):
-    """Its robots go on for a second and a half at a time."""
-
-    async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
-        frames = 0
-        async with aclosing(super().drive(motion)) as moving:
-            async for poses in moving:
-                yield poses
-                frames += 1
-                if frames * PERIOD >= 1.5:
-                    return
-
-
-def test_robots_that_stop_short_are_sent_again() -> None:
-    plan = planned(GROUPS[0])
-    poses = asyncio.run(opened(plan).observe())
-    arrival = driven(plan, StopsShort(poses, speed=160.0, radius=RADIUS))[0].arrival
-    assert arrival.arrived
-    assert arrival.corrections >= 1
 
 
 def test_a_plan_that_is_not_certified_moves_nobody() -> None:
