@@ -19,6 +19,8 @@ from .motion import Indices, Motion, Passages, arc_lengths
 
 ROUNDING = 1e-6
 """Distances may fall short of what is demanded by so much, px."""
+AS_NEAR = 0.98
+"""Robots that start or end too near to an obstacle come no nearer than this share of that."""
 DETOUR = 3.0
 """Robots that start or end too near to an obstacle are so for so many times the shortest way out
 and a radius at most."""
@@ -214,8 +216,8 @@ def _clearances(
 def _in_passing(way: LineString, region: BaseGeometry, radius: float) -> float:
     """How near a way comes to a region beside where it leaves and enters its surroundings, px.
 
-    Where it starts or ends nearer than is allowed, it comes no nearer than that there, and goes
-    out or in by nearly the shortest way.
+    Where it starts or ends nearer than is allowed, it comes hardly nearer than that there, and
+    goes out or in by nearly the shortest way.
     """
     least, body = np.inf, region.buffer(radius - ROUNDING)
     for part in shapely.get_parts(shapely.intersection(way, body)):
@@ -225,7 +227,7 @@ def _in_passing(way: LineString, region: BaseGeometry, radius: float) -> float:
         ends = [end for end in way.boundary.geoms if part.distance(end) < ROUNDING]
         out = sum(float(body.boundary.distance(end)) for end in ends)
         allowed = min((float(region.distance(end)) for end in ends), default=np.inf)
-        if near < allowed - 10 * ROUNDING or part.length > DETOUR * (out + radius):
+        if near < AS_NEAR * allowed or part.length > DETOUR * (out + radius):
             least = min(least, near)
     return least
 
