@@ -40,6 +40,7 @@ class OpenSessions:
         self.sessions: dict[str, Session] = {}
         self.feeds: dict[str, Feed] = {}
         self._stopped: dict[str, set[str]] = {}
+        self.view = Services().view
 
     async def current(self, session: str) -> Session:
         """A conversation as the store has it, read again where another process has gone on.
@@ -77,7 +78,7 @@ class OpenSessions:
         stored = self._store.open(session)
         events, old = stored.events(), self.sessions.get(session)
         feed = self.feeds.setdefault(session, Feed(stored, ()))
-        services = Services(claim=self._owner.claim, watch=feed.moved)
+        services = Services(claim=self._owner.claim, watch=feed.moved, view=self.view)
         services.stopped |= self._stopped.get(session, set())
         if old is not None and old.services is not None:
             services.stopped |= old.services.stopped

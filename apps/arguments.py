@@ -335,15 +335,17 @@ def scores(path: Path | None) -> dict[str, dict[str, float]]:
         raise InputError(f"--baselines {path} must hold {form}: {violations(error)}") from None
 
 
-def recording(path: Path | None) -> Path | None:
-    """Where a recording goes; that it can is found out before the run.
+def file(option: str, path: Path | None, endings: Sequence[str] = ()) -> Path | None:
+    """A file to be written at the end; that it can be is found out before the work.
 
     Raises:
-        InputError: there is no such folder, or a folder lies there.
+        InputError: there is no such folder, a folder lies there, or its name ends otherwise.
     """
-    if path is not None and (path.is_dir() or not path.parent.is_dir()):
+    ends = path is None or not endings or path.suffix.lower() in endings
+    if path is not None and (not ends or path.is_dir() or not path.parent.is_dir()):
+        ending = f" ending in {', '.join(endings)}" if endings else ""
         raise InputError(
-            f"--record {path} cannot be written; name a file in a folder that is there."
+            f"{option} {path} cannot be written; name a file{ending} in a folder that is there."
         )
     return path
 

@@ -32,6 +32,7 @@ from .run_files import Folder
 from .starts import starts as read_starts
 from .terminal import say
 from .terminal_picture import way_of_terminal
+from .window import watching
 
 POINTING = ("--point", "--box", "--outline", "--target", "--mask")
 """Options that point, in the order in which `chat` reads them."""
@@ -64,6 +65,7 @@ def chat(
     plain: o.Plain = False,
     as_json: o.ScriptJson = False,
     out: o.Out = None,
+    watch: o.Watch = False,
     model: o.ModelName = "offline",
     base_url: o.BaseUrl = None,
     planner: o.PlannerName = None,
@@ -93,9 +95,11 @@ def chat(
     rules, lines = _rules(policy, auto=auto, plan_only=plan_only), _lines(script, as_json)
     display = None if as_json else _display(plain=plain or lines is not None)
     chosen = partial(_agent, (planner, base_url, prompt, prompts, limit, rules), display, lines)
-    with chosen(model) as agent, Folder(out) as home:
+    with chosen(model) as agent, Folder(out) as home, watching(watch) as services:
         talk = Talk(Service(agent, store_at(store), auto=auto), home, chosen)
-        raise typer.Exit(asyncio.run(_serve(talk, begin, lines, display, plain=plain)))
+        talk.service.watch_with(services)
+        code = asyncio.run(_serve(talk, begin, lines, display, plain=plain))
+    raise typer.Exit(code)
 
 
 def _agent(

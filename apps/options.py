@@ -110,6 +110,14 @@ Record = Annotated[
     Path | None,
     typer.Option("--record", help="Where to keep the run, for --model replay:FILE."),
 ]
+Film = Annotated[
+    Path | None,
+    typer.Option(
+        "--film",
+        help="Where a film of the robots goes too: .gif, .mp4, or .png, a strip of moments.",
+    ),
+]
+Watch = Annotated[bool, typer.Option("--watch", help="Show robots in a window while they drive.")]
 LimitList = Annotated[
     list[str] | None,
     typer.Option(
