@@ -40,7 +40,6 @@ class OpenSessions:
         self.sessions: dict[str, Session] = {}
         self.feeds: dict[str, Feed] = {}
         self._stopped: dict[str, set[str]] = {}
-        self.view = Services().view
 
     async def current(self, session: str) -> Session:
         """A conversation as the store has it, read again where another process has gone on.
@@ -78,10 +77,11 @@ class OpenSessions:
         stored = self._store.open(session)
         events, old = stored.events(), self.sessions.get(session)
         feed = self.feeds.setdefault(session, Feed(stored, ()))
-        services = Services(claim=self._owner.claim, watch=feed.moved, view=self.view)
+        services = Services(claim=self._owner.claim, watch=feed.moved)
         services.stopped |= self._stopped.get(session, set())
         if old is not None and old.services is not None:
             services.stopped |= old.services.stopped
+            services.view = old.services.view
             services.fleets |= {n: f for n, f in old.services.fleets.items() if f.real}
         fed = FedSession(stored, feed)
         return events, read_conversation(fed, events, self._agents, picture, services)

@@ -9,7 +9,7 @@ from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from contextlib import closing, suppress
 from typing import Any, Unpack
 
-from ..tools.context import Services, Settings
+from ..tools.context import Settings
 from ..tools.errors import FleetError, FormupError, InputError, StorageError
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
@@ -54,10 +54,6 @@ class Service:
         self._sessions, self._feeds = self._open.sessions, self._open.feeds
         self._waiting: dict[str, tuple[int | None, Waiting | None]] = {}
         self._watcher: asyncio.Task[None] | None = None
-
-    def watch_with(self, services: Services) -> None:
-        """Show the robots of conversations that are opened from now on as services show theirs."""
-        self._open.view = services.view
 
     def open(
         self,

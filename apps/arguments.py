@@ -335,17 +335,15 @@ def scores(path: Path | None) -> dict[str, dict[str, float]]:
         raise InputError(f"--baselines {path} must hold {form}: {violations(error)}") from None
 
 
-def file(option: str, path: Path | None, endings: Sequence[str] = ()) -> Path | None:
-    """A file to be written at the end; that it can be is found out before the work.
+def recording(path: Path | None) -> Path | None:
+    """Where a recording goes; that it can is found out before the run.
 
     Raises:
-        InputError: there is no such folder, a folder lies there, or its name ends otherwise.
+        InputError: there is no such folder, or a folder lies there.
     """
-    ends = path is None or not endings or path.suffix.lower() in endings
-    if path is not None and (not ends or path.is_dir() or not path.parent.is_dir()):
-        ending = f" ending in {', '.join(endings)}" if endings else ""
+    if path is not None and (path.is_dir() or not path.parent.is_dir()):
         raise InputError(
-            f"{option} {path} cannot be written; name a file{ending} in a folder that is there."
+            f"--record {path} cannot be written; name a file in a folder that is there."
         )
     return path
 

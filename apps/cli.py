@@ -13,7 +13,6 @@ from ..agent.session import load_run, prompt_name
 from ..agent.store.folder import log_path, read_events
 from ..prompts import PromptLibrary
 from ..tools.context import Settings
-from ..tools.draw import FILMS
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
 from . import arguments, chat, deploy, doctor, evaluate, prompts, serve, sessions, tools, trace
@@ -94,8 +93,7 @@ def run(
     seed: o.Seed = "0",
 ) -> None:
     """Carry out an instruction on a picture."""
-    picture, keep = load_picture(image), arguments.file("--record", record)
-    film = arguments.file("--film", film, FILMS)
+    picture, keep = load_picture(image), arguments.recording(record)
     lengths = metres_per_pixel, robot_radius, clearance
     fixed = arguments.numbers(robots, *lengths, threshold, seed, picture)
     fixed |= {"descriptor": arguments.descriptor(descriptor), "starts": read_starts(starts)}

@@ -15,17 +15,15 @@ from ..agent.session import load_run
 from ..agent.store.folder import NAME, PICTURES, FolderArtefacts, FolderLog
 from ..tools.builtin.robots import drive_to
 from ..tools.context import Context, Settings
-from ..tools.draw import FILMS
 from ..tools.errors import FleetError, InputError, ToolError
 from ..tools.formation.plan import Plan
 from ..tools.formation.units import length_text
 from ..tools.perception.image import load_picture
 from ..tools.store import StoredWorld, picture_of, plan_file, read_world, write_whole
 from ..tools.world import World
-from . import arguments
 from . import options as o
 from .run_display import show_report
-from .run_files import animate
+from .run_files import write_films
 from .terminal import say
 from .window import watching
 
@@ -39,14 +37,12 @@ def deploy(
     watch: o.Watch = False,
 ) -> None:
     """Move robots to a certified plan; naming the file is the approval."""
-    film, stored = arguments.file("--film", film, FILMS), read_world(plan)
+    stored = read_world(plan)
     if stored.plan_id is None or stored.plan_id not in stored.world.plans:
         raise InputError(f"{plan} holds no plan to deploy; give a plan.json written by formup run.")
     picture = picture_of(stored, plan, None if image is None else load_picture(image))
     settings = Settings(fleet=fleet, approved=stored.plan_id)
-    context = replace(
-        Context.of(picture, settings, stored.world), words=stored.instruction or ""
-    )
+    context = replace(Context.of(picture, settings, stored.world), words=stored.instruction or "")
     context.services.artefacts = FolderArtefacts(plan.parent / PICTURES)
     chosen = stored.world.plans[stored.plan_id].plan
     if chosen.partial is not None:
@@ -60,23 +56,14 @@ def deploy(
         with _session(plan, context) as session:
             context = context.at(session.start(context.world))
             context = context.at(_driven(context, chosen, plan, session, keep))
-        report = _report(chosen, context.world, stored, _films(context, chosen, plan, film))
+        films = write_films(plan.parent, film, context, chosen, context.words)
+        report = _report(chosen, context.world, stored, films)
         if as_json:
             say(report.model_dump_json(indent=2))
             say(f"formup: files in {plan.parent}", error=True)
         else:
             show_report(Console(highlight=False), report, str(plan.parent))
         raise typer.Exit(report.exit_code)
-
-
-def _films(context: Context, plan: Plan, path: Path, film: Path | None) -> dict[str, str | None]:
-    """The files that are written of a drive, by what they are."""
-    files: dict[str, str | None] = dict.fromkeys(("plan", "picture", "animation", "trace"))
-    if animate(path.with_name("deploy.gif"), context, plan, context.words):
-        files["animation"] = "deploy.gif"
-    if film is not None and animate(film, context, plan, context.words):
-        files["film"] = str(film)
-    return files
 
 
 @dataclass
@@ -140,9 +127,7 @@ def _driven(
     return observed[-1]
 
 
-def _report(
-    plan: Plan, world: World, stored: StoredWorld, files: dict[str, str | None]
-) -> Report:
+def _report(plan: Plan, world: World, stored: StoredWorld, films: dict[str, str | None]) -> Report:
     arrival = world.arrivals[plan.id]
     state = "All arrived" if arrival.arrived else arrival.reason or "Not all arrived"
     furthest = length_text(max(arrival.residual_px), world.metres_per_pixel)
@@ -162,5 +147,5 @@ def _report(
         arrival=arrival,
         metric=metric_data(world, plan, arrival),
         model="none",
-        files=files,
+        files={"plan": None, "picture": None, "animation": None, "trace": None, **films},
     )

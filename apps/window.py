@@ -1,7 +1,7 @@
 """`--watch`: a window in which robots are seen while they drive, and their time is controlled.
 
 It is drawn in the thread of the event loop, which has to be the main one for SDL, between steps;
-at most 30 times a second and in a fourth of the time, so that robots are not slower for it.
+at most 30 times a second and half of the time, so that robots are not slower for it.
 """
 
 import asyncio
@@ -16,12 +16,12 @@ import numpy as np
 import typer
 from PIL import Image
 
-from ..tools.context import Context, Services
-from ..tools.draw.canvas import ALLOWED, FINDING, IDLE, INK, MUTED, ROBOT, WHITE
-from ..tools.draw.live import BAR, PANEL, Course, LivePage, body, name
+from ..tools.context import Context, Services, Watch
+from ..tools.draw.canvas import ALLOWED, FINDING, IDLE, INK, MUTED, PAPER, ROBOT, WHITE
+from ..tools.draw.live import BAR, EDGE, HEAD, PANEL, Course, Ground, body, words
 from ..tools.errors import FleetError, InputError
 from ..tools.fleet.pace import Pace
-from ..tools.fleet.protocol import Fleet, Pose
+from ..tools.fleet.protocol import Fleet
 from ..tools.formation.plan import Plan
 from .terminal import say
 
@@ -29,102 +29,80 @@ if TYPE_CHECKING:
     from pygame import Surface
     from pygame.event import Event
 
-FRAME, SHARE = 1 / 30, 0.25
+FRAME, SHARE = 1 / 30, 0.5
 """Least seconds from one frame to the next, and the greatest share of time drawing may take."""
-SIZE = (1230, 760)
+SIZE, ROW = (1230, 760), 21
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, None)
 """Simulated seconds a second; None for as many as can be computed."""
-ZOOM, STEP = 1.25, 60.0
-NUMBERED, TRAILED = 60, 400
+ZOOM, PAN = 1.25, 60
+NUMBERED, TRAILED, BANDS = 60, 400, 4
 """Up to so many robots bear numbers and lines to their places; up to so many leave trails."""
-NUMBER, ROOM = 13, 22.0
-"""Size of a robot's number, and how near the next robot may be for it, px."""
+INSIDE, BESIDE = 10.0, 22.0
+"""A number stands in a body of this radius, else beside it where no robot is as near as this."""
+MOST_DRAWN = 2000
+"""Texts and bodies that are kept to be shown again."""
 HEADLESS = ("dummy", "offscreen")
 """SDL's drivers that show nothing."""
+TIME = (("Space", "pause, go on"), (".", "one step"), ("+  -", "faster, slower"))
+VIEW = (("wheel, I O", "zoom in, out"), ("drag, arrows", "move the picture"), ("F", "all of it"))
+KEYS = len(TIME) + len(VIEW) + 1
 
 
 class Window:
-    """A window for one drive after another.
-
-    Attributes:
-        is_open: whether it is on the screen.
-    """
+    """A window for one drive after another."""
 
     def __init__(self) -> None:
         import pygame
 
-        self._pygame, self.is_open, self._speed = pygame, False, SPEEDS.index(1.0)
+        self._pygame, self._open, self._speed = pygame, False, SPEEDS.index(1.0)
         self._task: asyncio.Task[None] | None = None
-        self._ground: Surface | None = None
         self._drawn: dict[Any, Surface] = {}
+        self._look: Any = None
 
     @contextmanager
-    def follow(
-        self, context: Context, plan: Plan, fleet: Fleet
-    ) -> Generator[Callable[[tuple[Pose, ...]], None]]:
-        """Show a drive; what is yielded is to be given the poses of all robots."""
-        world = context.world
+    def follow(self, context: Context, plan: Plan, fleet: Fleet) -> Generator[Watch]:
+        """Show a drive; see `Services.view`."""
+        world, display = context.world, self._pygame.display
         radius = max(plan.formation.contract.robot_radius, fleet.radius or 0.0)
         title = context.words or world.plans[plan.id].words
-        self._page = LivePage(context.picture, world, plan, title, radius)
+        self._ground = Ground(context.picture, world, plan, title, radius)
         self._course, self._fleet = Course(plan, world.picture.size, radius), fleet
+        self._scale, self._changed = world.metres_per_pixel, True
         pace = getattr(fleet, "pace", None)
         self._pace = pace if isinstance(pace, Pace) else None
-        self._ground, self._changed = None, True
-        self._drawn.clear()
         if self._pace is not None:
             self._pace.speed = SPEEDS[self._speed]
-        if not self.is_open:
-            self._pygame.display.init()
-            self._pygame.display.set_mode(SIZE, self._pygame.RESIZABLE)
-            self.is_open = True
-        self._pygame.display.set_caption(f"formup: {title}")
+        if not self._open:
+            display.init()
+            display.set_mode(SIZE, self._pygame.RESIZABLE)
+            display.set_caption("formup")
+            self._open = True
         if self._task is None or self._task.done():
             self._task = asyncio.get_running_loop().create_task(self._serve())
         try:
             yield partial(self._see, self._course)
         finally:
-            self._course.ended, self._changed = True, True
+            self._course.ended = self._changed = True
 
     def stay(self) -> None:
         """Stay until a person closes it; where nobody can see it, not at all."""
-        headless = self._pygame.display.get_driver() in HEADLESS
-        while self.is_open and not headless and self.turn():
+        while self._open and self._pygame.display.get_driver() not in HEADLESS and self._turn():
             time.sleep(FRAME)
-        self.close()
 
     def close(self) -> None:
         """Take it off the screen."""
-        self.is_open = False
+        self._open = False
         self._pygame.display.quit()
 
-    def turn(self) -> bool:
-        """Do what a person wants, and draw where something has changed; False to close it."""
-        for event in self._pygame.event.get():
-            self._changed = True
-            if not self._heed(event):
-                return False
-        if self._changed and self._course.poses:
-            self._draw()
-        return True
-
-    def _see(self, course: Course, poses: tuple[Pose, ...]) -> None:
-        if self.is_open:
+    def _see(self, course: Course, poses: Any) -> None:
+        if self._open:
             course.see(poses)
             self._changed = True
 
     async def _serve(self) -> None:
-        """Draw, and do what a person wants, until the window is closed."""
-        while self.is_open:
-            began = time.perf_counter()
-            if not self.turn():
-                await self._quit()
-                return
-            took = time.perf_counter() - began
-            await asyncio.sleep(max(FRAME - took, took * (1 / SHARE - 1)))
-
-    async def _quit(self) -> None:
-        """Close the window; robots that nobody watches any more are held."""
+        """Draw, and do what a person wants; robots that nobody watches any more are held."""
+        while self._open and self._turn():
+            await asyncio.sleep(max(FRAME - self._took, self._took * (1 / SHARE - 1)))
         self.close()
         if self._course.ended:
             return
@@ -135,110 +113,133 @@ class Window:
         if self._pace is not None:
             self._pace.paused = False  # a step that waits would not learn of it
 
-    def _heed(self, event: "Event") -> bool:
-        """Do what an event asks for; False where it is to close the window."""
-        pygame, page = self._pygame, self._page
-        if event.type == pygame.QUIT:
-            return False
-        if event.type == pygame.MOUSEWHEEL:
-            self._look(lambda: page.zoom(ZOOM**event.y, pygame.mouse.get_pos()))
-        elif event.type == pygame.MOUSEMOTION and event.buttons[0]:
-            self._look(lambda: page.pan(event.rel))
-        elif event.type == pygame.KEYDOWN:
-            if event.key == pygame.K_ESCAPE or event.unicode in ("q", "Q"):
+    def _turn(self) -> bool:
+        """Do what a person wants, and draw where something has changed; False to close it."""
+        began = time.perf_counter()
+        for event in self._pygame.event.get():
+            self._changed = True
+            if not self._heed(event):
                 return False
-            self._press(event)
+        if self._changed and self._course.poses:
+            self._changed = False
+            self._draw(self._pygame.display.get_surface())
+            self._pygame.display.flip()
+        self._took = time.perf_counter() - began
         return True
 
-    def _press(self, event: "Event") -> None:
-        """Do what a key is for."""
-        pygame, page = self._pygame, self._page
-        ways = {
-            pygame.K_LEFT: (STEP, 0),
-            pygame.K_RIGHT: (-STEP, 0),
-            pygame.K_UP: (0, STEP),
-            pygame.K_DOWN: (0, -STEP),
-        }
-        if event.key in ways:
-            self._look(lambda: page.pan(ways[event.key]))
-        elif (typed := event.unicode.lower()) in ("i", "o"):
-            self._look(lambda: page.zoom(ZOOM if typed == "i" else 1 / ZOOM))
-        elif typed == "f":
-            self._look(lambda: page.zoom(0.0))
-        elif self._pace is None:
-            return
-        elif typed == " ":
-            self._pace.paused = not self._pace.paused
+    def _heed(self, event: "Event") -> bool:
+        """Do what an event asks for; False where it is to close the window."""
+        pygame, ground = self._pygame, self._ground
+        if event.type == pygame.MOUSEWHEEL:
+            ground.zoom(ZOOM**event.y, pygame.mouse.get_pos())
+        elif event.type == pygame.MOUSEMOTION and event.buttons[0]:
+            ground.pan(event.rel)
+        elif event.type == pygame.KEYDOWN:
+            typed = event.unicode.lower()
+            ways = {pygame.K_LEFT: (PAN, 0), pygame.K_RIGHT: (-PAN, 0)}
+            ways |= {pygame.K_UP: (0, PAN), pygame.K_DOWN: (0, -PAN)}
+            if event.key in ways:
+                ground.pan(ways[event.key])
+            elif typed in ("i", "o", "f"):
+                ground.zoom({"i": ZOOM, "o": 1 / ZOOM, "f": 0.0}[typed])
+            elif self._pace is not None:
+                self._set(self._pace, typed)
+            return typed != "q" and event.key != pygame.K_ESCAPE
+        return event.type != pygame.QUIT
+
+    def _set(self, pace: Pace, typed: str) -> None:
+        """Do what a key says about time."""
+        if typed == " ":
+            pace.paused = not pace.paused
         elif typed == ".":
-            self._pace.steps += self._pace.paused
-            self._pace.paused = True
+            pace.steps += pace.paused
+            pace.paused = True
         elif typed in ("+", "=", "-"):
-            by = -1 if typed == "-" else 1
-            self._speed = int(np.clip(self._speed + by, 0, len(SPEEDS) - 1))
-            self._pace.speed = SPEEDS[self._speed]
+            speed = self._speed + (-1 if typed == "-" else 1)
+            self._speed = min(max(speed, 0), len(SPEEDS) - 1)
+            pace.speed = SPEEDS[self._speed]
 
-    def _look(self, change: Callable[[], None]) -> None:
-        change()
-        self._ground = None
-
-    def _draw(self) -> None:
-        """One frame."""
-        screen, page, course = self._pygame.display.get_surface(), self._page, self._course
-        if self._ground is None or self._ground.get_size() != screen.get_size():
-            self._ground = self._surface(page.ground(screen.get_size()))
-        self._changed = False
-        screen.blit(self._ground, (0, 0))
-        screen.set_clip(page.photo)
+    def _draw(self, screen: "Surface") -> None:
+        ground, size = self._ground, screen.get_size()
+        if (ground, ground.look, size) != self._look:
+            self._page = self._surface(ground.draw(size))
+            self._look = ground, ground.look, size
+        if len(self._drawn) > MOST_DRAWN:
+            self._drawn.clear()
+        screen.blit(self._page, (0, 0))
+        left, top, right, bottom = ground.canvas.photo
+        screen.set_clip((left, top, right - left, bottom - top))
         self._draw_ways(screen)
         self._draw_bodies(screen)
         screen.set_clip(None)
-        held = self._fleet.stopped
-        panel = page.panel(screen.get_height() - BAR, course, self._pace, held=held)
-        screen.blit(self._surface(panel), (screen.get_width() - PANEL, BAR))
-        self._pygame.display.flip()
+        self._draw_figures(screen)
 
     def _draw_ways(self, screen: "Surface") -> None:
         """Where robots came from, fading, and where they go."""
-        page, course, draw = self._page, self._course, self._pygame.draw
-        trail = np.stack(course.trail)
-        if trail.shape[1] <= TRAILED and len(trail) > 1:
+        course, draw, at = self._course, self._pygame.draw, self._ground.canvas.at
+        trail = np.stack([at(points) for points in course.trail])
+        if trail.shape[1] <= TRAILED and len(trail) > BANDS:
             layer = self._pygame.Surface(screen.get_size(), self._pygame.SRCALPHA)
-            paths = page.at(trail.reshape(-1, 2)).reshape(trail.shape)
-            parts = np.array_split(np.arange(len(trail)), min(4, len(trail) - 1))
-            for k, part in enumerate(parts, start=1):
-                band = paths[part[0] : part[-1] + 2]
-                for i in range(trail.shape[1]):
-                    draw.lines(layer, (*ALLOWED, 220 * k // len(parts)), False, band[:, i], 3)
+            for k, part in enumerate(np.array_split(np.arange(len(trail) - 1), BANDS), start=1):
+                for way in np.swapaxes(trail[part[0] : part[-1] + 2], 0, 1):
+                    draw.lines(layer, (*ALLOWED, 220 * k // BANDS), False, way, 3)
             screen.blit(layer, (0, 0))
         if len(course.robots) <= NUMBERED:
-            for robot, place in page.at(course.links.reshape(-1, 2)).reshape(-1, 2, 2):
-                draw.aaline(screen, MUTED, robot, place)
+            for link in course.links:
+                draw.aaline(screen, MUTED, *at(link))
 
     def _draw_bodies(self, screen: "Surface") -> None:
-        page, course = self._page, self._course
-        points, placed = page.at(course.trail[-1]), set(course.robots)
-        radius, near = round(page.body, 1), course.apart < course.demanded
-        for i, (pose, at) in enumerate(zip(course.poses, points, strict=True)):
+        course, canvas, radius = self._course, self._ground.canvas, round(self._ground.body, 1)
+        centres, placed = canvas.at(course.trail[-1]), set(course.robots)
+        for pose, at, apart in zip(course.poses, centres, course.apart, strict=True):
             colour = ROBOT if pose.id in placed else IDLE
-            self._put(screen, at, body, radius, FINDING if near[i] else colour)
+            self._put(screen, at, body, radius, FINDING if apart < course.demanded else colour)
             if pose.heading is not None:
                 nose = at + radius * np.array([np.cos(pose.heading), np.sin(pose.heading)])
                 self._pygame.draw.line(screen, WHITE, at, nose, max(round(0.3 * radius), 2))
-        if len(points) > NUMBERED:
-            return
-        for i, (pose, at) in enumerate(zip(course.poses, points, strict=True)):
-            if radius >= NUMBER:
-                self._put(screen, at, name, pose.id, NUMBER, WHITE, ROBOT)
-            elif course.apart[i] * page.scale >= ROOM:
-                self._put(screen, at + (radius + 6, -radius - 6), name, pose.id, NUMBER, WHITE, INK)
+        for pose, at, apart in zip(course.poses, centres, course.apart, strict=True):
+            if len(centres) <= NUMBERED and radius >= INSIDE:
+                self._put(screen, at, words, pose.id, WHITE, ROBOT)
+            elif len(centres) <= NUMBERED and canvas.page_length(apart) >= BESIDE:
+                beside = at + np.array([radius + 6, -radius - 6])
+                self._put(screen, beside, words, pose.id, WHITE, INK)
 
-    def _put(self, screen: "Surface", at: Any, draw: Callable[..., Image.Image], *how: Any) -> None:
-        """Put what is drawn so, once and for all, with its middle on a point of the page."""
+    def _draw_figures(self, screen: "Surface") -> None:
+        course, width, height = self._course, *screen.get_size()
+        left, right, y = width - PANEL + EDGE, width - EDGE, BAR + 38.0
+        state, ground = course.state(self._pace, held=self._fleet.stopped)
+        box = self._pygame.draw.rect(screen, ground, (left, BAR, right - left, 30), border_radius=4)
+        self._put(screen, np.array(box.center), words, state, PAPER)
+        most = (height - int(y) - EDGE) // ROW - KEYS - 2
+        for name, value, colour in course.figures(self._pace, self._scale, most):
+            if colour == HEAD:
+                self._pygame.draw.line(screen, HEAD, (left, y + 5), (right, y + 5))
+                y += 10
+            self._put(screen, np.array([left, y + ROW / 2]), words, name, MUTED, side=0)
+            self._put(screen, np.array([right, y + ROW / 2]), words, value, colour, side=1)
+            y += ROW
+        leave = "close" if course.ended else "hold robots, close"
+        keys = (*(TIME if self._pace is not None else ()), *VIEW, ("Q", leave))
+        for i, (key, meaning) in enumerate(keys):
+            y = height - EDGE - ROW * (len(keys) - i - 0.5)
+            self._put(screen, np.array([left, y]), words, key, ALLOWED, side=0)
+            self._put(screen, np.array([left + 105, y]), words, meaning, MUTED, side=0)
+
+    def _put(
+        self,
+        screen: "Surface",
+        at: Any,
+        draw: Callable[..., Image.Image],
+        *how: Any,
+        side: float = 0.5,
+    ) -> None:
+        """Put what is drawn so, once and for all, on a point of the page: its middle, or a side."""
         if (draw, how) not in self._drawn:
             self._drawn[draw, how] = self._surface(draw(*how))
         surface = self._drawn[draw, how]
-        x, y = np.round(at - (np.array(surface.get_size()) - 1) / 2).astype(int).tolist()
-        screen.blit(surface, (x, y))
+        x, y = (float(v) for v in at)
+        wide, high = surface.get_size()
+        screen.blit(surface, (round(x - (wide - 1) * side), round(y - (high - 1) / 2)))
 
     def _surface(self, image: Image.Image) -> "Surface":
         mode: Any = image.mode
@@ -247,29 +248,33 @@ class Window:
 
 
 @contextmanager
-def watching(wanted: bool) -> Generator[Services]:
-    """Services whose robots are shown in a window where that is wanted, which then stays.
+def watching(wanted: bool, *, stays: bool = True) -> Generator[Services]:
+    """Services whose robots are shown in a window where that is wanted.
 
     Where there is no display, that is said, and the films have to do.
+
+    Args:
+        stays: whether a person closes it once the command is done.
 
     Raises:
         InputError: the library is not installed.
     """
-    services, window = Services(), _opened() if wanted else None
+    services, window = Services(), _window() if wanted else None
     if window is None:
         yield services
         return
     services.view = window.follow
     try:
         yield services
-    except typer.Exit:
-        window.stay()
+    except typer.Exit:  # the command has done what it should
+        if stays:
+            window.stay()
         raise
     finally:
         window.close()
 
 
-def _opened() -> Window | None:
+def _window() -> Window | None:
     """A window that is not shown yet; None where there is no display."""
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # stdout is for reports
     os.environ.setdefault("SDL_NO_SIGNAL_HANDLERS", "1")
@@ -277,13 +282,12 @@ def _opened() -> Window | None:
         import pygame
     except ImportError:
         raise InputError("--watch needs an extra: pip install 'formup[sim]'.") from None
-    chosen = "SDL_VIDEODRIVER" in os.environ
+    chosen, why = "SDL_VIDEODRIVER" in os.environ, "this machine has no display"
     try:
         pygame.display.init()
         if chosen or pygame.display.get_driver() not in HEADLESS:
             pygame.display.set_mode(SIZE, pygame.HIDDEN)
             return Window()
-        why = "this machine has no display"
     except pygame.error as error:
         why = f"no window can be opened ({error})"
     say(f"formup: {why}: watch the film among the files instead.", error=True)

@@ -124,9 +124,10 @@ def _ignore(*what: object) -> None:
 
 
 Watch = Callable[[tuple[Pose, ...]], None]
+View = Callable[["Context", Plan, Fleet], AbstractContextManager[Watch]]
 
 
-def _unseen(context: "Context", plan: Plan, fleet: Fleet) -> AbstractContextManager[Watch]:
+def unseen(context: "Context", plan: Plan, fleet: Fleet) -> AbstractContextManager[Watch]:
     """Nobody watches the robots."""
     return nullcontext(_ignore)
 
@@ -149,8 +150,8 @@ class Services:
         claim: what is given a fleet's name and what opens it, and returns the one to use; raises
             where it is another's.
         watch: is given the poses of robots that drive, to be shown.
-        view: is given a plan, in its context, and the fleet that drives to it; what it yields for as
-            long as that lasts is given the poses too.
+        view: is given a plan, in its context, and the fleet that drives to it; what it yields for
+            as long as that lasts is given the poses too.
     """
 
     pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
@@ -161,7 +162,7 @@ class Services:
     stopped: set[str] = field(default_factory=set[str])
     claim: Callable[[str, Callable[[], Fleet]], Awaitable[Fleet]] = _unshared
     watch: Watch = _ignore
-    view: Callable[["Context", Plan, Fleet], AbstractContextManager[Watch]] = _unseen
+    view: View = unseen
 
     @property
     def is_stopped(self) -> bool:

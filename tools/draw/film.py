@@ -48,6 +48,7 @@ NUMBER_RADIUS = 8.0
 TRAIL = 10
 """Frames a trail is long."""
 
+
 def draw_deployment(
     picture: Picture,
     world: World,
