@@ -1,7 +1,7 @@
 """`--watch`: a window in which robots are seen while they drive, and their time is controlled.
 
 It is drawn in the thread of the event loop, which has to be the main one for SDL, between steps;
-at most 30 times a second and half of the time, so that robots are not slower for it.
+at most 30 times a second, with rests as long as it takes, so that robots are not slower for it.
 """
 
 import asyncio
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from pygame import Surface
     from pygame.event import Event
 
-FRAME, SHARE = 1 / 30, 0.5
-"""Least seconds from one frame to the next, and the greatest share of time drawing may take."""
+FRAME, REST = 1 / 30, 0.1
+"""Least seconds from one frame to the next, and the longest rest after one that took long."""
 SIZE, ROW = (1230, 760), 21
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, None)
 """Simulated seconds a second; None for as many as can be computed."""
@@ -64,7 +64,7 @@ class Window:
         """Show a drive; see `Services.view`."""
         world, display = context.world, self._pygame.display
         radius = max(plan.formation.contract.robot_radius, fleet.radius or 0.0)
-        title = context.words or world.plans[plan.id].words
+        title = world.plans[plan.id].words or context.words
         self._ground = Ground(context.picture, world, plan, title, radius)
         self._course, self._fleet = Course(plan, world.picture.size, radius), fleet
         self._scale, self._changed = world.metres_per_pixel, True
@@ -102,7 +102,7 @@ class Window:
     async def _serve(self) -> None:
         """Draw, and do what a person wants; robots that nobody watches any more are held."""
         while self._open and self._turn():
-            await asyncio.sleep(max(FRAME - self._took, self._took * (1 / SHARE - 1)))
+            await asyncio.sleep(max(FRAME - self._took, min(self._took, REST)))
         self.close()
         if self._course.ended:
             return
@@ -178,15 +178,17 @@ class Window:
         """Where robots came from, fading, and where they go."""
         course, draw, at = self._course, self._pygame.draw, self._ground.canvas.at
         trail = np.stack([at(points) for points in course.trail])
+        links = [at(link) for link in course.links if len(course.links) <= NUMBERED]
+        layer = self._pygame.Surface(screen.get_size(), self._pygame.SRCALPHA)
+        for link in links:
+            draw.line(layer, (*INK, 110), *link, 3)
         if trail.shape[1] <= TRAILED and len(trail) > BANDS:
-            layer = self._pygame.Surface(screen.get_size(), self._pygame.SRCALPHA)
             for k, part in enumerate(np.array_split(np.arange(len(trail) - 1), BANDS), start=1):
                 for way in np.swapaxes(trail[part[0] : part[-1] + 2], 0, 1):
                     draw.lines(layer, (*ALLOWED, 220 * k // BANDS), False, way, 3)
-            screen.blit(layer, (0, 0))
-        if len(course.robots) <= NUMBERED:
-            for link in course.links:
-                draw.aaline(screen, MUTED, *at(link))
+        screen.blit(layer, (0, 0))
+        for link in links:
+            draw.aaline(screen, PAPER, *link)
 
     def _draw_bodies(self, screen: "Surface") -> None:
         course, canvas, radius = self._course, self._ground.canvas, round(self._ground.body, 1)

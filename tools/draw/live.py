@@ -100,7 +100,7 @@ class Course:
         """At most so many rows of a name, a value and its colour."""
 
         def length(px: float) -> str:
-            return length_text(px, scale) if 0 < px < np.inf else "none"
+            return length_text(px, scale) if px < np.inf else "none"
 
         there, least = self.residual <= self.tolerance, self.least
         speed = "as fast as can be" if pace and pace.speed is None else f"{pace and pace.speed:g} x"
@@ -110,7 +110,7 @@ class Course:
             ("closest pair, between centres", "", HEAD),
             ("now", length(float(self.apart.min())), PAPER),
             ("least so far", length(least), BAD if least < self.demanded else PAPER),
-            ("demanded", length(self.demanded), PAPER),
+            ("demanded", length(self.demanded or np.inf), PAPER),
             ("from their places", "", HEAD),
             ("arrived", f"{there.sum()} of {len(there)}", GOOD if there.all() else PAPER),
             ("furthest", length(float(self.residual.max())), PAPER),
@@ -118,7 +118,7 @@ class Course:
         room = max(most - len(rows) - (len(there) > most - len(rows)), 0)
         for i in sorted(np.argsort(-self.residual, kind="stable")[:room]):
             colour = GOOD if there[i] else PAPER
-            rows.append((f"robot {self.robots[i]:.12}", f"{self.residual[i]:.1f} px", colour))
+            rows.append((f"robot {self.robots[i]:.12}", length(float(self.residual[i])), colour))
         more = [(f"and {len(there) - room} nearer ones", "", PAPER)] if room < len(there) else []
         return rows + more
 
