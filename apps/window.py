@@ -193,15 +193,17 @@ class Window:
     def _draw_bodies(self, screen: "Surface") -> None:
         course, canvas, radius = self._course, self._ground.canvas, round(self._ground.body, 1)
         centres, placed = canvas.at(course.trail[-1]), set(course.robots)
+        for pose, at in zip(course.poses, centres, strict=True):
+            if pose.heading is not None:
+                way = np.array([np.cos(pose.heading), np.sin(pose.heading)])
+                for reach, colour, width in ((1.9, INK, 5), (1.8, WHITE, 3)):
+                    self._pygame.draw.line(screen, colour, at, at + reach * radius * way, width)
         for pose, at, apart in zip(course.poses, centres, course.apart, strict=True):
             colour = ROBOT if pose.id in placed else IDLE
-            self._put(screen, at, body, radius, FINDING if apart < course.demanded else colour)
-            if pose.heading is not None:
-                nose = at + radius * np.array([np.cos(pose.heading), np.sin(pose.heading)])
-                self._pygame.draw.line(screen, WHITE, at, nose, max(round(0.3 * radius), 2))
-        for pose, at, apart in zip(course.poses, centres, course.apart, strict=True):
+            colour = FINDING if apart < course.demanded else colour
+            self._put(screen, at, body, radius, colour)
             if len(centres) <= NUMBERED and radius >= INSIDE:
-                self._put(screen, at, words, pose.id, WHITE, ROBOT)
+                self._put(screen, at, words, pose.id, WHITE, colour)
             elif len(centres) <= NUMBERED and canvas.page_length(apart) >= BESIDE:
                 beside = at + np.array([radius + 6, -radius - 6])
                 self._put(screen, beside, words, pose.id, WHITE, INK)
