@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from formup import Agent, Picture, Run, TargetPrompt, picture_from_bytes
+from formup import Agent, Picture, Run, TargetPrompt, load_picture
 from formup.apps.window import watching
 from formup.tools.context import Services, Settings
 from formup.tools.fleet.protocol import Pose
@@ -36,7 +36,7 @@ def scene() -> Image.Image:
 @pytest.fixture
 def picture(tmp_path: Path) -> Picture:
     scene().save(tmp_path / "scene.png")
-    return picture_from_bytes((tmp_path / "scene.png").read_bytes())
+    return load_picture(tmp_path / "scene.png")
 
 
 @pytest.fixture(autouse=True)

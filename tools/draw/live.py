@@ -29,6 +29,7 @@ from .canvas import (
     WHITE,
     Canvas,
     Colour,
+    shown_size,
 )
 from .captions import left_text
 from .marks import draw_met, draw_outline
@@ -103,7 +104,7 @@ class Course:
             return length_text(px, scale) if px < np.inf else "none"
 
         there, least = self.residual <= self.tolerance, self.least
-        speed = "as fast as can be" if pace and pace.speed is None else f"{pace and pace.speed:g} x"
+        speed = "as fast as can be" if pace is None or pace.speed is None else f"{pace.speed:g} x"
         rows: list[tuple[str, str, Colour]] = [
             ("time", f"{self.seconds:.2f} s", PAPER),
             *([("speed", speed, PAPER)] if pace else ()),
@@ -148,11 +149,12 @@ class Ground:
         low = np.clip(np.round(self._centre - cut / 2), 0, whole - cut).astype(int)
         self._centre = low + cut / 2
         part, origin = part_of(self._picture, (*low.tolist(), *(low + cut).tolist()))
-        shown = np.maximum((cut * min(scale, float((area / cut).min()))).astype(int), 1)
+        long = max(int(cut.max() * min(scale, float((area / cut).min()))), 1)
+        shown = np.array(shown_size(part, long))
         left, top = ((area - shown) // 2 + (0, BAR)).tolist()
         right, bottom = (np.array(size) - shown - (left, top)).tolist()
         margins = left, top, right, bottom
-        self.canvas = canvas = Canvas(part, int(shown.max()), 1.0, margins, origin)
+        self.canvas = canvas = Canvas(part, long, 1.0, margins, origin)
         contract = self._plan.formation.contract
         for name in contract.keep_out:
             canvas.tint(self._world.outline(name).filled, FORBIDDEN, 0.35)
