@@ -9,7 +9,7 @@ import os
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from functools import partial
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from ..tools.draw.canvas import ALLOWED, FINDING, IDLE, INK, MUTED, PAPER, ROBOT
 from ..tools.draw.live import BAR, EDGE, HEAD, PANEL, Course, Ground, body, words
 from ..tools.errors import FleetError, InputError
 from ..tools.fleet.pace import Pace
-from ..tools.fleet.protocol import Fleet
+from ..tools.fleet.protocol import Fleet, Pose
 from ..tools.formation.plan import Plan
 from .terminal import say
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from pygame import Surface
     from pygame.event import Event
 
+Draw = Callable[..., Image.Image]
 FRAME, REST = 1 / 30, 0.1
 """Least seconds from one frame to the next, and the longest rest after one that took long."""
 SIZE, ROW = (1230, 760), 21
@@ -39,8 +40,6 @@ NUMBERED, TRAILED, BANDS = 60, 400, 4
 """Up to so many robots bear numbers and lines to their places; up to so many leave trails."""
 INSIDE, BESIDE = 10.0, 22.0
 """A number stands in a body of this radius, else beside it where no robot is as near as this."""
-MOST_DRAWN = 2000
-"""Texts and bodies that are kept to be shown again."""
 HEADLESS = ("dummy", "offscreen")
 """SDL's drivers that show nothing."""
 TIME = (("Space", "pause, go on"), (".", "one step"), ("+  -", "faster, slower"))
@@ -56,14 +55,13 @@ class Window:
 
         self._pygame, self._open, self._speed = pygame, False, SPEEDS.index(1.0)
         self._task: asyncio.Task[None] | None = None
-        self._drawn: dict[Any, Surface] = {}
         self._look: Any = None
 
     @contextmanager
     def follow(self, context: Context, plan: Plan, fleet: Fleet) -> Generator[Watch]:
         """Show a drive; see `Services.view`."""
         world, display = context.world, self._pygame.display
-        radius = max(plan.formation.contract.robot_radius, fleet.radius or 0.0)
+        radius = max(plan.formation.contract.robot_radius, fleet.radius)
         title = world.plans[plan.id].words or context.words
         self._ground = Ground(context.picture, world, plan, title, radius)
         self._course, self._fleet = Course(plan, world.picture.size, radius), fleet
@@ -80,7 +78,7 @@ class Window:
         if self._task is None or self._task.done():
             self._task = asyncio.get_running_loop().create_task(self._serve())
         try:
-            yield partial(self._see, self._course)
+            yield self._see
         finally:
             self._course.ended = self._changed = True
 
@@ -94,9 +92,9 @@ class Window:
         self._open = False
         self._pygame.display.quit()
 
-    def _see(self, course: Course, poses: Any) -> None:
+    def _see(self, poses: tuple[Pose, ...]) -> None:
         if self._open:
-            course.see(poses)
+            self._course.see(poses)
             self._changed = True
 
     async def _serve(self) -> None:
@@ -162,10 +160,8 @@ class Window:
     def _draw(self, screen: "Surface") -> None:
         ground, size = self._ground, screen.get_size()
         if (ground, ground.look, size) != self._look:
-            self._page = self._surface(ground.draw(size))
+            self._page = _drawn.__wrapped__(ground.draw, (size,))
             self._look = ground, ground.look, size
-        if len(self._drawn) > MOST_DRAWN:
-            self._drawn.clear()
         screen.blit(self._page, (0, 0))
         left, top, right, bottom = ground.canvas.photo
         screen.set_clip((left, top, right - left, bottom - top))
@@ -229,26 +225,24 @@ class Window:
             self._put(screen, np.array([left, y]), words, key, ALLOWED, side=0)
             self._put(screen, np.array([left + 105, y]), words, meaning, MUTED, side=0)
 
-    def _put(
-        self,
-        screen: "Surface",
-        at: Any,
-        draw: Callable[..., Image.Image],
-        *how: Any,
-        side: float = 0.5,
-    ) -> None:
-        """Put what is drawn so, once and for all, on a point of the page: its middle, or a side."""
-        if (draw, how) not in self._drawn:
-            self._drawn[draw, how] = self._surface(draw(*how))
-        surface = self._drawn[draw, how]
-        x, y = (float(v) for v in at)
-        wide, high = surface.get_size()
-        screen.blit(surface, (round(x - (wide - 1) * side), round(y - (high - 1) / 2)))
+    def _put(self, screen: "Surface", at: Any, draw: Draw, *how: Any, side: float = 0.5) -> None:
+        """Put what is drawn so on a point of the page: its middle, or its left or right side."""
+        surface = _drawn(draw, how)
+        (x, y), (wide, high) = at, surface.get_size()
+        screen.blit(
+            surface, (round(float(x) - (wide - 1) * side), round(float(y) - (high - 1) / 2))
+        )
 
-    def _surface(self, image: Image.Image) -> "Surface":
-        mode: Any = image.mode
-        surface = self._pygame.image.frombytes(image.tobytes(), image.size, mode)
-        return surface.convert_alpha() if mode == "RGBA" else surface.convert()
+
+@lru_cache(maxsize=2000)
+def _drawn(draw: Draw, how: tuple[Any, ...]) -> "Surface":
+    """An image as what is put on the screen."""
+    import pygame
+
+    image = draw(*how)
+    mode: Any = image.mode
+    surface = pygame.image.frombytes(image.tobytes(), image.size, mode)
+    return surface.convert_alpha() if mode == "RGBA" else surface.convert()
 
 
 @contextmanager

@@ -72,6 +72,7 @@ class Watched:
         await self.until(lambda: len(self.poses) > 5)
         self.press(pygame.K_SPACE, " ")
         await self.until(lambda: self.fleet.pace.paused)
+        await asyncio.sleep(6 * PERIOD)  # the step that was under way ends
         await self.drawn()
 
     async def drawn(self) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from formup.tools.draw.canvas import Colour
 from formup.tools.draw.live import BAD, GOOD, PANEL, Course, Ground
 from formup.tools.fleet.pace import Pace
 from formup.tools.fleet.protocol import Pose
@@ -26,7 +27,7 @@ def seen(*points: tuple[float, float], at: float = 0.0) -> tuple[Pose, ...]:
     return tuple(Pose(str(i), x, y, None, at) for i, (x, y) in enumerate(points, start=1))
 
 
-def figures(course: Course, most: int = 20, scale: float | None = None) -> dict[str, tuple]:
+def figures(course: Course, most: int = 20, scale: float | None = None) -> dict[str, tuple[str, Colour]]:
     return {name: (value, colour) for name, value, colour in course.figures(Pace(1.0), scale, most)}
 
 
