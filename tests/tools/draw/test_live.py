@@ -27,8 +27,9 @@ def seen(*points: tuple[float, float], at: float = 0.0) -> tuple[Pose, ...]:
     return tuple(Pose(str(i), x, y, None, at) for i, (x, y) in enumerate(points, start=1))
 
 
-def figures(course: Course, most: int = 20, scale: float | None = None) -> dict[str, tuple[str, Colour]]:
-    return {name: (value, colour) for name, value, colour in course.figures(Pace(1.0), scale, most)}
+def figures(course: Course, scale: float | None = None) -> dict[str, tuple[str, Colour]]:
+    rows = course.figures(Pace(1.0), scale, 20)
+    return {name: (value, colour) for name, value, colour in rows}
 
 
 def test_the_least_separation_is_that_of_the_whole_drive() -> None:
