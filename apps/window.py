@@ -160,7 +160,7 @@ class Window:
     def _draw(self, screen: "Surface") -> None:
         ground, size = self._ground, screen.get_size()
         if (ground, ground.look, size) != self._look:
-            self._page = _drawn.__wrapped__(ground.draw, (size,))
+            self._page = _sprite.__wrapped__(ground.draw, (size,))
             self._look = ground, ground.look, size
         screen.blit(self._page, (0, 0))
         left, top, right, bottom = ground.canvas.photo
@@ -227,7 +227,7 @@ class Window:
 
     def _put(self, screen: "Surface", at: Any, draw: Draw, *how: Any, side: float = 0.5) -> None:
         """Put what is drawn so on a point of the page: its middle, or its left or right side."""
-        surface = _drawn(draw, how)
+        surface = _sprite(draw, how)
         (x, y), (wide, high) = at, surface.get_size()
         screen.blit(
             surface, (round(float(x) - (wide - 1) * side), round(float(y) - (high - 1) / 2))
@@ -235,7 +235,7 @@ class Window:
 
 
 @lru_cache(maxsize=2000)
-def _drawn(draw: Draw, how: tuple[Any, ...]) -> "Surface":
+def _sprite(draw: Draw, how: tuple[Any, ...]) -> "Surface":
     """An image as what is put on the screen."""
     import pygame
 
