@@ -140,13 +140,15 @@ async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
         nonlocal last
         last = poses
         context.services.watch(poses)
+        show(poses)
 
     site = context.world.site(plan.formation.contract)
     robots = plan.formation.robot_of_place
     try:
-        return await deploy(
-            plan, site, fleet, robots, watch=watch, starting=lambda: context.moving(plan.id)
-        )
+        with context.services.view(context, plan, fleet) as show:
+            return await deploy(
+                plan, site, fleet, robots, watch=watch, starting=lambda: context.moving(plan.id)
+            )
     finally:
         if last:
             context.observed(context.world.having(robots=last))
