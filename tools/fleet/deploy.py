@@ -18,7 +18,6 @@ from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
 from ..motion.planning import Ground, Team, plan_motion
 from ..motion.routes import named_obstacles
-from ..tool import in_thread
 from .arrival import Arrival, Deployment, Ended, Track
 from .getting_on import GettingOn, nearest_spare, said_of, said_of_replaced
 from .protocol import (
@@ -305,7 +304,7 @@ class _Drive:
             error=fleet.tracking_error,
             idle={pose.id: (pose.x, pose.y) for pose in self._idle()},
         )
-        motion, _, verdict = await in_thread(
+        motion, _, verdict = await asyncio.to_thread(
             lambda: plan_motion(team, goals, ground, interchangeable=False)
         )
         if not verdict.certified:
