@@ -42,8 +42,7 @@ class NoOrderError(FleetError):
         named = ", ".join(ids[:12]) + (", ..." if len(ids) > 12 else "")
         super().__init__(
             f"Robots {named} stand in each other's way: none of them can go first if each is to "
-            "have exactly its own place. Let them share the places among themselves, or move one "
-            "of them away first."
+            "have its own place."
         )
         self.ids = tuple(ids)
 
