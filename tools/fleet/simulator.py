@@ -210,7 +210,8 @@ class Simulator:
         assert self._following is not None
         noise, off = self.physics.noise.sensing, _norms(seen.off)
         ended = self._progress >= self._following.lengths - EXACT
-        turned = np.isnan(seen.looks) | (abs(_wrapped(seen.looks - seen.headings)) <= LOOKING)
+        still = _wrapped(seen.looks - self.headings[self._rows])  # not as they will look
+        turned = np.isnan(still) | (abs(still) <= LOOKING)
         slow = _norms(seen.rates) <= self._push * PERIOD
         self._there &= off <= SETTLED + 2 * SPREAD * noise
         self._there |= ended & turned & slow & (off <= SETTLED + 3 * noise)

@@ -105,8 +105,8 @@ class Following:
     def advance(self, points: FloatArray, progress: FloatArray, near: float = NEAR) -> FloatArray:
         """How far along its path each robot seen at a point, (n, 2) px, is, (n,) px.
 
-        That is where the leg it is on comes nearest; a vertex within `near` px has been come to, and
-        the next leg is begun there. Nobody's progress goes back.
+        That is where the leg it is on comes nearest; vertices within `near` px have been come to,
+        and the next leg is begun there. Nobody's progress goes back.
         """
         progress, rows = progress.copy(), np.arange(len(progress))
         while len(rows):
