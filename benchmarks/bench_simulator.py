@@ -1,8 +1,8 @@
 """`python -m formup.benchmarks.bench_simulator`: the stepping simulator, in steps and in residuals.
 
-Steps per second of CPU time beside pyrvo's, which steps discs that avoid each other towards a velocity each,
-with its positions read and its velocities set, as ours are; in turns, where it is installed. Then a
-team on two wheels with 5 % noise, over seeds.
+Steps per second of CPU time beside pyrvo's, which steps discs that avoid each other towards a
+velocity each, with its positions read and its velocities set, as ours are; in turns, where it is
+installed. Then a team on two wheels with 5 % noise, over seeds.
 """
 
 import asyncio
@@ -37,7 +37,7 @@ TEAMS, SEEDS, NOISE = (8, 30), 20, 0.05
 SITE = Site({"t1": make_outline([(400, 300), (800, 300), (800, 600), (400, 600)])}, 1200, 900)
 
 
-def _scene(n: int) -> tuple[FloatArray, FloatArray]:
+def _ways(n: int) -> tuple[FloatArray, FloatArray]:
     """Starts 20 px apart and ways of six legs, (n, 7, 2) px."""
     random, side = np.random.default_rng(n), math.ceil(math.sqrt(n))
     starts = 20.0 * np.stack(np.divmod(np.arange(n), side), axis=1)
@@ -46,7 +46,7 @@ def _scene(n: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _ours(n: int, drive: str) -> Callable[[], object]:
-    starts, ways = _scene(n)
+    starts, ways = _ways(n)
     physics = Physics.model_validate(
         {"drive": drive, "speed": SPEED, "acceleration": 4 * SPEED, "slip": 0.02}
     )
@@ -58,7 +58,7 @@ def _ours(n: int, drive: str) -> Callable[[], object]:
 
 def _fleet(n: int) -> Callable[[], object]:
     """As `drive` is read: with poses made at each step."""
-    starts, ways = _scene(n)
+    starts, ways = _ways(n)
     poses = [Pose(str(i), float(x), float(y)) for i, (x, y) in enumerate(starts)]
     motion = Motion(dict(zip((pose.id for pose in poses), ways, strict=True)))
     moving, loop = SimulatedFleet(poses, speed=SPEED).drive(motion), asyncio.new_event_loop()
@@ -67,7 +67,7 @@ def _fleet(n: int) -> Callable[[], object]:
 
 def _pyrvo(n: int) -> Callable[[], object]:
     rvo: Any = import_module("pyrvo")
-    starts, ways = _scene(n)
+    starts, ways = _ways(n)
     there = rvo.RVOSimulator(PERIOD, 15.0, 10, 5.0, 5.0, RADIUS, SPEED)
     for x, y in starts.tolist():
         there.add_agent((x, y))
@@ -84,7 +84,7 @@ def _pyrvo(n: int) -> Callable[[], object]:
     return step
 
 
-def _steps() -> None:
+def _show_steps() -> None:
     makers: dict[str, Callable[[int], Callable[[], object]]] = {
         "point": lambda n: _ours(n, "point"),
         "differential": lambda n: _ours(n, "differential"),
@@ -142,7 +142,7 @@ def _team(robots: int) -> None:
 
 def main() -> None:
     """Print both tables."""
-    _steps()
+    _show_steps()
     print(f"\ntwo wheels, {NOISE:.0%} noise, {SEEDS} seeds")  # noqa: T201
     heads = f"{'robots':>8} {'arrived':>7} {'median off':>12} {'worst off':>12}"
     print(f"{heads} {'least apart / 2r':>18} {'tracking error':>18}")  # noqa: T201

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import yaml
 from pydantic import ValidationError
@@ -84,7 +84,7 @@ def _content(path: Path) -> dict[str, Any]:
     try:
         if path.stat().st_size > MOST_BYTES:
             raise InputError(f"{path} is larger than {MOST_BYTES:,} bytes; describe one fleet.")
-        content: object = yaml.load(path.read_text(encoding="utf-8"), _Loader)
+        content: Any = yaml.load(path.read_text(encoding="utf-8"), _Loader)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
@@ -92,7 +92,7 @@ def _content(path: Path) -> dict[str, Any]:
         raise InputError(f"{path} is not YAML: {where}.") from None
     if not isinstance(content, dict):
         raise InputError(f"{path} describes no fleet; begin it with a line `fleet: simulated`.")
-    return {str(key): value for key, value in content.items()}
+    return {str(key): value for key, value in cast("dict[Any, Any]", content).items()}
 
 
 class _Loader(yaml.SafeLoader):

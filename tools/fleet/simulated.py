@@ -156,16 +156,17 @@ def open_fleet(request: FleetRequest) -> SimulatedFleet:
             f"up to {MAX_ROBOTS} so far: the plan stands, nothing was moved."
         )
     speed, radius = SPEED_SHARE * math.hypot(*request.size), request.radius or RADIUS
-    if request.config is None:
+    path = request.config
+    if path is None:
         return SimulatedFleet(set_down(request), speed=speed, radius=radius, seed=request.seed)
-    told = described(request.config)
+    told = described(path)
     speed = told.given.get("speed", speed)
     usual = {"speed": speed, "acceleration": speed / FULL_SPEED_S, "radius": radius}
     physics = told.physics(usual)
     if "radius" in told.given:
         request = replace(request, radius=physics.radius)
     poses = set_down(request)
-    _check_named(request.config, physics, [pose.id for pose in poses])
+    _check_named(path, physics, [pose.id for pose in poses])
     fleet = SimulatedFleet(poses, physics=physics, seed=request.seed)
     fleet.pace.speed = 1.0 if told.pace == "real" else None
     return fleet

@@ -238,7 +238,8 @@ class Simulator:
         settled = ended & (size <= SETTLED + 3 * self.physics.noise.sensing)
         aim = np.where(ended[:, None], -seen.off, seen.aims - seen.points)
         turn = _wrapped(np.arctan2(aim[:, 1], aim[:, 0]) - seen.headings)
-        turn = np.where(settled, np.nan_to_num(_wrapped(seen.looks - seen.headings)), turn)
+        looks = np.where(np.isnan(seen.looks), seen.headings, seen.looks)
+        turn = np.where(settled, _wrapped(looks - seen.headings), turn)
         turn[~settled & (_norms(aim) < NEAR / 4)] = 0.0
         about = _braking(abs(turn) * radius, self._push, self._smoothing) * np.sign(turn)
         about = np.clip(about, -most / 2, most / 2)
@@ -343,7 +344,7 @@ def _braking(room: FloatArray, deceleration: float, step: float) -> FloatArray:
 
 def _norms(vectors: FloatArray) -> FloatArray:
     """Their lengths, (n,)."""
-    return np.hypot(vectors[:, 0], vectors[:, 1])
+    return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1]))
 
 
 def _ratio(a: FloatArray | float, b: FloatArray) -> FloatArray:

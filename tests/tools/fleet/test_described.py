@@ -69,7 +69,7 @@ def test_a_mistake_is_found_before_a_fleet_is_opened(tmp_path: Path, text: str, 
 
 
 def test_a_file_that_is_not_there_and_faults_of_nobody_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="none.yaml cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"none\.yaml cannot be read: No such file"):
         fleet_named(str(tmp_path / "none.yaml"))
     nobody = written(tmp_path, "fleet: simulated\nlost: [{robot: 9}, {robot: 2}]")
     with pytest.raises(InputError, match="faults of robot 9; the fleet has 4 robots, 1 to 4"):
