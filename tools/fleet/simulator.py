@@ -245,7 +245,7 @@ class Simulator:
         about = np.clip(about, -most / 2, most / 2)
         before = seen.rates[:, 1] * radius
         about = np.clip(about, before - change, before + change)
-        room = np.where(ended, size, seen.room)
+        room = np.asarray(np.where(ended, size, seen.room), dtype=float)
         room[settled] = 0.0
         fast = np.minimum(_braking(room, self._push, self._smoothing), most - abs(about))
         fast *= np.clip(1 - abs(turn) / ASKEW, 0.0, 1.0)
