@@ -239,13 +239,13 @@ class Simulator:
         aim = np.where(ended[:, None], -seen.off, seen.aims - seen.points)
         turn = _wrapped(np.arctan2(aim[:, 1], aim[:, 0]) - seen.headings)
         looks = np.where(np.isnan(seen.looks), seen.headings, seen.looks)
-        turn = np.where(settled, _wrapped(looks - seen.headings), turn)
+        turn = np.asarray(np.where(settled, _wrapped(looks - seen.headings), turn), dtype=float)
         turn[~settled & (_norms(aim) < NEAR / 4)] = 0.0
         about = _braking(abs(turn) * radius, self._push, self._smoothing) * np.sign(turn)
         about = np.clip(about, -most / 2, most / 2)
         before = seen.rates[:, 1] * radius
         about = np.clip(about, before - change, before + change)
-        room = np.asarray(np.where(ended, size, seen.room), dtype=float)
+        room = np.where(ended, size, seen.room)
         room[settled] = 0.0
         fast = np.minimum(_braking(room, self._push, self._smoothing), most - abs(about))
         fast *= np.clip(1 - abs(turn) / ASKEW, 0.0, 1.0)
