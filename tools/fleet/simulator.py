@@ -239,9 +239,10 @@ class Simulator:
         aim = np.where(ended[:, None], -seen.off, seen.aims - seen.points)
         turn = _wrapped(np.arctan2(aim[:, 1], aim[:, 0]) - seen.headings)
         looks = np.where(np.isnan(seen.looks), seen.headings, seen.looks)
-        turn = np.asarray(np.where(settled, _wrapped(looks - seen.headings), turn), dtype=float)
+        turn = np.where(settled, _wrapped(looks - seen.headings), turn)
         turn[~settled & (_norms(aim) < NEAR / 4)] = 0.0
-        about = _braking(abs(turn) * radius, self._push, self._smoothing) * np.sign(turn)
+        arc = np.asarray(abs(turn) * radius, dtype=float)
+        about = _braking(arc, self._push, self._smoothing) * np.sign(turn)
         about = np.clip(about, -most / 2, most / 2)
         before = seen.rates[:, 1] * radius
         about = np.clip(about, before - change, before + change)
