@@ -11,7 +11,7 @@ from ..agent.agent import Agent
 from ..agent.service import Service
 from ..agent.store.places import data_folder, store_at
 from ..tools.errors import InputError
-from ..tools.fleet.registry import FLEETS
+from ..tools.fleet.described import fleet_named
 from . import options as o
 from .agents import agent_of
 from .terminal import say
@@ -67,7 +67,7 @@ def serve(
     if settings.tokens_file is None and usual.exists():
         settings = settings.model_copy(update={"tokens_file": usual})
     check_reach(settings)
-    FLEETS.load(settings.fleet)
+    fleet_named(settings.fleet)
     with service_of(settings, planner, base_url, prompt, prompts, limit, policy) as service:
         raise typer.Exit(run(service, settings))
 

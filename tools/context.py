@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 from .errors import InputError, StorageError, ToolError
+from .fleet.described import fleet_named
 from .fleet.protocol import Fleet, Pose
-from .fleet.registry import FLEETS
 from .formation.plan import Plan
 from .formation.units import check_scale
 from .formation.value import Value
@@ -241,7 +241,7 @@ class Context:
             raise InputError(
                 f"{BESIDE} goes with a detector that knows words; got {detector.name!r}."
             )
-        FLEETS.load(self.settings.fleet)
+        fleet_named(self.settings.fleet)
         scale = self.settings.metres_per_pixel
         if scale is None or scale == self.world.metres_per_pixel:
             return self
