@@ -18,15 +18,15 @@ SEGMENT_ROWS = 2_000_000
 
 @dataclass(frozen=True)
 class Cells:
-    """Parts of paths, c of them, one robot's after the other's.
+    """Parts of paths, c of them, one path's after the other's.
 
-    The first of a robot is its start and the last its goal, both of no length.
+    The first of a path is its start and the last its goal, both of no length.
 
     Attributes:
         robot: (c,) whose it is.
         begin, end: (c, 2) px.
-        enter, leave: (c,) arc length where it begins and ends, px.
-        first: (n + 1,) where the cells of each robot begin, and the last one's end.
+        enter, leave: (c,) arc length where it begins and ends along all that its robot drives, px.
+        first: (n + 1,) where the cells of each path begin, and the last one's end.
     """
 
     robot: Indices
@@ -38,21 +38,25 @@ class Cells:
 
     @property
     def starts(self) -> Indices:
-        """(n,) each robot's start."""
+        """(n,) each path's start."""
         return self.first[:-1]
 
     @property
     def goals(self) -> Indices:
-        """(n,) each robot's goal."""
+        """(n,) each path's goal."""
         return self.first[1:] - 1
 
-    def of(self, robot: int) -> slice:
-        """The cells of a robot."""
-        return slice(int(self.first[robot]), int(self.first[robot + 1]))
+    def of(self, path: int) -> slice:
+        """The cells of a path."""
+        return slice(int(self.first[path]), int(self.first[path + 1]))
 
 
-def cut(paths: Sequence[FloatArray], step: float) -> Cells:
-    """Cut polylines, (k, 2) px each, at their vertices and into cells no longer than a step."""
+def cut(paths: Sequence[FloatArray], owners: Indices, step: float) -> Cells:
+    """Cut polylines, (k, 2) px each, at their vertices and into cells no longer than a step.
+
+    Args:
+        owners: the robot that drives each path; a second path of one leads to its first.
+    """
     knots: list[FloatArray] = []
     for path in paths:
         along = arc_lengths(path)
@@ -65,8 +69,12 @@ def cut(paths: Sequence[FloatArray], step: float) -> Cells:
         knots.append(np.concatenate(shares))
     points = [_points(path, s) for path, s in zip(paths, knots, strict=True)]
     counts = np.array([len(s) - 1 for s in knots], dtype=np.intp)
+    before = np.zeros(len(paths))
+    legs = np.arange(len(paths)) != owners
+    before[owners[legs]] = [s[-1] for s, leg in zip(knots, legs, strict=True) if leg]
+    knots = [s + offset for s, offset in zip(knots, before, strict=True)]
     return Cells(
-        robot=np.repeat(np.arange(len(paths)), counts),
+        robot=np.repeat(owners, counts),
         begin=np.concatenate([p[:-1] for p in points]),
         end=np.concatenate([p[1:] for p in points]),
         enter=np.concatenate([s[:-1] for s in knots]),

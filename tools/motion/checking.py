@@ -4,18 +4,18 @@ Shares nothing with the planner: closest approaches are exact, from the times of
 the order of passage keeps robots apart when they are late is checked at points along the paths.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely.geometry import LineString
+from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
 from ..formation.value import Value
 from ..geometry.outline import FloatArray
-from .motion import Indices, Motion, Passages, arc_lengths
+from .motion import Indices, Motion, Passages, arc_lengths, as_line
 
 ROUNDING = 1e-6
 """Distances may fall short of what is demanded by so much, px."""
@@ -150,7 +150,7 @@ def _closest_approach(
         return None, ()
     pieces = _Pieces(motion, idle)
     ways = np.stack([pieces.begin, pieces.end], axis=1)
-    lines = np.asarray(shapely.linestrings(ways), dtype=object)
+    lines = [as_line(way) for way in ways]
     tree = shapely.STRtree(lines)
     reach = 2 * demanded
     while True:
@@ -192,7 +192,7 @@ def _clearances(
         if region.is_empty:
             continue
         for robot, path in motion.paths.items():
-            way = LineString(path)
+            way = as_line(path)
             near = float(region.distance(way))
             if near < radius - ROUNDING:
                 near = _in_passing(way, region, radius)
@@ -213,28 +213,31 @@ def _clearances(
     return (None if np.isinf(least) else least), tuple(found[:FINDINGS])
 
 
-def _in_passing(way: LineString, region: BaseGeometry, radius: float) -> float:
+def _in_passing(way: BaseGeometry, region: BaseGeometry, radius: float) -> float:
     """How near a way comes to a region beside where it leaves and enters its surroundings, px.
 
     Where it starts or ends nearer than is allowed, it comes hardly nearer than that there, and
     goes out or in by nearly the shortest way.
     """
     least, body = np.inf, region.buffer(radius - ROUNDING)
-    parts: Iterable[BaseGeometry] = shapely.get_parts(shapely.intersection(way, body))
-    for part in parts:
-        if part.length < ROUNDING:
-            continue
+    for part in _parts(shapely.intersection(way, body)):
         near = float(region.distance(part))
-        ends = [
-            end
-            for end in map(shapely.Point, (way.coords[0], way.coords[-1]))
-            if part.distance(end) < ROUNDING
-        ]
+        ends = [end for end in _ends(way) if part.distance(end) < ROUNDING]
         out = sum(float(body.boundary.distance(end)) for end in ends)
         allowed = min((float(region.distance(end)) for end in ends), default=np.inf)
         if near < AS_NEAR * allowed or part.length > DETOUR * (out + radius):
             least = min(least, near)
     return least
+
+
+def _parts(geometry: BaseGeometry) -> list[BaseGeometry]:
+    parts = shapely.get_parts(geometry)
+    return [part for part in parts if not part.is_empty]
+
+
+def _ends(way: BaseGeometry) -> list[Point]:
+    points = shapely.get_coordinates(way)
+    return [Point(points[0]), Point(points[-1])]
 
 
 def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
@@ -254,7 +257,7 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
     kept = _held(motion.passages, robot[one], s[one], robot[other], s[other])
     kept = kept | _held(motion.passages, robot[other], s[other], robot[one], s[one])
     ids = list(motion.paths)
-    loose: Indices = np.unique(np.sort(robot[pairs[~kept]], axis=1), axis=0)[:FINDINGS]
+    loose = sorted({(int(min(i, j)), int(max(i, j))) for i, j in robot[pairs[~kept]]})[:FINDINGS]
     return tuple(
         MotionFinding(
             kind="passage",
@@ -264,7 +267,7 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
             sentence=f"Robots {ids[i]} and {ids[j]} could touch if one of them were late: nothing "
             "says which goes first.",
         )
-        for i, j in loose.astype(int).tolist()
+        for i, j in loose
     )
 
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely.geometry import LineString, Point
+from shapely.geometry.base import BaseGeometry
 
 from ..geometry.outline import FloatArray
 
@@ -62,6 +64,11 @@ class Motion:
     def makespan(self) -> float:
         """Seconds until the last robot arrives if nothing delays any."""
         return max((float(times[-1]) for times in self.times.values()), default=0.0)
+
+
+def as_line(path: FloatArray) -> BaseGeometry:
+    """A polyline, (k, 2), as a geometry: a point where it has no length, which lines must have."""
+    return LineString(path) if (path != path[0]).any() else Point(path[0])
 
 
 def arc_lengths(path: FloatArray) -> FloatArray:

@@ -11,11 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
-from ..geometry.outline import FloatArray
-from .motion import Indices, arc_lengths
+from ..geometry.outline import FloatArray, distances
+from .motion import Indices, arc_lengths, as_line
 from .routes import NOBODY, NoRouteError
 
+REACHES, SPOKES, SPOTS = (1.2, 2.0, 3.0, 4.5, 7.0, 10.0), 12, 8
+"""Robots wait so many times as far from their starts as they stay apart, in so many directions;
+so many of those spots are tried."""
 ROUNDS, SWAPS = 12, 200
 """Most times that robots in circles are matched anew, and most pairs that are exchanged."""
 
@@ -29,7 +33,9 @@ class Matched:
 
     Attributes:
         robots: (n,) who goes to each goal, by its row among the starts.
-        paths: for each goal.
+        paths: for each goal; then first legs of those that step aside, whose path leads on from
+            there.
+        aside: the goal whose robot drives each first leg.
         leaving: (k, 2) goals whose robots leave in this order, one having to pass the other's
             start.
         arriving: (k, 2) goals that are taken in this order.
@@ -39,11 +45,20 @@ class Matched:
     paths: list[FloatArray]
     leaving: Indices
     arriving: Indices
+    aside: tuple[int, ...] = ()
 
     @property
     def before(self) -> Indices:
-        """(k, 2) all pairs of which the first has to go before the second."""
-        return np.unique(np.concatenate([self.leaving, self.arriving]), axis=0)
+        """(k, 2) all pairs of paths of which the first has to be driven before the second."""
+        count = len(self.robots)
+        legs = [(count + k, goal) for k, goal in enumerate(self.aside)]
+        then = np.array(legs, dtype=np.intp).reshape(-1, 2)
+        return np.unique(np.concatenate([self.leaving, self.arriving, then]), axis=0)
+
+    @property
+    def owners(self) -> Indices:
+        """The goal whose robot drives each path."""
+        return np.array([*range(len(self.robots)), *self.aside], dtype=np.intp)
 
     @property
     def circles(self) -> list[Indices]:
@@ -51,15 +66,18 @@ class Matched:
         return circles(self.before, len(self.paths))
 
 
-def match(robots: Indices, paths: list[FloatArray], apart: float) -> Matched:
+def match(
+    robots: Indices, paths: list[FloatArray], apart: float, aside: tuple[int, ...] = ()
+) -> Matched:
     """Robots on paths with the order these demand of bodies that keep `apart` px."""
-    lines = shapely.STRtree([shapely.LineString(path) for path in paths])
+    lines = shapely.STRtree([as_line(path) for path in paths])
     starts = shapely.points(np.stack([path[0] for path in paths]))
     goals = shapely.points(np.stack([path[-1] for path in paths]))
     leaving = lines.query(starts, predicate="dwithin", distance=apart).T
     arriving = lines.query(goals, predicate="dwithin", distance=apart).T[:, ::-1]
-    pairs = (found[found[:, 0] != found[:, 1]] for found in (leaving, arriving))
-    return Matched(robots, paths, *pairs)
+    owner = np.array([*range(len(robots)), *aside])
+    leaving, arriving = (p[owner[p[:, 0]] != owner[p[:, 1]]] for p in (leaving, arriving))
+    return Matched(robots, paths, leaving, arriving, aside)
 
 
 def circles(before: Indices, count: int) -> list[Indices]:
@@ -130,6 +148,57 @@ def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
     return found
 
 
+def stepped_aside(
+    found: Matched, ways: Ways, apart: float, free: Callable[[FloatArray], NDArray[np.bool_]]
+) -> Matched:
+    """Some robots of circles wait beside the ways of the others, and go on when those have gone.
+
+    Args:
+        free: which of some points, (k, 2), robots can wait at.
+    """
+    tried: set[int] = set()
+    while found.circles:
+        inside = Counter(int(i) for circle in found.circles for i in circle)
+        demands = Counter(found.before.ravel().tolist())
+        left = [i for i in inside if i < len(found.robots) and i not in {*tried, *found.aside}]
+        if not left:
+            break
+        robot = max(left, key=lambda i: demands[i])
+        tried.add(robot)
+        for spot in _spots(found, robot, apart, free):
+            better = _best(found, _by_way_of(found, robot, spot, ways, apart))
+            if better is not found:
+                found = better
+                break
+    return found
+
+
+def _spots(
+    found: Matched, robot: int, apart: float, free: Callable[[FloatArray], NDArray[np.bool_]]
+) -> FloatArray:
+    """Where a robot could wait off all other paths, (k, 2), the nearest to its start first."""
+    angle = np.linspace(0, 2 * np.pi, SPOKES, endpoint=False)
+    reach = apart * np.array(REACHES)[:, None, None]
+    around = reach * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    spots = (found.paths[robot][0] + around).reshape(-1, 2)
+    others = [as_line(path) for i, path in enumerate(found.paths) if i != robot]
+    near = np.min([distances(other, spots) for other in others], axis=0)
+    return spots[(near >= apart) & free(spots)][:SPOTS]
+
+
+def _by_way_of(
+    found: Matched, robot: int, spot: FloatArray, ways: Ways, apart: float
+) -> Matched | None:
+    """As it is but for one robot, which first drives to a spot; None if it cannot."""
+    begin, end = found.paths[robot][[0, -1]]
+    try:
+        first, second = ways(np.stack([begin, spot]), np.stack([spot, end]), NOBODY)
+    except NoRouteError:
+        return None
+    paths = [second if i == robot else path for i, path in enumerate(found.paths)]
+    return match(found.robots, [*paths, first], apart, (*found.aside, robot))
+
+
 def _best(found: Matched, other: Matched | None) -> Matched:
     """That which leaves fewer demands in circles."""
     return found if other is None or _worth(other) >= _worth(found) else other
@@ -181,7 +250,7 @@ def _exchanged(
         return None
     for i, path in zip(goals, onto, strict=True):
         paths[i] = path
-    return match(robots, paths, apart)
+    return match(robots, paths, apart, found.aside)
 
 
 def _past(
@@ -194,7 +263,7 @@ def _past(
     except NoRouteError:
         return None
     paths = [path if i == robot else old for i, old in enumerate(found.paths)]
-    return match(found.robots, paths, apart)
+    return match(found.robots, paths, apart, found.aside)
 
 
 def _pairs_exchanged(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import FleetError
@@ -19,7 +21,7 @@ from .avoiding import routes_off
 from .cells import Cells, conflicts, cut
 from .checking import MotionVerdict, check_motion
 from .motion import Indices, Motion
-from .order import Matched, match, matched_anew, ordered, rerouted
+from .order import Matched, match, matched_anew, ordered, rerouted, stepped_aside
 from .routes import NOBODY, union, way_lengths
 from .schedule import Near, NoTimeError, Schedule, passages, schedule
 
@@ -103,15 +105,17 @@ def plan_motion(
     found, apart = _matched(team, goals, ground, interchangeable)
     ids = tuple(team.ids[int(i)] for i in found.robots)
     if found.circles:
-        raise NoOrderError([ids[int(i)] for i in np.concatenate(found.circles)])
-    cells, pairs = _cut(found.paths, apart)
-    lengths = cells.leave[cells.goals]
+        shut = found.owners[np.concatenate(found.circles)]
+        raise NoOrderError(list(dict.fromkeys(ids[int(i)] for i in shut)))
+    cells, pairs = _cut(found, apart)
+    lengths = cells.leave[cells.goals] - cells.enter[cells.starts]
+    legs = {goal: len(ids) + k for k, goal in enumerate(found.aside)}
     try:
         near = Near.of(pairs, len(cells.robot))
-        times = schedule(cells, near, ordered(found.before, lengths.tolist()), team.speed)
+        times = schedule(cells, near, ordered(found.before, lengths.tolist()), team.speed, legs)
     except NoTimeError as error:
         raise NoOrderError([ids[error.robot]]) from None
-    knots = [_knots(cells, times, i) for i in range(len(ids))]
+    knots = [_knots(cells, times, [*filter(None, [legs.get(i)]), i]) for i in range(len(ids))]
     motion = Motion(
         paths={robot: path for robot, (path, _) in zip(ids, knots, strict=True)},
         times={robot: when for robot, (_, when) in zip(ids, knots, strict=True)},
@@ -169,20 +173,41 @@ def _matched(
             found = matched_anew(found, team.starts, ways, apart)
         if apart >= 2 * radius * EXACT and not found.circles:
             return found, apart
-    return rerouted(found, ways, apart), apart
+    found = rerouted(found, ways, apart)
+
+    def free(spots: FloatArray) -> NDArray[np.bool_]:
+        return _off(spots, ground, standing, radius, apart)
+
+    return stepped_aside(found, ways, apart, free), apart
 
 
-def _cut(paths: Sequence[FloatArray], apart: float) -> tuple[Cells, Indices]:
+def _off(
+    spots: FloatArray, ground: Ground, standing: FloatArray, radius: float, apart: float
+) -> NDArray[np.bool_]:
+    """Which points, (k, 2), are in the picture and off obstacles, things and idle robots."""
+    others = [thing.region for thing in ground.site.others]
+    solid = shapely.union_all(np.array([ground.solid, *others], dtype=object))
+    idle = shapely.MultiPoint(standing)
+    room, points = ground.site.frame(radius).box, shapely.points(spots)
+    off = shapely.covers(room, points) & ~shapely.dwithin(solid, points, 1.1 * radius)
+    return np.asarray(off & ~shapely.dwithin(idle, points, apart), dtype=bool)
+
+
+def _cut(found: Matched, apart: float) -> tuple[Cells, Indices]:
     """Paths in cells, and the pairs of cells that are too near."""
-    coarse = min(max((len(paths) / CROWD) ** 0.5, 1.0), COARSEST)
+    coarse = min(max((len(found.robots) / CROWD) ** 0.5, 1.0), COARSEST)
     step = min(coarse / 2, 0.9) * apart
-    cells = cut(paths, step)
+    cells = cut(found.paths, found.owners, step)
     return cells, conflicts(cells, apart, step)
 
 
-def _knots(cells: Cells, times: Schedule, robot: int) -> tuple[FloatArray, FloatArray]:
-    """A robot's path, (k, 2), with a vertex wherever its velocity changes, and when it is there."""
-    mine = cells.of(robot)
+def _knots(cells: Cells, times: Schedule, paths: list[int]) -> tuple[FloatArray, FloatArray]:
+    """What a robot drives, (k, 2), with a vertex wherever its velocity changes, and when that is.
+
+    Args:
+        paths: one after the other.
+    """
+    mine = np.concatenate([np.r_[cells.of(path)] for path in paths]).astype(np.intp)
     points = np.concatenate([cells.begin[mine], cells.end[mine][-1:]])
     when = np.append(times.enter[mine], times.enter[mine][-1])
     spans, ways = np.diff(when), np.diff(points, axis=0)

@@ -4,7 +4,7 @@ Safe intervals (Phillips and Likhachev 2011) along a fixed path (Kant and Zucker
 are too near are never used at once, so the times give an order of passage without a circle.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,11 +57,14 @@ class Near:
         return cls(first.astype(np.intp), np.ascontiguousarray(both[:, 1]))
 
 
-def schedule(cells: Cells, near: Near, order: Sequence[int], speed: float) -> Schedule:
-    """The earliest times for robots, each of which gives way to those before it in an order.
+def schedule(
+    cells: Cells, near: Near, order: Sequence[int], speed: float, legs: Mapping[int, int]
+) -> Schedule:
+    """The earliest times for paths, each of which gives way to those before it in an order.
 
     Args:
         speed: greatest, px/s.
+        legs: for the path of a robot that steps aside the one on which it does.
 
     Raises:
         NoTimeError: one cannot get through.
@@ -69,13 +72,16 @@ def schedule(cells: Cells, near: Near, order: Sequence[int], speed: float) -> Sc
     enter = np.full(len(cells.robot), FOREVER)
     leave = np.full(len(cells.robot), FOREVER)
     seconds = (cells.leave - cells.enter) / speed
-    for robot in order:
-        mine = cells.of(robot)
+    for path in order:
+        mine = cells.of(path)
         blocked = _blocked(mine, near, enter, leave)
-        times = _earliest(seconds[mine], blocked)
+        before = cells.goals[legs[path]] if path in legs else None
+        times = _earliest(seconds[mine], blocked, 0.0 if before is None else float(enter[before]))
         if times is None:
-            raise NoTimeError(robot)
+            raise NoTimeError(int(cells.robot[mine.start]))
         enter[mine], leave[mine] = times, np.append(times[1:], FOREVER)
+        if before is not None:
+            leave[before] = leave[mine.start]
     return Schedule(enter, leave)
 
 
@@ -128,12 +134,12 @@ class _Arrival:
     before: "_Arrival | None"
 
 
-def _earliest(seconds: FloatArray, blocked: dict[int, list[Span]]) -> FloatArray | None:
+def _earliest(
+    seconds: FloatArray, blocked: dict[int, list[Span]], begun: float
+) -> FloatArray | None:
     """When a robot enters each of its cells, (k,) s, to be in the last one for good soonest."""
-    begin, end = _free(blocked.get(0))[0]
-    if begin > 0.0:
-        return None
-    reached = [_Arrival(0.0, end, None)]
+    free = [end for begin, end in _free(blocked.get(0)) if begin <= begun <= end]
+    reached = [_Arrival(begun, end, None) for end in free]
     for k in range(1, len(seconds)):
         takes = float(seconds[k - 1])
         free = _free(blocked.get(k))
