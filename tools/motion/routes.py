@@ -51,7 +51,7 @@ class NoRouteError(FleetError):
 
 def obstacles(contract: Contract, site: Site) -> BaseGeometry:
     """What robots have to drive around: targets no group of the contract stands on."""
-    solid = [site.outlines[t].filled for t in contract.solid_targets]
+    solid = [site.solid(t, contract) for t in contract.solid_targets]
     return shapely.union_all(np.asarray(solid, dtype=object)) if solid else Polygon()
 
 
