@@ -70,6 +70,24 @@ class Settings(Value):
     metres_per_pixel: float | None = None
 
 
+def check_settings(settings: Settings) -> None:
+    """Refuse names of what is not there, and what does not go together.
+
+    Raises:
+        InputError: saying so.
+    """
+    segmenter = segmenter_named(settings.segmenter)
+    detector = detector_named(settings.detector.removeprefix(BESIDE))
+    if isinstance(detector, Finder) and "box" not in segmenter.takes:
+        raise InputError(
+            f"The detector {detector.name!r} gives boxes, which the segmenter "
+            f"{segmenter.name!r} does not take; choose another of the two."
+        )
+    if settings.detector.startswith(BESIDE) and not isinstance(detector, Finder):
+        raise InputError(f"{BESIDE} goes with a detector that knows words; got {detector.name!r}.")
+    FLEETS.load(settings.fleet)
+
+
 class Artefacts(Protocol):
     """Files by the hash of their content: pictures, and the tracks of robots on their way."""
 
@@ -217,17 +235,7 @@ class Context:
         Raises:
             InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
         """
-        segmenter, detector = segmenter_named(self.settings.segmenter), self._detector
-        if isinstance(detector, Finder) and "box" not in segmenter.takes:
-            raise InputError(
-                f"The detector {detector.name!r} gives boxes, which the segmenter "
-                f"{segmenter.name!r} does not take; choose another of the two."
-            )
-        if self.settings.detector.startswith(BESIDE) and not isinstance(detector, Finder):
-            raise InputError(
-                f"{BESIDE} goes with a detector that knows words; got {detector.name!r}."
-            )
-        FLEETS.load(self.settings.fleet)
+        check_settings(self.settings)
         scale = self.settings.metres_per_pixel
         if scale is None or scale == self.world.metres_per_pixel:
             return self

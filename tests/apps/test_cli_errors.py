@@ -249,3 +249,23 @@ def test_no_scale_of_a_picture(cli: Cli, picture: Path, scale: str) -> None:
 def test_metric_options_take_a_scale(cli: Cli, picture: Path, option: str) -> None:
     refused(cli("run", picture, *CAR, option, "1.5m"), f"{option} '1.5m'", "--metres-per-pixel")
     refused(cli("run", picture, *CAR, option, "1.5 miles"), "1.5 miles", "1.5m or 40cm")
+
+
+@pytest.mark.parametrize(
+    "command", [("serve",), ("mcp",), ("mcp", "--http"), ("chat", "scene.png")]
+)
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--detector", "owl", "Unknown detector 'owl'"),
+        ("--segmenter", "scissors", "Unknown segmenter 'scissors'"),
+        ("--threshold", "2", "--threshold '2' cannot be used; give a number from 0 to 1"),
+    ],
+)
+def test_who_serves_or_chats_is_told_at_the_start(
+    cli: Cli, picture: Path, command: tuple[str, ...], option: str, value: str, said: str
+) -> None:
+    code, out, err = cli(*command, option, value, "--store", picture.parent / "store")
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
