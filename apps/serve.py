@@ -88,11 +88,12 @@ def service_of(settings: "ServerSettings", *rest: Any) -> Generator[Service]:
     Raises:
         InputError: no session can be begun with such settings.
     """
-    check_settings(settings.of_session())
+    check_settings(begun := settings.of_session())
     with ExitStack() as stack:
         agents: dict[str, Agent] = {}
         for name in map(str.strip, settings.model.split(",")):
             agents[name] = stack.enter_context(agent_of(name, *rest, talks=True))
+            agents[name].check(begun)
         yield Service(agents, store_at(settings.store))
 
 

@@ -111,6 +111,7 @@ def test_no_number_of_robots(cli: Cli, picture: Path, count: str) -> None:
         ("--target", "١", ("'١'", "c3")),
         ("--target", "c123456", ("'c123456'", "c3")),
         ("--target", "", ("''", "c3")),
+        ("--detector", "vlm", "sees no picture; choose a model"),
         ("--threshold", "2", ("'2'", "0 to 1")),
         ("--threshold", "high", ("'high'",)),
         ("--robot-radius", "-3", ("'-3'", "pixels")),
@@ -259,6 +260,7 @@ def test_metric_options_take_a_scale(cli: Cli, picture: Path, option: str) -> No
     [
         ("--detector", "owl", "Unknown detector 'owl'"),
         ("--segmenter", "scissors", "Unknown segmenter 'scissors'"),
+        ("--detector", "vlm", "sees no picture; choose a model"),
         ("--threshold", "2", "--threshold '2' cannot be used; give a number from 0 to 1"),
     ],
 )
