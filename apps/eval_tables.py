@@ -13,7 +13,7 @@ from .terminal import styled
 SCORES = ("success", "95 %", "GCR", "strict", "chance SR", "chance GCR")
 PLACED = (
     *("trials", "placed", "success", "strict"),
-    *("right thing,\nif placed", "success,\nif placed", "mean IoU", "e95"),
+    *("right,\nif placed", "success,\nif placed", "mean\nIoU", "e95"),
 )
 MISSES = 200
 """Misses that are listed; the report shows all."""
