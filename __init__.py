@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         ModelError,
         ToolError,
     )
-    from .tools.fleet.deploy import Arrival
+    from .tools.fleet.arrival import Arrival
     from .tools.formation.checking.check import certify
     from .tools.formation.checking.verdict import Finding, Verdict
     from .tools.formation.contract import Contract, Group

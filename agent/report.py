@@ -7,7 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict
 
 from ..tools.context import Context
-from ..tools.fleet.deploy import Arrival
+from ..tools.fleet.arrival import Arrival
 from ..tools.formation.checking.verdict import Verdict
 from ..tools.formation.contract import Contract
 from ..tools.formation.encounters import notes_of

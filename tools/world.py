@@ -13,7 +13,7 @@ import shapely
 from pydantic import Field, TypeAdapter, field_validator
 
 from .errors import ToolError
-from .fleet.deploy import Arrival
+from .fleet.arrival import Arrival
 from .fleet.protocol import Pose
 from .formation.contract import Contract
 from .formation.encounters import Encounter, others_than

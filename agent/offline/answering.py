@@ -109,8 +109,8 @@ def arrived(data: Mapping[str, Any], scale: float | None) -> str:
     if data.get("already_there"):
         return f"All stand there already; the furthest is {worst}."
     if data["arrived"]:
-        return f"All arrived; the furthest is {worst}."
-    return f"Robot {data['worst_robot']} stopped {worst} after {data['corrections']} corrections."
+        return f"All arrived; the furthest is {worst}. {data.get('reason', '')}".rstrip()
+    return f"Not all arrived after {data['corrections']} corrections. {data['reason']}"
 
 
 def said_of_heading(standing: Standing) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from formup.tools.context import Context, MemoryArtefacts, Settings
 from formup.tools.errors import InputError, StorageError, ToolError
-from formup.tools.fleet.deploy import Arrival
+from formup.tools.fleet.arrival import Arrival
 from formup.tools.fleet.protocol import Pose
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import Plan, make_plan

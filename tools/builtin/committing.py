@@ -8,7 +8,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from ..context import Context, Settings
 from ..errors import ToolError
-from ..fleet.deploy import Arrival
+from ..fleet.arrival import Arrival
 from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, exact_clearance, nominal
 from ..formation.placement.avoidance import off_others
@@ -221,6 +221,8 @@ async def deploy(
     }
     if not moved:
         data["already_there"] = True
+    elif arrival.reason is not None:
+        data["reason"] = arrival.reason
     message = _with_observed(tell, arrival, world) if arrival.arrived else None
     data = with_metres(data, world.metres_per_pixel)
     return ToolResult(data, world=world, message=message)
@@ -356,7 +358,8 @@ def _with_observed(tell: str | None, arrival: Arrival, world: World) -> str | No
     count, worst = len(arrival.observed), max(arrival.residual_px)
     robots = "The robot was" if count == 1 else f"All {count} robots were"
     within = length_text(max(worst, 0.1), world.metres_per_pixel)
-    return f"{tell.strip()} {robots} observed within {within} of the plan."
+    said = f"{tell.strip()} {robots} observed within {within} of the plan."
+    return f"{said} {arrival.reason or ''}".rstrip()
 
 
 def _held_to(contract: Contract, settings: Settings) -> Contract:

@@ -10,18 +10,9 @@ import shapely
 
 from ..context import Context
 from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
-from ..fleet.deploy import (
-    ARRIVED_DEG,
-    MAX_AGE,
-    Arrival,
-    Assigned,
-    Deployment,
-    Track,
-    assign_robots,
-    check_turns,
-    deploy,
-    heading_residuals,
-)
+from ..fleet.arrival import Arrival, Deployment, Track
+from ..fleet.assigning import Assigned, assign_robots
+from ..fleet.deploy import ARRIVED_DEG, MAX_AGE, check_turns, deploy, heading_residuals
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
 from ..fleet.registry import FLEETS
 from ..formation.checking.instruction_doubts import overruled
@@ -76,7 +67,7 @@ async def with_robots(
         raise ToolError(str(error), "too_many_robots") from None
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
     node = node.model_copy(update={"plan": plan})
-    radius = fleet.radius or 0.0
+    radius = fleet.radius
     told += _notes(found, poses)
     node = await in_thread(lambda: _noted(world, node, told, poses, radius))
     return world.having(robots=poses).with_plan(node)
@@ -155,9 +146,9 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bo
         stored = await to_its_end(lambda: put(file))
         arrival = arrival.model_copy(update={"track": stored})
     world = world.having(robots=made.poses).with_arrival(plan.id, arrival)
-    if arrival.reason is not None:
+    if arrival.ended in ("stopped", "failed"):
         context.observed(world)
-        raise FleetError(arrival.reason)
+        raise FleetError(arrival.reason or "")
     return arrival, world, True
 
 
@@ -244,6 +235,8 @@ def _are_there(poses: tuple[Pose, ...], plan: Plan, arrival: Arrival) -> bool:
 def _in_robot_order(arrival: Arrival, plan: Plan) -> Arrival:
     """An arrival by places as one by robots, as the plan's positions are."""
     place_of = {robot: place for place, robot in enumerate(arrival.robots)}
+    for failed, other in reversed(arrival.replaced.items()):
+        place_of[failed] = place_of[other]
     order = [place_of[robot] for robot in plan.formation.robots or arrival.robots]
     return arrival.model_copy(
         update={

@@ -114,12 +114,14 @@ def _group_facts(world: World, plan: Plan, k: int) -> dict[str, Any]:
 def arrival_facts(world: World, plan: Plan) -> dict[str, Any]:
     """Whether robots were seen at the places of a plan where they stand last, and how many were."""
     seen = {pose.id: (pose.x, pose.y) for pose in world.robots if pose.seen > 0}
-    places = zip(plan.formation.robots, plan.formation.positions, strict=False)
+    arrival = world.arrivals.get(plan.id)
+    robots = arrival.robots if arrival is not None else plan.formation.robots
+    places = zip(robots, plan.formation.positions, strict=False)
     off = {name: math.dist(seen[name], place) for name, place in places if name in seen}
     if not off:
         return {"arrived": False}
     there = sum(way <= tolerance(world.picture.size) for way in off.values())
-    furthest, arrival = max(off, key=lambda name: off[name]), world.arrivals.get(plan.id)
+    furthest = max(off, key=lambda name: off[name])
     return {
         "arrived": there == len(plan.formation.positions) and (arrival is None or arrival.arrived),
         "there": there,

@@ -2,10 +2,9 @@
 
 import asyncio
 import math
+from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import aclosing, suppress
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -14,12 +13,12 @@ from ..formation.checking.check import certify
 from ..formation.contract import MIN_SPACING, Contract, with_defaults
 from ..formation.headings import off_heading
 from ..formation.placement.place import Site
-from ..formation.plan import Plan, Point
-from ..formation.value import Value
-from ..geometry.assignment import assign
+from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
 from ..motion.avoiding import routes_off
 from ..motion.routes import obstacles
+from .arrival import Arrival, Deployment, Ended, Track
+from .getting_on import GettingOn, nearest_spare, said_of, said_of_replaced
 from .protocol import (
     Fleet,
     FleetBusyError,
@@ -29,10 +28,13 @@ from .protocol import (
     PlaceTakenError,
     Pose,
     RobotsFailedError,
+    StalePosesError,
     points_of,
 )
 
 CORRECTIONS = 5
+TRIES = 2
+"""How often a robot that does not get on is sent before it is given up."""
 ARRIVED_DEG = 2.0
 """A robot that is to look somewhere has arrived within so many degrees of it."""
 ARRIVED_SHARE, ARRIVED_PX = 0.001, 0.5
@@ -42,97 +44,10 @@ MAX_AGE = 1.0
 TRACK_FRAMES = 120
 """Most moments of a deployment that are recorded for its film."""
 
-Ended = Literal["arrived", "short", "stopped", "failed"]
 Watch = Callable[[tuple[Pose, ...]], None]
 
 _in_deployment: set[int] = set()
 """`id` of the fleets that are being deployed; a deployment holds its fleet, so none is reused."""
-
-
-class Arrival(Value):
-    """Requested against observed, per place of the formation.
-
-    Attributes:
-        ended: arrived; short: some are off their places after all corrections; stopped: by the
-            fleet's stop; failed: robots or the fleet failed on the way.
-        reason: one sentence where it was stopped or failed.
-        robots: ids of the robots that take the places.
-        failed: ids of those that the fleet named as having failed.
-        observed: where they were seen last, px.
-        residual_px: distance of observed to requested.
-        heading_residual_deg: of observed to requested headings; empty where none were requested.
-        corrections: how many times robots were sent again after the first drive.
-        track: hash of the file that holds where they were on their way.
-    """
-
-    arrived: bool
-    ended: Ended
-    reason: str | None = None
-    robots: tuple[str, ...]
-    failed: tuple[str, ...] = ()
-    observed: tuple[Point, ...]
-    residual_px: tuple[float, ...]
-    heading_residual_deg: tuple[float | None, ...] = ()
-    tolerance_px: float
-    corrections: int
-    track: str | None = None
-
-
-@dataclass(frozen=True)
-class Track:
-    """Where robots were over a deployment, for its film.
-
-    Attributes:
-        ids: of the robots, in the order of their places.
-        points: (f, n, 2) px at f moments, evenly thinned; the last is the last observation.
-    """
-
-    ids: tuple[str, ...]
-    points: FloatArray
-
-
-@dataclass(frozen=True)
-class Deployment:
-    """What came of a deployment, and where all robots of the fleet, idle ones too, were last."""
-
-    arrival: Arrival
-    poses: tuple[Pose, ...]
-    track: Track
-
-
-@dataclass(frozen=True)
-class Assigned:
-    """Who takes which place.
-
-    Attributes:
-        robots: ids; robot i takes place i.
-        gap: share of the summed squared ways another assignment could have saved at most; None
-            where there was none better.
-    """
-
-    robots: tuple[str, ...]
-    gap: float | None
-
-
-def assign_robots(poses: Sequence[Pose], places: FloatArray) -> Assigned:
-    """The robots for all places, (n, 2) px, with the least sum of squared ways; others stay idle.
-
-    Raises:
-        FleetSizeError: the fleet has fewer robots than there are places.
-    """
-    from scipy.optimize import linear_sum_assignment
-    from scipy.spatial.distance import cdist
-
-    if len(poses) < len(places):
-        raise FleetSizeError(f"The fleet has {len(poses)} robots; the plan needs {len(places)}.")
-    points = points_of(poses)
-    chosen = np.arange(len(poses))
-    if len(poses) > len(places):
-        cost = cdist(places, points, "sqeuclidean")
-        chosen = np.sort(linear_sum_assignment(cost)[1])
-    found = assign(points[chosen], places)
-    robots = tuple(poses[int(i)].id for i in chosen[found.robots])
-    return Assigned(robots, found.gap if found.method == "approximate" else None)
 
 
 def tolerance(size: tuple[float, float]) -> float:
@@ -234,11 +149,16 @@ class _Drive:
         self._goals, self._headings = goals
         self._contract, self._site = contract, site
         self._fleet, self._robots, self._watch = fleet, tuple(robots), watch
-        self._radius = max(contract.robot_radius, fleet.radius or 0.0)
+        self._radius = max(contract.robot_radius, fleet.radius)
         self._tolerance = tolerance(site.room)
         self._poses: dict[str, Pose] = {}
         self._frames: list[FloatArray] = []
         self._stride, self._seen = 1, 0
+        self._places: tuple[FloatArray, tuple[float | None, ...], tuple[str, ...]]
+        self._places = *goals, self._robots  # of those given up, too
+        self._tried: Counter[str] = Counter()
+        self._failed: dict[str, str | None] = {}  # and who took their place
+        self._waiting: dict[str, str] = {}
 
     async def run(self, starting: Callable[[], Awaitable[None]] | None) -> Deployment:
         if len(set(self._robots)) != len(self._goals):
@@ -269,13 +189,58 @@ class _Drive:
         return self._report(corrections)
 
     async def _drive(self, motion: Motion) -> None:
-        async with aclosing(self._fleet.drive(motion)) as moving:
-            async for poses in moving:
-                self._saw(poses)
-        await self._observe()
+        """Drive until the robots are there, or none has got on for a while; then see to those."""
+        failing: Sequence[str] = ()
+        on, self._waiting = GettingOn(motion), {}
+        try:
+            async with aclosing(self._fleet.drive(motion)) as moving:
+                async for poses in moving:
+                    self._saw(poses)
+                    if not on.saw(self._poses):
+                        failing, self._waiting = on.stuck(), on.waiting()
+                        break
+            await self._observe()
+        except RobotsFailedError as error:
+            gone = set(error.ids) - set(self._failed)
+            if not gone or not all(self._replace(robot) for robot in gone):
+                raise
+        off = dict(zip(self._robots, self._residual(), strict=True))
+        for robot in (robot for robot in failing if robot not in self._failed):
+            self._tried[robot] += 1
+            if off[robot] <= self._tolerance or self._replace(robot):
+                continue
+            if self._tried[robot] == TRIES:
+                self._give_up(robot)
+
+    def _replace(self, robot: str) -> bool:
+        """Give the place of a robot to the nearest idle one, unless the robot stands on one."""
+        if robot not in self._robots or self._blocks(self._poses[robot]):
+            return False
+        place = self._robots.index(robot)
+        other = nearest_spare(self._goals[place], self._idle(), self._failed)
+        if other is None:
+            return False
+        self._failed[robot] = other
+        self._robots = tuple(other if r == robot else r for r in self._robots)
+        goals, headings, robots = self._places
+        self._places = goals, headings, tuple(other if r == robot else r for r in robots)
+        return True
+
+    def _give_up(self, robot: str) -> None:
+        """Leave a robot where it is: the others go around it."""
+        self._failed[robot] = None
+        keep = [i for i, other in enumerate(self._robots) if other != robot]
+        self._goals = self._goals[keep]
+        self._robots = tuple(self._robots[i] for i in keep)
+        self._headings = tuple(self._headings[i] for i in keep if self._headings)
 
     async def _observe(self) -> None:
-        poses = await self._fleet.observe(max_age=MAX_AGE)
+        try:
+            poses = await self._fleet.observe(max_age=MAX_AGE)
+        except StalePosesError as error:
+            if not set(error.ids) <= set(self._failed):
+                raise
+            poses = await self._fleet.observe()
         there = {pose.id for pose in poses}
         missing = [robot for robot in self._robots if robot not in there]
         if missing:
@@ -290,14 +255,15 @@ class _Drive:
         """Keep poses, and thin the frames to every second one whenever there are too many."""
         self._poses |= {pose.id: pose for pose in poses}
         if self._seen % self._stride == 0:
-            self._frames.append(self._points())
+            self._frames.append(self._points(self._places[2]))
         if len(self._frames) > TRACK_FRAMES:
             self._frames, self._stride = self._frames[::2], 2 * self._stride
         self._seen += 1
         self._watch(tuple(self._poses.values()))
 
-    def _points(self) -> FloatArray:
-        return points_of([self._poses[robot] for robot in self._robots])
+    def _points(self, robots: Sequence[str] | None = None) -> FloatArray:
+        named = self._robots if robots is None else robots
+        return points_of([self._poses[robot] for robot in named])
 
     def _idle(self) -> list[Pose]:
         taking_part = set(self._robots)
@@ -306,14 +272,19 @@ class _Drive:
     def _check_idle(self) -> None:
         """Refuse a plan with a place that a robot stands on which is not to be driven."""
         for pose in self._idle():
-            away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
-            if away.min() < max(2 * self._radius, MIN_SPACING):
+            if self._blocks(pose):
+                away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
                 place = int(away.argmin()) + 1
                 raise PlaceTakenError(
                     f"Robot {pose.id}, which has no place in the plan, stands {away.min():.1f} px "
                     f"from place {place}: give it a place too, or send it away first.",
                     (pose.id,),
                 )
+
+    def _blocks(self, pose: Pose) -> bool:
+        """Whether nobody else could stand on some place, for a robot that stays."""
+        away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
+        return bool(away.min() < max(2 * self._radius, MIN_SPACING))
 
     def _motion(self) -> Motion:
         site, radius = self._site, self._radius
@@ -329,32 +300,56 @@ class _Drive:
 
     def _arrived(self) -> bool:
         turned = all((off or 0.0) <= ARRIVED_DEG for off in self._heading_residual())
-        return turned and bool(self._residual().max() <= self._tolerance)
+        return turned and bool(self._residual().max(initial=0.0) <= self._tolerance)
 
     def _heading_residual(self) -> tuple[float | None, ...]:
         return heading_residuals([self._poses[robot] for robot in self._robots], self._headings)
 
     def _report(self, corrections: int, error: FleetError | None = None) -> Deployment:
-        reason = str(error) if error else None
+        self._goals, self._headings, self._robots = self._places
+        arrived = self._arrived()
+        given_up = [robot for robot, other in self._failed.items() if other is None]
         if self._fleet.stopped or isinstance(error, FleetStoppedError):
             ended: Ended = "stopped"
-            reason = reason or f"The fleet {self._fleet.name} was stopped."
-        elif error:
+        elif error or given_up:
             ended = "failed"
         else:
-            ended = "arrived" if self._arrived() else "short"
-        points = self._points()
+            ended = "arrived" if arrived else "short"
+        points, residual = self._points(), self._residual()
+        named = error.ids if isinstance(error, RobotsFailedError) else ()
+        reason, certified = self._told(ended, error)
         arrival = Arrival(
             arrived=ended == "arrived",
             ended=ended,
             reason=reason,
             robots=self._robots,
-            failed=error.ids if isinstance(error, RobotsFailedError) else (),
+            failed=tuple(dict.fromkeys((*self._failed, *named))),
+            replaced={robot: other for robot, other in self._failed.items() if other is not None},
+            waiting=self._waiting,
+            certified=certified,
             observed=tuple((round(float(x), 3), round(float(y), 3)) for x, y in points),
-            residual_px=tuple(round(float(r), 3) for r in self._residual()),
+            residual_px=tuple(round(float(r), 3) for r in residual),
             heading_residual_deg=self._heading_residual(),
             tolerance_px=round(self._tolerance, 3),
             corrections=corrections,
         )
         track = Track(self._robots, np.stack([*self._frames, points]))
         return Deployment(arrival, tuple(self._poses.values()), track)
+
+    def _told(self, ended: Ended, error: FleetError | None) -> tuple[str | None, bool | None]:
+        """Why not all arrived, and whether what stands is certified."""
+        if ended == "arrived":
+            return " ".join(said_of_replaced(self._failed)) or None, None
+        poses = [self._poses[robot] for robot in self._robots]
+        looks = [None if p.heading is None else math.degrees(p.heading) for p in poses]
+        headings = tuple(looks) if any(h is not None for h in self._headings) else ()
+        verdict = certify(points_of(poses), self._contract, self._site, headings)
+        if ended == "stopped":
+            reason = str(error) if error else f"The fleet {self._fleet.name} was stopped."
+        elif error:
+            reason = str(error)
+        else:
+            off = dict(zip(self._robots, self._residual().tolist(), strict=True))
+            off = {robot: far for robot, far in off.items() if far > self._tolerance}
+            reason = said_of(self._failed, self._waiting, off, len(poses), verdict)
+        return reason, verdict.certified

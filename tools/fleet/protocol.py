@@ -86,8 +86,13 @@ class Fleet(Protocol):
         ...
 
     @property
-    def radius(self) -> float | None:
-        """Of a robot, px; None where the fleet does not say."""
+    def radius(self) -> float:
+        """Of a robot, px, above 0."""
+        ...
+
+    @property
+    def speed(self) -> float:
+        """The greatest of a robot, px per second of the fleet's clock."""
         ...
 
     @property

@@ -38,24 +38,30 @@ def routes_off(
     radius: float,
     *,
     idle: FloatArray = NOBODY,
+    ends: FloatArray | None = None,
 ) -> list[FloatArray]:
     """Shortest paths as of `routes`, that also keep off the site's other things.
+
+    Args:
+        ends: (k, 2) as of `routes`.
 
     Raises:
         NoRouteError: a goal is walled off by obstacles and robots that stay.
     """
     paths: dict[int, FloatArray] = {}
     frame = site.frame(radius)
+    near = np.concatenate([starts, goals]) if ends is None else ends
 
     def route(robots: Indices, things: Sequence[Other], share: float) -> Indices:
         """Find paths past things; return the robots that none leads past them."""
-        ends = np.concatenate([starts[robots], goals[robots]])
-        grown = [_with_room(t, share * (room_of(site) + t.blur), ends, radius) for t in things]
+        grown = [_with_room(t, share * (room_of(site) + t.blur), near, radius) for t in things]
         left = np.array(grown, dtype=object)
         around, walled = solid, robots[:0]
         while len(robots):
             try:
-                ways = routes(starts[robots], goals[robots], around, radius, frame, idle=idle)
+                ways = routes(
+                    starts[robots], goals[robots], around, radius, frame, idle=idle, ends=near
+                )
             except NoRouteError as error:
                 if around is solid:
                     raise

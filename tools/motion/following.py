@@ -7,6 +7,8 @@ from .motion import Indices, Motion, arc_lengths
 
 EXACT = 1e-6
 """A robot has come to a point of its path within so many px."""
+NEAR = 0.05
+"""A robot that is seen so near to a vertex of its path has come to it, px."""
 
 
 class Following:
@@ -17,25 +19,43 @@ class Following:
     Attributes:
         ids: of the robots.
         lengths: (n,) px of their paths.
+        turns: by how much the paths bend at their vertices, one path after the other, radians;
+            pi at their ends.
+        legs_before: px from the vertex before to each of them.
     """
 
     def __init__(self, motion: Motion) -> None:
         self.ids = tuple(motion.paths)
         lengths = [arc_lengths(path) for path in motion.paths.values()]
         self.lengths = np.array([s[-1] for s in lengths])
-        sizes = np.array([len(s) for s in lengths], dtype=np.intp)
+        kept = [_apart(s) for s in lengths]
+        sizes = np.array([len(rows) for rows in kept], dtype=np.intp)
         self._ends = np.cumsum(sizes)
         self._begins = self._ends - sizes
         # One table for all: what comes before a robot is shorter, what comes after it longer.
         self._base = np.concatenate([[0.0], np.cumsum(self.lengths + 1.0)[:-1]])
         self._along = np.concatenate(
-            [s + base for s, base in zip(lengths, self._base, strict=True)]
+            [s[k] + base for s, k, base in zip(lengths, kept, self._base, strict=True)]
         )
-        self._points = np.concatenate(list(motion.paths.values()))
+        paths = zip(motion.paths.values(), kept, strict=True)
+        self._points = np.concatenate([np.asarray(path, dtype=float)[k] for path, k in paths])
+        self._directions, self.legs_before, self.turns = self._shape()
         self._passages = motion.passages
         robots = np.arange(len(self.ids))
         self._next = np.searchsorted(motion.passages.waiting, robots, side="left")
         self._last = np.searchsorted(motion.passages.waiting, robots, side="right")
+
+    def _shape(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Unit vectors of the legs from vertices on, lengths of those before, and turns."""
+        legs = np.diff(self._points, axis=0, append=self._points[-1:])
+        size = np.linalg.norm(legs, axis=1)
+        size[self._ends - 1] = 0.0
+        along = np.divide(legs, size[:, None], out=np.zeros_like(legs), where=size[:, None] > 0)
+        cosine = np.einsum("ij,ij->i", along, np.roll(along, 1, axis=0))
+        turns = np.arccos(np.clip(cosine, -1.0, 1.0))
+        turns[self._ends - 1] = np.pi  # robots stand at the end
+        turns[self._begins] = 0.0
+        return along, np.roll(size, 1), turns
 
     def at(self, progress: FloatArray) -> FloatArray:
         """Points of the paths, (n, 2) px."""
@@ -55,34 +75,51 @@ class Following:
         limits[held] = rows.at[self._next[held]]
         return limits
 
-    def waits_for(self, progress: FloatArray) -> dict[str, str]:
-        """Robots that stand before a passage, by id, and the robot that each waits for."""
+    def waits_for(self, progress: FloatArray, slack: float = EXACT) -> dict[str, str]:
+        """Robots within `slack` px of a closed passage, by id, and whom each waits for."""
         held = np.flatnonzero(self._next < self._last)
         rows = self._next[held]
-        there = progress[held] >= self._passages.at[rows] - EXACT
+        there = progress[held] >= self._passages.at[rows] - slack
         pairs = zip(held[there], self._passages.first[rows[there]], strict=True)
         return {self.ids[i]: self.ids[j] for i, j in pairs}
 
-    def bends(self, progress: FloatArray) -> FloatArray:
-        """How far along its path each robot's next vertex is, (n,) px; the end of it at last."""
-        return self._along[self._after(progress)] - self._base
+    def stops(self, rooms: FloatArray) -> FloatArray:
+        """How far a robot may go at most, by the vertex it comes to next; for `room`.
 
-    def directions(self, progress: FloatArray) -> FloatArray:
-        """Unit vectors along the paths to the next vertex, (n, 2); zero at the end."""
-        ahead = self._points[self._after(progress)] - self.at(progress)
-        size = np.linalg.norm(ahead, axis=1, keepdims=True)
-        return np.divide(ahead, size, out=np.zeros_like(ahead), where=size > EXACT)
+        Args:
+            rooms: how far past each vertex a robot may come to a stand that passes it as fast as
+                it may, px, in the order of `turns`.
+        """
+        return np.minimum.accumulate((self._along + rooms)[::-1])[::-1]
 
-    def nearest(self, points: FloatArray, progress: FloatArray, reach: float) -> FloatArray:
+    def room(self, progress: FloatArray, stops: FloatArray) -> FloatArray:
+        """How far on each robot has to be able to stand, for the bends before it, (n,) px."""
+        return stops[self._after(progress)] - self._base - progress
+
+    def legs(self, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Unit vectors along the legs that robots are on, (n, 2), and the legs' ends, (n, 2) px."""
+        after = self._after(progress)
+        along = self._directions[after - 1].copy()
+        along[progress >= self.lengths - EXACT] = 0.0
+        return along, self._points[after]
+
+    def advance(self, points: FloatArray, progress: FloatArray) -> FloatArray:
         """How far along its path each robot seen at a point, (n, 2) px, is, (n,) px.
 
-        Looked for between its progress so far and `reach` px on, as a path may come back.
+        That is where the leg it is on comes nearest; a vertex within NEAR has been come to, and
+        the next leg is begun there. Nobody's progress goes back.
         """
-        tried = progress[:, None] + np.linspace(0.0, reach, 9)
-        tried = np.minimum(tried, self.lengths[:, None])
-        away = [np.linalg.norm(self.at(column) - points, axis=1) for column in tried.T]
-        best = np.argmin(np.stack(away, axis=1), axis=1)
-        return np.asarray(tried[np.arange(len(tried)), best])
+        progress, rows = progress.copy(), np.arange(len(progress))
+        while len(rows):
+            after = self._after(progress[rows], rows)
+            before, base = after - 1, self._base[rows]
+            begin, vertex = self._along[before] - base, self._along[after] - base
+            ahead = points[rows] - self._points[before]
+            way = begin + np.einsum("ij,ij->i", ahead, self._directions[before])
+            way = np.where(way >= vertex - NEAR, vertex, np.maximum(way, progress[rows]))
+            progress[rows] = way
+            rows = rows[(way >= vertex - EXACT) & (vertex < self.lengths[rows] - EXACT)]
+        return progress
 
     def _open(self, progress: FloatArray) -> Indices:
         """The first passage of each robot that is not open yet, (n,)."""
@@ -96,7 +133,14 @@ class Following:
             checked = checked[upcoming[checked] < self._last[checked]]
         return upcoming
 
-    def _after(self, progress: FloatArray) -> Indices:
+    def _after(self, progress: FloatArray, rows: Indices | slice = slice(None)) -> Indices:
         """The vertex that each robot comes to next, (n,)."""
-        found = np.searchsorted(self._along, self._base + progress, side="right")
-        return np.clip(found, self._begins + 1, self._ends - 1)
+        place = self._base[rows] + progress + EXACT / 2
+        found = np.searchsorted(self._along, place, side="right")
+        return np.clip(found, self._begins[rows] + 1, self._ends[rows] - 1)
+
+
+def _apart(lengths: FloatArray) -> Indices:
+    """Vertices that are not where the one before is, and the last: robots do not turn on them."""
+    moved = np.flatnonzero(np.diff(lengths) > EXACT) + 1
+    return np.array([0, *moved[:-1], len(lengths) - 1], dtype=np.intp)

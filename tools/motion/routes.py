@@ -6,7 +6,8 @@ Frame: image pixels. Robots do not yet avoid each other.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -17,13 +18,13 @@ from shapely.geometry.base import BaseGeometry
 from ..errors import FleetError
 from ..formation.contract import MIN_SPACING, Contract
 from ..formation.placement.place import Site
-from ..geometry.curves import Frame
+from ..geometry.curves import Frame, round_join_dip
 from ..geometry.outline import FloatArray, distances
 
-MAX_NODES, EACH_NODES = 60, 8
+MAX_NODES, EACH_NODES = 80, 12
 """Vertices kept of obstacles, and of each further part of them: enough for a path within a percent
 of the shortest."""
-BEND_SEGMENTS = 2
+BEND_SEGMENTS = 3
 """Segments of a quarter circle around an obstacle's corner."""
 ROOM_SHARES = (0.7, 0.3, 0.03)
 """How much of the smallest clearance at starts and goals paths keep: well away where there is
@@ -37,14 +38,16 @@ ROUND_DIP = math.cos(math.pi / 4 / ROUND_SEGMENTS)
 SPARE = 1.02
 """Share of a body that is left free where robots leave obstacles, so that all of it is kept off."""
 NOBODY = np.empty((0, 2))
+NOBODIES = np.empty(0, dtype=object)
 
 Bodies = NDArray[np.object_]
+Indices = NDArray[np.intp]
 
 
 class NoRouteError(FleetError):
     """Places that no path leads to: those of `robots`, indices of starts and goals."""
 
-    def __init__(self, text: str, robots: NDArray[np.intp]) -> None:
+    def __init__(self, text: str, robots: Indices) -> None:
         super().__init__(text)
         self.robots = robots
 
@@ -63,6 +66,7 @@ def routes(
     frame: Frame,
     *,
     idle: FloatArray = NOBODY,
+    ends: FloatArray | None = None,
 ) -> list[FloatArray]:
     """Shortest paths that keep robots of a radius off obstacles and idle robots, start i to goal i.
 
@@ -76,6 +80,7 @@ def routes(
         radius: of a robot, px.
         frame: the picture.
         idle: (m, 2) where robots stand that do not move.
+        ends: (k, 2) all that are asked for in turn, so that what is kept off obstacles is the same.
 
     Returns:
         n polylines, (k, 2) each.
@@ -83,14 +88,18 @@ def routes(
     Raises:
         NoRouteError: a goal is walled off.
     """
-    ground = _Ground(solid, radius, frame)
-    ends = np.concatenate([starts, goals])
-    wider = _bodies(idle, ends, SPARE * radius)
+    own = np.concatenate([starts, goals])
+    ends = own if ends is None else ends
+    ground = _Ground(solid, radius, frame, ends)
+    wider = _bodies(idle, own, SPARE * radius)
     exits, entries = ground.exits(starts, goals, wider), ground.exits(goals, goals, wider)
-    bodies = _bodies(idle, np.concatenate([ends, exits, entries]), radius)
+    bodies = _bodies(idle, np.concatenate([own, exits, entries]), radius)
+    ground = replace(ground, ends=np.concatenate([ends, exits, entries]))
     paths = ground.paths(exits, entries, bodies)
     leaving = np.flatnonzero((exits != starts).any(axis=1))
-    ways_out = _Ground(Polygon(), radius, frame).paths(starts[leaving], exits[leaving], bodies)
+    ways_out = _Ground(Polygon(), radius, frame, ends).paths(
+        starts[leaving], exits[leaving], bodies
+    )
     for i, way_out in zip(leaving, ways_out, strict=True):
         paths[i] = np.concatenate([way_out[:-1], paths[i]])
     for i in np.flatnonzero((entries != goals).any(axis=1)):
@@ -98,10 +107,33 @@ def routes(
     return paths
 
 
+def way_lengths(
+    starts: FloatArray, goals: FloatArray, solid: BaseGeometry, radius: float, frame: Frame
+) -> FloatArray:
+    """How long the ways around obstacles are from every start to every goal, px.
+
+    Args:
+        starts: (n, 2).
+        goals: (m, 2).
+
+    Returns:
+        (n, m); infinite where there is no way.
+    """
+    from scipy.spatial.distance import cdist
+
+    graph = _graph(solid.wkb, radius, None)
+    lengths = cdist(starts, goals)
+    lines = np.stack(np.broadcast_arrays(starts[:, None], goals[None]), axis=2)
+    bent = shapely.intersects(shapely.linestrings(lines), graph.barrier)
+    if bent.any():
+        lengths[bent] = graph.lengths(starts, goals)[bent]
+    return lengths
+
+
 def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
     """Discs, (m,), that the centres of others keep out of; smaller where a path ends near."""
     if not len(idle):
-        return np.empty(0, dtype=object)
+        return NOBODIES
     nearest = np.linalg.norm(idle[:, None] - ends, axis=2).min(axis=1)
     body = max(2 * radius, MIN_SPACING)
     reach = np.where(nearest > body / ROUND_DIP, body, np.minimum(body, 0.99 * nearest)) / ROUND_DIP
@@ -126,6 +158,7 @@ class _Ground:
     solid: BaseGeometry
     radius: float
     frame: Frame
+    ends: FloatArray
 
     def exits(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> FloatArray:
         """Starts, (n, 2), those on the obstacles moved off them as far as the goals are."""
@@ -171,42 +204,79 @@ class _Ground:
         """Shortest paths around the obstacles and around all of some bodies."""
         ways = np.stack([starts, goals], axis=1)
         paths = list(ways)
-        straight = np.asarray(shapely.linestrings(ways), dtype=object)
-        left = np.arange(len(paths))
-        keeps = self._keeps(np.concatenate([starts, goals]))
-        for keep, bounded in [*((keep, True) for keep in keeps), (keeps[-1], False)]:
-            barrier = self._barrier(keep, bodies)
-            left = left[shapely.intersects(straight[left], barrier)]
-            if not len(left):
-                return paths
-            nodes = _nodes(self.solid, keep, bodies, barrier)
-            if bounded:
-                nodes = nodes[shapely.intersects_xy(self.frame.box, nodes)]
-            graph = _Visibility(nodes, barrier)
-            bent = {int(i): graph.path(*ways[i]) for i in left}
-            for i, path in bent.items():
-                paths[i] = paths[i] if path is None else path
-            left = np.array([i for i, path in bent.items() if path is None], dtype=np.intp)
-        if len(left):
-            what = "the target and the robots that stay" if len(bodies) else "the target"
-            x, y = goals[left[0]]
-            raise NoRouteError(f"There is no way around {what} to place ({x:.0f}, {y:.0f}).", left)
+        for group, keeps in self._groups(starts, goals):
+            left = group
+            for keep, bounded in [*((keep, True) for keep in keeps), (keeps[-1], False)]:
+                frame = self.frame if bounded else None
+                if len(bodies):
+                    graph = _graph_past(self.solid, keep, bodies, frame)
+                else:
+                    graph = _graph(self.solid.wkb, keep, frame)
+                straight = shapely.linestrings(ways[left])
+                left = left[shapely.intersects(straight, graph.barrier)]
+                found = {int(i): graph.path(*ways[i]) for i in left}
+                for i, path in found.items():
+                    paths[i] = paths[i] if path is None else path
+                left = np.array([i for i, path in found.items() if path is None], dtype=np.intp)
+                if not len(left):
+                    break
+            if len(left):
+                raise self._no_route(left, goals, bodies)
         return paths
 
-    def _keeps(self, ends: FloatArray) -> list[float]:
-        """Distances to keep from the obstacles, px, the one that is tried first at the front."""
-        near = 0.0 if self.solid.is_empty else float(distances(self.solid, ends).min())
-        if near <= self.radius:
-            return [0.99 * near]
-        return [self.radius + share * (near - self.radius) for share in ROOM_SHARES]
+    def _groups(self, starts: FloatArray, goals: FloatArray) -> list[tuple[Indices, list[float]]]:
+        """Robots, and the distances they keep from the obstacles, px, the first to try in front.
 
-    def _barrier(self, keep: float, bodies: Bodies) -> BaseGeometry:
-        """What paths must not touch: the obstacles grown by nearly what is kept, and bodies."""
-        barrier = self.solid.buffer(keep * 0.999)
-        if len(bodies):
-            barrier = shapely.union_all([barrier, *bodies])
-        shapely.prepare(barrier)
-        return barrier
+        Those that start or end with their bodies on one keep less, and only they.
+        """
+        near = np.minimum(self._off(starts), self._off(goals))
+        clear, free = near > self.radius, self._off(self.ends)
+        least = float(free[free > self.radius].min(initial=self.far))
+        keeps = [self.radius + share * (least - self.radius) for share in ROOM_SHARES]
+        tight = np.flatnonzero(~clear)
+        groups = [
+            (np.flatnonzero(clear), keeps),
+            (tight, [0.99 * near[tight].min(initial=self.radius)]),
+        ]
+        return [group for group in groups if len(group[0])]
+
+    def _off(self, points: FloatArray) -> FloatArray:
+        """How far points, (n, 2), are from the obstacles, px; far where there are none."""
+        far = self.far
+        return np.full(len(points), far) if self.solid.is_empty else distances(self.solid, points)
+
+    @property
+    def far(self) -> float:
+        """Farther off than any end, px."""
+        return self.frame.width + self.frame.height
+
+    def _no_route(self, robots: Indices, goals: FloatArray, bodies: Bodies) -> NoRouteError:
+        what = "the target and the robots that stay" if len(bodies) else "the target"
+        x, y = goals[robots[0]]
+        return NoRouteError(f"There is no way around {what} to place ({x:.0f}, {y:.0f}).", robots)
+
+
+@lru_cache(maxsize=32)
+def _graph(solid: bytes, keep: float, frame: Frame | None) -> "_Visibility":
+    """Around obstacles alone, which are asked for again and again."""
+    return _graph_past(shapely.from_wkb(solid), keep, NOBODIES, frame)
+
+
+def _graph_past(
+    solid: BaseGeometry, keep: float, bodies: Bodies, frame: Frame | None
+) -> "_Visibility":
+    """What sees what around obstacles and bodies, within a frame if there is one.
+
+    Paths must not touch the obstacles grown by nearly what is kept, nor bodies.
+    """
+    barrier: BaseGeometry = solid.buffer(keep * 0.999)
+    if len(bodies):
+        barrier = shapely.union_all([barrier, *bodies])
+    shapely.prepare(barrier)
+    nodes = _nodes(solid, keep, bodies, barrier)
+    if frame is not None:
+        nodes = nodes[shapely.intersects_xy(frame.box, nodes)]
+    return _Visibility(nodes, barrier)
 
 
 def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
@@ -217,8 +287,8 @@ def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
 
 def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeometry) -> FloatArray:
     """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
-    dip = math.cos(math.pi / (4 * BEND_SEGMENTS))
-    grown = solid.buffer((1.01 * keep + 0.05) / dip, quad_segs=BEND_SEGMENTS)
+    dip = round_join_dip(BEND_SEGMENTS)
+    grown = solid.buffer((1.01 * keep + 0.05) * dip, quad_segs=BEND_SEGMENTS)
     tolerance, most = 0.0, MAX_NODES + EACH_NODES * (shapely.get_num_geometries(grown) - 1)
     while True:
         coarse = grown.simplify(tolerance).buffer(1.05 * tolerance, join_style="mitre")
@@ -227,7 +297,7 @@ def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeomet
             break
         tolerance = max(1.5 * tolerance, 0.25)
     x0, _, x1, _ = shapely.bounds(bodies).reshape(-1, 4).T
-    reach = (1.01 * (x1 - x0) / 2 + 0.05) / dip
+    reach = (1.01 * (x1 - x0) / 2 + 0.05) * dip
     corners = shapely.buffer(shapely.centroid(bodies), reach, quad_segs=BEND_SEGMENTS)
     bends = shapely.get_coordinates(corners)
     free = bends[~shapely.intersects_xy(barrier, bends)]
@@ -240,7 +310,7 @@ class _Visibility:
     def __init__(self, nodes: FloatArray, barrier: BaseGeometry) -> None:
         from scipy.sparse.csgraph import shortest_path
 
-        self._nodes, self._barrier = nodes, barrier
+        self.barrier, self._nodes = barrier, nodes
         if not len(nodes):
             return
         lengths = np.stack([self._sight(node) for node in nodes])
@@ -259,9 +329,17 @@ class _Visibility:
             chain.append(int(self._before[first, chain[-1]]))
         return np.concatenate([[start], self._nodes[chain[::-1]], [goal]])
 
+    def lengths(self, starts: FloatArray, goals: FloatArray) -> FloatArray:
+        """Of the shortest paths from every start to every goal, (n, m) px."""
+        if not len(self._nodes):
+            return np.full((len(starts), len(goals)), np.inf)
+        to_goals = np.stack([self._sight(goal) for goal in goals], axis=1)
+        onward = np.min(self._length[:, :, None] + to_goals[None], axis=1)
+        return np.stack([np.min(self._sight(s)[:, None] + onward, axis=0) for s in starts])
+
     def _sight(self, point: FloatArray) -> FloatArray:
         """Distance to every node that is seen from a point, infinite to the others."""
         ends = np.broadcast_to(point, self._nodes.shape)
         lines = shapely.linestrings(np.stack([ends, self._nodes], axis=1))
         distance = np.linalg.norm(self._nodes - point, axis=1)
-        return np.where(shapely.intersects(lines, self._barrier), np.inf, distance)
+        return np.where(shapely.intersects(lines, self.barrier), np.inf, distance)

@@ -23,7 +23,7 @@ PERIOD_S, SPEED = 0.005, 800.0
 class Carts:
     """Robots that go on driving by themselves until they are held."""
 
-    name, real, radius, turns = "example", True, 5.0, False
+    name, real, radius, speed, turns = "example", True, 5.0, SPEED, False
 
     def __init__(self, width: float) -> None:
         self.stopped = False

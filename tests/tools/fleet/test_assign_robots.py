@@ -4,7 +4,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from formup.tools.fleet.deploy import assign_robots
+from formup.tools.fleet.assigning import assign_robots
 from formup.tools.fleet.protocol import FleetSizeError, Pose, points_of
 from formup.tools.geometry.outline import FloatArray
 from hypothesis import given

@@ -22,7 +22,8 @@ Poses = tuple[Pose, ...]
 USE = """
 import asyncio
 from formup.tools.fleet.conformance import check_fleet
-from formup.tools.fleet.deploy import assign_robots, deploy
+from formup.tools.fleet.assigning import assign_robots
+from formup.tools.fleet.deploy import deploy
 from formup.tools.fleet.protocol import FleetRequest
 from formup.tools.fleet.registry import FLEETS
 from formup.tools.formation.contract import Contract, Group

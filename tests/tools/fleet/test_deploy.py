@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 import shapely
 from formup.tools.errors import FleetError, ToolError
-from formup.tools.fleet.deploy import (
-    TRACK_FRAMES,
-    Deployment,
-    assign_robots,
-    deploy,
-)
+from formup.tools.fleet.arrival import Deployment
+from formup.tools.fleet.assigning import assign_robots
+from formup.tools.fleet.deploy import TRACK_FRAMES, deploy
 from formup.tools.fleet.protocol import (
     Fleet,
     FleetBusyError,
@@ -135,18 +132,13 @@ def test_the_track_shows_the_way_from_the_start_to_the_last_observation() -> Non
 
 def test_what_happens_is_fixed_by_the_seed_and_only_by_it() -> None:
     plan = planned(GROUPS[0])
-    (first, frames), (second, again), (third, _) = (
+    (first, frames), (second, again), (third, other) = (
         driven(plan, opened(plan, s)) for s in (5, 5, 6)
     )
     assert first.arrival == second.arrival
     assert frames == again
-    assert third.arrival.residual_px != first.arrival.residual_px
+    assert other != frames
     assert third.arrival.arrived
-
-
-def test_robots_that_slip_are_sent_again() -> None:
-    plan = planned(GROUPS[0])
-    assert driven(plan, opened(plan))[0].arrival.corrections >= 1
 
 
 def test_a_plan_that_is_not_certified_moves_nobody() -> None:

@@ -6,7 +6,9 @@ from collections.abc import AsyncGenerator
 
 import pytest
 from formup.tools.errors import ToolError
-from formup.tools.fleet.deploy import ARRIVED_DEG, Deployment, assign_robots, deploy
+from formup.tools.fleet.arrival import Deployment
+from formup.tools.fleet.assigning import assign_robots
+from formup.tools.fleet.deploy import ARRIVED_DEG, deploy
 from formup.tools.fleet.protocol import FleetRequest, Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet, open_fleet
 from formup.tools.formation.contract import Contract, Group

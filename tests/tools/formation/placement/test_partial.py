@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from formup.tools.errors import ToolError
-from formup.tools.fleet.deploy import Arrival
+from formup.tools.fleet.arrival import Arrival
 from formup.tools.formation.checking.check import certify
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.placement.caging import CUT_SHORT, CageError

@@ -1,0 +1,355 @@
+"""Steps robots through simulated time: what they are told, what they do, where they are seen.
+
+Nothing here waits: whoever steps it keeps the clock. Robots are driven on what is sensed alone.
+Frame: image pixels. Everything random comes from one seed.
+"""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.outline import FloatArray
+from ..motion.following import EXACT, NEAR, Following, Indices
+from ..motion.motion import Motion
+from .physics import Physics, Spell
+
+PERIOD = 0.05
+"""Seconds of simulated time a step takes."""
+KEPT = 0.1
+"""How far from its path a robot may be taken by a bend that it does not stop at, px."""
+SETTLED = 0.25
+"""A robot has come to its end within so many px, beside the noise."""
+CALM = 0.3
+"""Seconds over which robots make up for being off their path where sensing is noisy."""
+LOOK_AHEAD = 4
+"""Steps ahead on its path that a robot with wheels steers for."""
+ASKEW = 0.3
+"""A robot with wheels that looks so many radians past its way turns before it drives on."""
+LOOKING = 0.01
+"""A robot looks where it is to within so many radians."""
+SPREAD = 5.0
+"""Standard deviations that noise is taken to stay within."""
+
+Mask = NDArray[np.bool_]
+
+
+def tracking_error(physics: Physics) -> float:
+    """How far from its path a robot may come that nothing pushes, px."""
+    noise, smoothing = physics.noise, _smoothing(physics)
+    drift = noise.actuation * physics.speed * math.sqrt(PERIOD * smoothing)
+    if physics.drive == "differential":
+        drift *= 1 + physics.speed * smoothing / physics.radius / 4
+    late = (noise.actuation + physics.slip) * physics.speed * physics.delay
+    return KEPT + NEAR + SPREAD * (noise.sensing + drift) + late
+
+
+def _smoothing(physics: Physics) -> float:
+    """Seconds over which robots make up for being off their path."""
+    return PERIOD + 2 * physics.delay + (CALM if physics.noise.sensing else 0.0)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Robots of a drive as their controllers see them; rows are theirs.
+
+    Attributes:
+        points, headings: where they will be when what they are told now takes effect.
+        rates: what they were told last.
+        room: px that they may still go along their paths.
+        along: unit vectors of their legs, zero at the end.
+        off: (n, 2) from where they should be to where they are, px.
+        aims: points of their paths that they steer for.
+        looks: how they are to look at the end; nan for any way.
+    """
+
+    points: FloatArray
+    headings: FloatArray
+    rates: FloatArray
+    room: FloatArray
+    along: FloatArray
+    off: FloatArray
+    aims: FloatArray
+    looks: FloatArray
+
+
+class Simulator:
+    """Robots on a plane, from step to step.
+
+    Args:
+        ids: of the robots.
+        points: (n, 2) where they stand, px.
+        headings: (n,) radians; nan where they have none.
+        now: the time, seconds.
+
+    Attributes:
+        points, headings: as they truly are.
+        velocities: (n, 2) px per second, without what slips.
+        sensed: (n, 2) where they were seen last.
+        seen: (n,) when that was.
+    """
+
+    def __init__(
+        self,
+        ids: Sequence[str],
+        points: FloatArray,
+        headings: FloatArray,
+        physics: Physics,
+        *,
+        seed: int = 0,
+        now: float = 0.0,
+    ) -> None:
+        self.ids, self.physics, self.now = tuple(ids), physics, now
+        self.points, self.headings = points.copy(), headings.copy()
+        self._wheels = physics.drive == "differential"
+        if self._wheels:
+            self.headings = np.nan_to_num(self.headings)
+        self._begun = now
+        self._random = np.random.default_rng(seed)
+        n = len(self.ids)
+        self.velocities, self._rates = np.zeros((n, 2)), np.zeros((n, 2))
+        self._grip = 1 - physics.slip * self._random.random(n)
+        self._smoothing = _smoothing(physics)
+        # Along the way and across it, or on and about: together within the limit.
+        self._push = physics.acceleration * (0.5 if self._wheels else math.sqrt(0.5))
+        row = {robot: i for i, robot in enumerate(self.ids)}
+        self._stuck, self._lost = (
+            [(row[s.robot], s) for s in spells] for spells in (physics.stuck, physics.lost)
+        )
+        self._pushes = [(row[p.robot], p) for p in physics.pushes]
+        self.sensed, self.seen = points.copy(), np.full(n, now)
+        self._sense(np.zeros(n, dtype=bool))
+        self._rows: Indices = np.empty(0, dtype=np.intp)
+        self._following: Following | None = None
+
+    def begin(self, motion: Motion) -> None:
+        """Take up a motion of some of the robots; the others stay."""
+        row = {robot: i for i, robot in enumerate(self.ids)}
+        self._rows = np.array([row[robot] for robot in motion.paths], dtype=np.intp)
+        self._following = Following(motion)
+        n = len(self._rows)
+        self._progress, self._ahead = np.zeros(n), np.zeros(n)
+        self._stops = self._following.stops(self._rooms(self._following))
+        looks = [motion.headings.get(robot, math.nan) for robot in motion.paths]
+        self._looks = np.array(looks)
+        self._told = np.zeros((n, 2))
+        self._queue = deque([self._told] * round(self.physics.delay / PERIOD))
+        self._there = np.zeros(n, dtype=bool)
+
+    def hold(self) -> None:
+        """Stand, at once."""
+        self._following = None
+        self.velocities[:], self._rates[:] = 0.0, 0.0
+
+    @property
+    def arrived(self) -> bool:
+        """Whether all robots that drive were seen at their ends."""
+        return bool(self._there.all())
+
+    def step(self) -> None:
+        """Let a step of time pass."""
+        self.now += PERIOD
+        if self._following is not None:
+            rows, seen = self._rows, self._seen(self._following)
+            self._mark(seen)
+            told = self._steered(seen) if self._wheels else self._pulled(seen)
+            unseen = self.seen[rows] < self.now - 1.5 * PERIOD
+            told[unseen] = self._changed(self._told[unseen], np.zeros((unseen.sum(), 2)))
+            self._told = told
+            self._queue.append(told)
+            self._move(rows, self._queue.popleft())
+        for i, push in self._pushes:
+            if self.now - PERIOD < self._begun + push.at <= self.now:
+                self.points[i] += push.by
+        self._sense(self._random.random(len(self.ids)) < self.physics.drop_outs)
+
+    def _rooms(self, following: Following) -> FloatArray:
+        """Px in which robots that pass a vertex as fast as they may can stop.
+
+        They stop at it unless what they cut off, or are carried past it, in a step is within KEPT.
+        """
+        change = min(KEPT / PERIOD, self._push * PERIOD)
+        legs = np.minimum(following.legs_before, np.roll(following.legs_before, -1))
+        turned = np.maximum(2 * np.sin(following.turns / 2), 1e-9)
+        fast = np.minimum(change / turned, np.sqrt(change / PERIOD * legs / turned))
+        fast = np.minimum(fast, self.physics.speed)
+        fast[fast < self._push * PERIOD] = 0.0
+        return np.maximum(fast**2 / (2 * self._push) - fast * PERIOD / 2, 0.0)
+
+    def _seen(self, following: Following) -> _Seen:
+        rows = self._rows
+        points, headings, rates = self.sensed[rows], self.headings[rows], self._told
+        fresh = self.seen[rows] >= self.now - 1.5 * PERIOD
+        progress = following.advance(points, self._progress)
+        self._progress = np.where(fresh, progress, self._progress)
+        if self._queue:
+            for told in self._queue:
+                points, headings = self._carried(points, headings, told)
+            ahead = following.advance(points, np.maximum(self._ahead, self._progress))
+            self._ahead = np.where(fresh, ahead, self._ahead)
+        else:
+            self._ahead = self._progress
+        ahead = self._ahead
+        along, ends = following.legs(ahead)
+        off = points - following.at(ahead)
+        room = np.minimum(
+            following.limits(self._progress) - ahead, following.room(ahead, self._stops)
+        )
+        room = np.maximum(room - np.einsum("ij,ij->i", off, along), 0.0)
+        reach = _norms(rates) if not self._wheels else rates[:, 0]
+        reach = np.maximum(LOOK_AHEAD * PERIOD * reach, 2 * self.physics.radius)
+        left = np.einsum("ij,ij->i", ends - following.at(ahead), along)
+        aims = following.at(ahead) + along * np.minimum(reach, left)[:, None]
+        return _Seen(points, headings, rates, room, along, off, aims, self._looks)
+
+    def _mark(self, seen: _Seen) -> None:
+        """Note who is at the end; noise does not take robots from it, a push does."""
+        assert self._following is not None
+        noise, off = self.physics.noise.sensing, _norms(seen.off)
+        ended = self._progress >= self._following.lengths - EXACT
+        turned = np.isnan(seen.looks) | (abs(_wrapped(seen.looks - seen.headings)) <= LOOKING)
+        slow = _norms(seen.rates) <= self._push * PERIOD
+        self._there &= off <= SETTLED + 2 * SPREAD * noise
+        self._there |= ended & turned & slow & (off <= SETTLED + 3 * noise)
+
+    def _pulled(self, seen: _Seen) -> FloatArray:
+        """Velocities that points are told: along the way, and across it back onto it."""
+        most, change = self.physics.speed, self._push * PERIOD
+        before = np.einsum("ij,ij->i", seen.rates, seen.along)
+        across = seen.rates - before[:, None] * seen.along
+        size = _norms(seen.off)
+        back = np.minimum(_braking(size, self._push, self._smoothing), most / 2)
+        wanted = -seen.off * _ratio(back, size)[:, None]
+        wanted -= np.einsum("ij,ij->i", wanted, seen.along)[:, None] * seen.along
+        across = self._changed(across, wanted)
+        fast = np.minimum(_braking(seen.room, self._push, self._smoothing), most)
+        fast = np.clip(fast, before - change, before + change)
+        told = fast[:, None] * seen.along + across
+        return told * np.minimum(_ratio(most, _norms(told)), 1.0)[:, None]
+
+    def _steered(self, seen: _Seen) -> FloatArray:
+        """Speeds on and about that robots with wheels are told, px and radians per second."""
+        radius, most, change = self.physics.radius, self.physics.speed, self._push * PERIOD
+        ended, size = _norms(seen.along) == 0.0, _norms(seen.off)
+        settled = ended & (size <= SETTLED + 3 * self.physics.noise.sensing)
+        aim = np.where(ended[:, None], -seen.off, seen.aims - seen.points)
+        turn = _wrapped(np.arctan2(aim[:, 1], aim[:, 0]) - seen.headings)
+        turn = np.where(settled, np.nan_to_num(_wrapped(seen.looks - seen.headings)), turn)
+        turn[~settled & (_norms(aim) < NEAR / 4)] = 0.0
+        about = _braking(abs(turn) * radius, self._push, self._smoothing) * np.sign(turn)
+        about = np.clip(about, -most / 2, most / 2)
+        before = seen.rates[:, 1] * radius
+        about = np.clip(about, before - change, before + change)
+        room = np.where(ended, size, seen.room)
+        room[settled] = 0.0
+        fast = np.minimum(_braking(room, self._push, self._smoothing), most - abs(about))
+        fast *= np.clip(1 - abs(turn) / ASKEW, 0.0, 1.0)
+        fast = np.clip(fast, seen.rates[:, 0] - change, seen.rates[:, 0] + change)
+        return np.stack([fast, about / radius], axis=1)
+
+    def _changed(self, rates: FloatArray, wanted: FloatArray) -> FloatArray:
+        """Rates, (n, 2), as near to those wanted as a step can bring them."""
+        most, change = self._push * PERIOD, wanted - rates
+        if self._wheels:
+            scale = np.array([1.0, self.physics.radius])
+            return rates + np.clip(change * scale, -most, most) / scale
+        size = _norms(change)
+        return rates + change * np.minimum(_ratio(most, size), 1.0)[:, None]
+
+    def _move(self, rows: Indices, told: FloatArray) -> None:
+        """What robots do of what they are told."""
+        stuck = self._out_of_order(self._stuck)[rows]
+        if self._wheels:
+            rates = self._changed(self._rates[rows], told)
+        else:  # all of the acceleration: across and along have been kept apart
+            change = told - self._rates[rows]
+            most = self.physics.acceleration * PERIOD
+            share = np.minimum(_ratio(most, _norms(change)), 1.0)
+            rates = self._rates[rows] + change * share[:, None]
+        rates[stuck] = 0.0
+        self._rates[rows] = rates
+        done = self._noisy(rates) * self._grip[rows, None]
+        done[stuck] = 0.0
+        self.points[rows], self.headings[rows] = self._carried(
+            self.points[rows], self.headings[rows], done, ~stuck
+        )
+        self.velocities[rows] = rates
+        if self._wheels:
+            way = self.headings[rows]
+            self.velocities[rows] = rates[:, :1] * np.stack([np.cos(way), np.sin(way)], axis=1)
+
+    def _carried(
+        self, points: FloatArray, headings: FloatArray, rates: FloatArray, free: Mask | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Where a step at some rates takes robots, and how they look then."""
+        if self._wheels:
+            headings = headings + rates[:, 1] * PERIOD
+            way = np.stack([np.cos(headings), np.sin(headings)], axis=1)
+            return points + rates[:, :1] * PERIOD * way, headings
+        if free is not None:  # points turn by the way
+            wanted = ~np.isnan(self._looks) & free
+            begun = np.nan_to_num(headings[wanted])
+            most = self.physics.speed / self.physics.radius * PERIOD
+            headings = headings.copy()
+            turn = np.clip(_wrapped(self._looks[wanted] - begun), -most, most)
+            headings[wanted] = begun + turn
+        return points + rates * PERIOD, headings
+
+    def _noisy(self, rates: FloatArray) -> FloatArray:
+        """Rates as actuators make them of what they are told; none goes faster than it can."""
+        share, most = self.physics.noise.actuation, self.physics.speed
+        if not share:
+            return rates
+        noise = 1 + share * self._random.standard_normal(rates.shape)
+        if self._wheels:
+            radius = self.physics.radius
+            turned = radius * rates[:, 1]
+            wheels = np.stack([rates[:, 0] - turned, rates[:, 0] + turned], axis=1)
+            left, right = np.clip(wheels * noise, -most, most).T
+            return np.stack([(left + right) / 2, (right - left) / (2 * radius)], axis=1)
+        askew = noise[:, 1:] - 1
+        turned = np.stack([-rates[:, 1], rates[:, 0]], axis=1)
+        done = rates * noise[:, :1] + turned * askew
+        return done * np.minimum(_ratio(most, _norms(done)), 1.0)[:, None]
+
+    def _sense(self, dropped: Mask) -> None:
+        seen = np.flatnonzero(~(dropped | self._out_of_order(self._lost)))
+        noise = self.physics.noise.sensing
+        self.sensed[seen] = self.points[seen]
+        if noise:
+            self.sensed[seen] += noise * self._random.standard_normal((len(seen), 2))
+        self.seen[seen] = self.now
+
+    def _out_of_order(self, spells: Sequence[tuple[int, Spell]]) -> Mask:
+        """Robots that are in such a spell now, (n,)."""
+        out, since = np.zeros(len(self.ids), dtype=bool), self.now - self._begun
+        for i, spell in spells:
+            lasts = math.inf if spell.lasting is None else spell.lasting
+            out[i] |= spell.after <= since < spell.after + lasts
+        return out
+
+
+def _braking(room: FloatArray, deceleration: float, step: float) -> FloatArray:
+    """The greatest speed from which a robot stops within `room`, (n,) px, exactly, in steps."""
+    change = deceleration * step
+    unit = room / (change * step)
+    whole = np.floor((np.sqrt(1 + 8 * unit) - 1) / 2)
+    return np.asarray(change * (whole / 2 + unit / (whole + 1)))
+
+
+def _norms(vectors: FloatArray) -> FloatArray:
+    """Their lengths, (n,)."""
+    return np.hypot(vectors[:, 0], vectors[:, 1])
+
+
+def _ratio(a: FloatArray | float, b: FloatArray) -> FloatArray:
+    """a / b, and 1 where b is 0, (n,)."""
+    return np.divide(a, b, out=np.ones(len(b)), where=b > 0)
+
+
+def _wrapped(angle: FloatArray) -> FloatArray:
+    """Angles between -pi and pi, (n,)."""
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)

@@ -1,0 +1,290 @@
+"""Whether robots that follow a motion keep apart and off obstacles, from the motion alone.
+
+Shares nothing with the planner: closest approaches are exact, from the times of the motion; that
+the order of passage keeps robots apart when they are late is checked at points along the paths.
+"""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
+
+from ..formation.value import Value
+from ..geometry.outline import FloatArray
+from .motion import Indices, Motion, Passages, arc_lengths
+
+ROUNDING = 1e-6
+"""Distances may fall short of what is demanded by so much, px."""
+FINDINGS = 12
+"""Most findings of a kind."""
+SAMPLE_SHARE, MOST_SAMPLES = 0.25, 60_000
+"""Paths are looked at every so many of what is demanded, more coarsely where that is too many."""
+
+
+class MotionFinding(Value):
+    """What keeps a motion from being certified."""
+
+    kind: Literal["separation", "clearance", "passage"]
+    robots: tuple[str, ...]
+    value: float
+    limit: float
+    sentence: str
+
+
+class MotionVerdict(Value):
+    """The certificate of a motion.
+
+    Attributes:
+        separation_px: least distance of two robots' centres on the way; None for one robot.
+        demanded_px: what it may not fall below: two radii, or as near as they start or end.
+        clearance_px: least distance of a robot's centre to an obstacle, leaving and entering aside;
+            None where there is none.
+        makespan_s: until the last robot arrives if nothing delays any.
+        longest_px: the longest way.
+        waits: how often a robot has to let another one pass.
+    """
+
+    certified: bool
+    findings: tuple[MotionFinding, ...] = ()
+    separation_px: float | None = None
+    demanded_px: float = 0.0
+    clearance_px: float | None = None
+    makespan_s: float = 0.0
+    longest_px: float = 0.0
+    waits: int = 0
+
+
+def check_motion(
+    motion: Motion,
+    radius: float,
+    demanded: float,
+    obstacles: Mapping[str, BaseGeometry],
+    idle: Mapping[str, tuple[float, float]],
+) -> MotionVerdict:
+    """Certify a motion, or find every robot that comes too near.
+
+    Args:
+        radius: of a robot, px.
+        demanded: least distance of two robots' centres, px.
+        obstacles: what no robot may touch, by name.
+        idle: where robots stand that do not move, by id.
+    """
+    closest, near = _closest_approach(motion, idle, demanded)
+    clearance, touched = _clearances(motion, radius, obstacles)
+    unordered = _unordered(motion, demanded)
+    lengths = [float(arc_lengths(path)[-1]) for path in motion.paths.values()]
+    rows = motion.passages
+    waits = {*zip(rows.waiting.tolist(), rows.first.tolist(), strict=True)}
+    findings = (*near, *touched, *unordered)
+    return MotionVerdict(
+        certified=not findings,
+        findings=findings,
+        separation_px=None if closest is None else round(closest, 3),
+        demanded_px=round(demanded, 3),
+        clearance_px=None if clearance is None else round(clearance, 3),
+        makespan_s=round(motion.makespan, 3),
+        longest_px=round(max(lengths, default=0.0), 3),
+        waits=len(waits),
+    )
+
+
+class _Pieces:
+    """Parts of the way in which each robot drives straight on: (k,) arrays."""
+
+    def __init__(self, motion: Motion, idle: Mapping[str, tuple[float, float]]) -> None:
+        end = motion.makespan + 1.0
+        begins: list[FloatArray] = []
+        spans: list[FloatArray] = []
+        for robot, path in motion.paths.items():
+            times = motion.times[robot]
+            points = np.concatenate([path, path[-1:]])
+            when = np.append(times, end)
+            begins.append(np.concatenate([points[:-1], points[1:]], axis=1))
+            spans.append(np.stack([when[:-1], when[1:]], axis=1))
+        for place in idle.values():
+            begins.append(np.array([[*place, *place]], dtype=float))
+            spans.append(np.array([[0.0, end]]))
+        self.ids = (*motion.paths, *idle)
+        self.robot = np.repeat(np.arange(len(self.ids)), [len(s) for s in spans])
+        ways = np.concatenate(begins)
+        self.begin, self.end = ways[:, :2], ways[:, 2:]
+        self.span = np.concatenate(spans)
+
+    def approach(self, pairs: Indices) -> FloatArray:
+        """The least distance of two pieces at one time, (p,) px; infinite where they share none."""
+        one, other = pairs.T
+        lo = np.maximum(self.span[one, 0], self.span[other, 0])
+        hi = np.minimum(self.span[one, 1], self.span[other, 1])
+        apart, drift = self.at(one, lo) - self.at(other, lo), self._speed(one) - self._speed(other)
+        square = np.einsum("ij,ij->i", drift, drift)
+        towards = -np.einsum("ij,ij->i", apart, drift)
+        after = np.divide(towards, square, out=np.zeros_like(square), where=square > 0)
+        after = np.clip(after, 0.0, np.maximum(hi - lo, 0.0))
+        found = np.linalg.norm(apart + after[:, None] * drift, axis=1)
+        return np.where(hi >= lo, found, np.inf)
+
+    def at(self, piece: Indices, time: FloatArray) -> FloatArray:
+        """Where robots are in the course of a piece, (p, 2) px."""
+        return self.begin[piece] + (time - self.span[piece, 0])[:, None] * self._speed(piece)
+
+    def _speed(self, piece: Indices) -> FloatArray:
+        way = self.end[piece] - self.begin[piece]
+        takes = np.diff(self.span[piece], axis=1)
+        return np.divide(way, takes, out=np.zeros_like(way), where=takes > 0)
+
+
+def _closest_approach(
+    motion: Motion, idle: Mapping[str, tuple[float, float]], demanded: float
+) -> tuple[float | None, tuple[MotionFinding, ...]]:
+    """How near two robots come at most, px, and who comes too near."""
+    if len(motion.paths) + len(idle) < 2 or not motion.paths:
+        return None, ()
+    pieces = _Pieces(motion, idle)
+    ways = np.stack([pieces.begin, pieces.end], axis=1)
+    tree = shapely.STRtree(shapely.linestrings(ways))
+    reach = 2 * demanded
+    while True:
+        pairs = tree.query(tree.geometries, predicate="dwithin", distance=reach).T
+        pairs = pairs[pieces.robot[pairs[:, 0]] < pieces.robot[pairs[:, 1]]]
+        approach = pieces.approach(pairs)
+        closest = float(approach.min(initial=np.inf))
+        if closest <= reach or len(pairs) == len(ways) * (len(ways) - 1) // 2 or reach > 1e5:
+            break
+        reach *= 4
+    who = pieces.robot[pairs]
+    both_idle = (who >= len(motion.paths)).all(axis=1)
+    bad = np.flatnonzero((approach < demanded - ROUNDING) & ~both_idle)
+    worst: dict[tuple[int, int], float] = {}
+    for row in bad:
+        key = (int(who[row, 0]), int(who[row, 1]))
+        worst[key] = min(worst.get(key, np.inf), float(approach[row]))
+    ranked = sorted(worst.items(), key=lambda item: item[1])[:FINDINGS]
+    found = tuple(
+        MotionFinding(
+            kind="separation",
+            robots=(pieces.ids[i], pieces.ids[j]),
+            value=round(value, 3),
+            limit=round(demanded, 3),
+            sentence=f"Robots {pieces.ids[i]} and {pieces.ids[j]} would come within {value:.2f} px "
+            f"of each other on the way; {demanded:.2f} px are needed.",
+        )
+        for (i, j), value in ranked
+    )
+    return (closest if np.isfinite(closest) else None), found
+
+
+def _clearances(
+    motion: Motion, radius: float, obstacles: Mapping[str, BaseGeometry]
+) -> tuple[float | None, tuple[MotionFinding, ...]]:
+    """How near robots come to obstacles, px, and who touches one.
+
+    Who starts or ends nearer than its radius may be so near where it leaves or enters.
+    """
+    least, found = np.inf, list[MotionFinding]()
+    for name, region in obstacles.items():
+        if region.is_empty:
+            continue
+        body = region.buffer(radius - ROUNDING)
+        for robot, path in motion.paths.items():
+            rest = _between(path, region, radius)
+            near = float(region.distance(rest)) if rest is not None else np.inf
+            least = min(least, near)
+            if rest is None or near >= radius - 10 * ROUNDING or not rest.intersects(body):
+                continue
+            found.append(
+                MotionFinding(
+                    kind="clearance",
+                    robots=(robot,),
+                    value=round(near, 3),
+                    limit=round(radius, 3),
+                    sentence=f"Robot {robot} would come within {near:.2f} px of {name} on the way; "
+                    f"its radius is {radius:.2f} px.",
+                )
+            )
+    found.sort(key=lambda finding: finding.value)
+    return (None if np.isinf(least) else least), tuple(found[:FINDINGS])
+
+
+def _between(path: FloatArray, region: BaseGeometry, radius: float) -> BaseGeometry | None:
+    """A path without the leg on which it leaves a region and the one on which it enters it."""
+    legs = np.unique(path, axis=0)
+    if len(legs) < 2:
+        return None
+    ends = shapely.distance(region, shapely.points(path[[0, -1]]))
+    begin, end = 0, len(path) - 1
+    if ends[0] < radius:
+        begin = _first_bend(path)
+    if ends[1] < radius:
+        end = len(path) - 1 - _first_bend(path[::-1])
+    return LineString(path[begin : end + 1]) if end > begin else None
+
+
+def _first_bend(path: FloatArray) -> int:
+    """The vertex at which a path first turns; its last one where it does not."""
+    ways = np.diff(path, axis=0)
+    length = np.linalg.norm(ways, axis=1)
+    going = np.flatnonzero(length > ROUNDING)
+    if not len(going):
+        return len(path) - 1
+    unit = ways[going] / length[going, None]
+    turned = np.flatnonzero(np.abs(unit - unit[0]).max(axis=1) > 1e-6)
+    return int(going[turned[0]]) if len(turned) else len(path) - 1
+
+
+def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
+    """Pairs of robots that could touch if one of them were late."""
+    from scipy.spatial import cKDTree
+
+    lengths = [float(arc_lengths(path)[-1]) for path in motion.paths.values()]
+    step = max(SAMPLE_SHARE * demanded, sum(lengths) / MOST_SAMPLES)
+    along = [np.append(np.arange(0.0, length, step), length) for length in lengths]
+    points = [_points(p, s) for p, s in zip(motion.paths.values(), along, strict=True)]
+    robot = np.repeat(np.arange(len(along)), [len(s) for s in along])
+    tree = cKDTree(np.concatenate(points))
+    pairs = tree.query_pairs(demanded - ROUNDING, output_type="ndarray")
+    pairs = pairs[robot[pairs[:, 0]] != robot[pairs[:, 1]]]
+    s = np.concatenate(along)
+    one, other = pairs.T
+    kept = _held(motion.passages, robot[one], s[one], robot[other], s[other])
+    kept |= _held(motion.passages, robot[other], s[other], robot[one], s[one])
+    ids = list(motion.paths)
+    loose = np.unique(np.sort(robot[pairs[~kept]], axis=1), axis=0)[:FINDINGS]
+    return tuple(
+        MotionFinding(
+            kind="passage",
+            robots=(ids[i], ids[j]),
+            value=0.0,
+            limit=round(demanded, 3),
+            sentence=f"Robots {ids[i]} and {ids[j]} could touch if one of them were late: nothing "
+            "says which goes first.",
+        )
+        for i, j in loose
+    )
+
+
+def _held(
+    rows: Passages, waiting: Indices, at: FloatArray, first: Indices, past: FloatArray
+) -> FloatArray:
+    """Whether a robot is held before a point as long as another has not gone past one of its own.
+
+    The arguments are (p,) columns; so is what comes back, of truth values.
+    """
+    if not len(rows):
+        return np.zeros(len(waiting), dtype=bool)
+    count = 1 + max(int(column.max(initial=0)) for column in (rows.first, first))
+    pair = rows.waiting * count + rows.first
+    rank = np.lexsort((rows.at, pair))
+    pair, entry, exit_ = pair[rank], rows.at[rank], rows.past[rank]
+    span = float(max(rows.at.max(), at.max(initial=0.0))) + 1.0
+    key = pair * span + entry
+    wanted = waiting * count + first
+    row = np.searchsorted(key, wanted * span + at, side="right") - 1
+    return (row >= 0) & (pair[row] == wanted) & (exit_[row] > past)
+
+
+def _points(path: FloatArray, along: FloatArray) -> FloatArray:
+    s = arc_lengths(path)
+    return np.stack([np.interp(along, s, path[:, axis]) for axis in (0, 1)], axis=1)

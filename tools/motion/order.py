@@ -1,0 +1,211 @@
+"""Who has to go before whom: off its start before others pass it, past goals before they are taken.
+
+Where that goes in a circle, interchangeable robots are matched anew: those that leave first take
+the places that are filled first. After Turpin et al. (2014), for robots with bodies.
+"""
+
+import heapq
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ..geometry.outline import FloatArray
+from .motion import Indices, arc_lengths
+from .routes import NOBODY, NoRouteError
+
+ROUNDS, SWAPS = 12, 200
+"""Most times that robots in circles are matched anew, and most pairs that are exchanged."""
+
+Ways = Callable[[FloatArray, FloatArray, FloatArray], list[FloatArray]]
+"""Paths from starts, (n, 2), to goals, (n, 2), past parked robots, (m, 2); NoRouteError if none."""
+
+
+@dataclass(frozen=True)
+class Matched:
+    """Robots with their goals, and the order their paths demand.
+
+    Attributes:
+        robots: (n,) who goes to each goal, by its row among the starts.
+        paths: for each goal.
+        leaving: (k, 2) goals whose robots leave in this order, one having to pass the other's
+            start.
+        arriving: (k, 2) goals that are taken in this order.
+    """
+
+    robots: Indices
+    paths: list[FloatArray]
+    leaving: Indices
+    arriving: Indices
+
+    @property
+    def before(self) -> Indices:
+        """(k, 2) all pairs of which the first has to go before the second."""
+        return np.unique(np.concatenate([self.leaving, self.arriving]), axis=0)
+
+    @property
+    def circles(self) -> list[Indices]:
+        """Goals whose robots have each to go before the others, in groups."""
+        return circles(self.before, len(self.paths))
+
+
+def match(robots: Indices, paths: list[FloatArray], apart: float) -> Matched:
+    """Robots on paths with the order these demand of bodies that keep `apart` px."""
+    lines = shapely.STRtree([shapely.LineString(path) for path in paths])
+    starts = shapely.points(np.stack([path[0] for path in paths]))
+    goals = shapely.points(np.stack([path[-1] for path in paths]))
+    leaving = lines.query(starts, predicate="dwithin", distance=apart).T
+    arriving = lines.query(goals, predicate="dwithin", distance=apart).T[:, ::-1]
+    pairs = (found[found[:, 0] != found[:, 1]] for found in (leaving, arriving))
+    return Matched(robots, paths, *pairs)
+
+
+def circles(before: Indices, count: int) -> list[Indices]:
+    """The strongly connected components of more than one of `count` nodes."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(before)), before.T), shape=(count, count))
+    label = connected_components(graph, connection="strong")[1]
+    return [np.flatnonzero(label == k) for k in np.flatnonzero(np.bincount(label) > 1)]
+
+
+def ordered(before: Indices, lengths: Sequence[float]) -> list[int]:
+    """All robots, each after those that have to go before it; of those free the farthest first."""
+    waits = Counter(before[:, 1].tolist())
+    after: defaultdict[int, list[int]] = defaultdict(list)
+    for one, other in before.tolist():
+        after[one].append(other)
+    free = [(-length, robot) for robot, length in enumerate(lengths) if not waits[robot]]
+    heapq.heapify(free)
+    order: list[int] = []
+    while free:
+        robot = heapq.heappop(free)[1]
+        order.append(robot)
+        for other in after[robot]:
+            waits[other] -= 1
+            if not waits[other]:
+                heapq.heappush(free, (-lengths[other], other))
+    return order
+
+
+def matched_anew(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
+    """Interchangeable robots with other goals, where that leaves fewer circles or none.
+
+    Args:
+        starts: (n, 2) of all robots.
+    """
+    for _ in range(ROUNDS):
+        better = found
+        for circle in found.circles:
+            goals = _by_order(better, circle)
+            better = _best(better, _exchanged(better, *goals, starts, ways, apart))
+        if better is found:
+            break
+        found = better
+    return _swapped(found, starts, ways, apart)
+
+
+def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
+    """Robots in circles on ways around the starts and goals of the others, where it helps."""
+    for _ in range(ROUNDS):
+        better = found
+        for circle in found.circles:
+            for i in circle:
+                for others in (range(len(found.paths)), circle):
+                    ends = [found.paths[j][[0, -1]] for j in others if j != i]
+                    other = _past(better, int(i), np.concatenate(ends), ways, apart)
+                    if other is not None:
+                        break
+                better = _best(better, other)
+        if better is found or not better.circles:
+            return better
+        found = better
+    return found
+
+
+def _best(found: Matched, other: Matched | None) -> Matched:
+    """That which leaves fewer demands in circles."""
+    return found if other is None or _worth(other) >= _worth(found) else other
+
+
+def _worth(found: Matched) -> int:
+    """How many demands lie in circles."""
+    number = np.full(len(found.paths), -1)
+    for k, circle in enumerate(found.circles):
+        number[circle] = k
+    one, other = number[found.before].T
+    return int(((one == other) & (one >= 0)).sum())
+
+
+def _by_order(found: Matched, circle: Indices) -> tuple[list[int], list[int]]:
+    """Goals of a circle as they are filled, and those whose robots, as they leave, take them."""
+    length = {int(i): float(arc_lengths(found.paths[i])[-1]) for i in circle}
+    leaving = _sorted(found.leaving.tolist(), length)
+    filled = _sorted(found.arriving.tolist(), {i: -way for i, way in length.items()})
+    return filled, leaving
+
+
+def _sorted(before: Iterable[list[int]], value: dict[int, float]) -> list[int]:
+    """Nodes in an order that breaks as few demands as it can; the least value first of the free."""
+    demands = [(one, other) for one, other in before if one in value and other in value]
+    left, order = set(value), list[int]()
+    while left:
+        waits = Counter(other for one, other in demands if one in left and other in left)
+        order.append(min(left, key=lambda node: (waits[node], value[node])))
+        left.remove(order[-1])
+    return order
+
+
+def _exchanged(
+    found: Matched,
+    goals: Sequence[int],
+    taken: Sequence[int],
+    starts: FloatArray,
+    ways: Ways,
+    apart: float,
+) -> Matched | None:
+    """As it is but for some goals, to which those go who went to others; None if none can."""
+    robots, paths = found.robots.copy(), list(found.paths)
+    robots[list(goals)] = found.robots[list(taken)]
+    ends = np.stack([found.paths[i][-1] for i in goals])
+    try:
+        onto = ways(starts[robots[list(goals)]], ends, NOBODY)
+    except NoRouteError:
+        return None
+    for i, path in zip(goals, onto, strict=True):
+        paths[i] = path
+    return match(robots, paths, apart)
+
+
+def _past(
+    found: Matched, robot: int, parked: FloatArray, ways: Ways, apart: float
+) -> Matched | None:
+    """As it is but for one robot, whose way keeps off parked ones; None if none does."""
+    begin, end = found.paths[robot][[0, -1]]
+    try:
+        (path,) = ways(begin[None], end[None], parked)
+    except NoRouteError:
+        return None
+    paths = [path if i == robot else old for i, old in enumerate(found.paths)]
+    return match(found.robots, paths, apart)
+
+
+def _swapped(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
+    """Exchange goals of pairs in circles while that leaves fewer demands in circles."""
+    tried: set[tuple[int, ...]] = set()
+    while len(tried) < SWAPS:
+        inside = {int(i): k for k, circle in enumerate(found.circles) for i in circle}
+        pairs = (
+            tuple(sorted(pair))
+            for pair in found.before.tolist()
+            if pair[0] in inside and inside[pair[0]] == inside.get(pair[1])
+        )
+        pair = next((p for p in pairs if p not in tried), None)
+        if pair is None:
+            break
+        tried.add(pair)
+        found = _best(found, _exchanged(found, pair, pair[::-1], starts, ways, apart))
+    return found

@@ -1,0 +1,183 @@
+"""Plans how robots get from where they are to where they shall stand without touching.
+
+Shortest ways, an order in which they can be driven, and the times that this order allows.
+Frame: image pixels.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+from ..errors import FleetError
+from ..formation.site import Site
+from ..geometry.outline import FloatArray
+from .avoiding import routes_off
+from .cells import Cells, conflicts, cut
+from .motion import Indices, Motion
+from .order import Matched, match, matched_anew, ordered, rerouted
+from .routes import NOBODY, way_lengths
+from .schedule import Near, NoTimeError, Schedule, passages, schedule
+
+EXACT = 1 - 1e-9
+"""Distances are kept but for so much, which rounding takes."""
+CROWD, COARSEST = 100, 1.8
+"""From so many robots on paths are cut less finely, up to cells of so many radii."""
+ALONG = 1e-9
+"""Times and places that differ by less are the same."""
+
+
+class NoOrderError(FleetError):
+    """Robots that would have to go before each other, so that none of them can go first.
+
+    Attributes:
+        ids: of the robots.
+    """
+
+    def __init__(self, ids: Sequence[str]) -> None:
+        named = ", ".join(ids[:12]) + (", ..." if len(ids) > 12 else "")
+        super().__init__(
+            f"Robots {named} stand in each other's way: none of them can go first if each is to "
+            "have exactly its own place. Let them share the places among themselves, or move one "
+            "of them away first."
+        )
+        self.ids = tuple(ids)
+
+
+@dataclass(frozen=True)
+class Team:
+    """What moves: robots of one kind.
+
+    Attributes:
+        ids: of the robots, in the order of `starts`.
+        starts: (n, 2) where they stand, px.
+        radius: of their bodies and how far they may be off their paths, px.
+        speed: greatest, px/s.
+        idle: (m, 2) where robots stand that do not move, px.
+    """
+
+    ids: tuple[str, ...]
+    starts: FloatArray
+    radius: float
+    speed: float
+    idle: FloatArray = field(default_factory=lambda: NOBODY)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where they move: obstacles, which no robot touches, and a site with things they avoid."""
+
+    solid: BaseGeometry
+    site: Site
+
+
+def plan_motion(
+    team: Team, goals: FloatArray, ground: Ground, *, interchangeable: bool
+) -> tuple[Motion, tuple[str, ...]]:
+    """Paths, times and an order of passage onto all goals.
+
+    Args:
+        goals: (n, 2) px, that of each robot in the team's order.
+        interchangeable: whether robots may take each other's goals.
+
+    Returns:
+        the motion, and who takes each goal.
+
+    Raises:
+        NoRouteError: no path leads to a goal.
+        NoOrderError: robots stand in each other's way.
+    """
+    apart = separation(team.starts, goals, team.radius)
+    found = _matched(team, goals, ground, apart, interchangeable)
+    ids = tuple(team.ids[i] for i in found.robots)
+    if found.circles:
+        raise NoOrderError([ids[i] for i in np.concatenate(found.circles)])
+    cells, pairs = _cut(found.paths, apart, team.radius)
+    lengths = cells.leave[cells.goals]
+    try:
+        near = Near.of(pairs, len(cells.robot))
+        times = schedule(cells, near, ordered(found.before, lengths.tolist()), team.speed)
+    except NoTimeError as error:
+        raise NoOrderError([ids[error.robot]]) from None
+    knots = [_knots(cells, times, i) for i in range(len(ids))]
+    motion = Motion(
+        paths={robot: path for robot, (path, _) in zip(ids, knots, strict=True)},
+        times={robot: when for robot, (_, when) in zip(ids, knots, strict=True)},
+        passages=passages(cells, pairs, times),
+    )
+    return motion, ids
+
+
+def separation(starts: FloatArray, goals: FloatArray, radius: float) -> float:
+    """How far apart robots stay, px: two radii, or as near as they start or end."""
+    return min(2 * radius, _closest(starts), _closest(goals)) * EXACT
+
+
+def assigned(starts: FloatArray, goals: FloatArray, ground: Ground, radius: float) -> Indices:
+    """Who takes each goal, (m,), for the least sum of squared ways around the obstacles.
+
+    Args:
+        starts: (n, 2) with n >= m.
+        goals: (m, 2).
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    frame = ground.site.frame(radius)
+    ways = way_lengths(starts, goals, ground.solid, radius, frame)
+    reached = np.isfinite(ways)
+    ways[~reached] = 10 * float(ways[reached].max(initial=frame.width + frame.height))
+    return np.asarray(linear_sum_assignment(ways.T**2)[1], dtype=np.intp)
+
+
+def _matched(
+    team: Team, goals: FloatArray, ground: Ground, apart: float, interchangeable: bool
+) -> Matched:
+    """Robots, their goals and their ways, without circles where any way around them is found."""
+    ends, site = np.concatenate([team.starts, goals]), ground.site
+
+    def ways(starts: FloatArray, ends_of_them: FloatArray, parked: FloatArray) -> list[FloatArray]:
+        idle = np.concatenate([team.idle, parked])
+        return routes_off(
+            starts, ends_of_them, ground.solid, site, team.radius, idle=idle, ends=ends
+        )
+
+    everyone = np.arange(len(goals))
+    found = match(everyone, ways(team.starts, goals, NOBODY), apart)
+    if interchangeable and found.circles:
+        found = matched_anew(found, team.starts, ways, apart)
+    return rerouted(found, ways, apart) if found.circles else found
+
+
+def _cut(paths: Sequence[FloatArray], apart: float, radius: float) -> tuple[Cells, Indices]:
+    """Paths in cells, and the pairs of cells that are too near."""
+    coarse = min(max((len(paths) / CROWD) ** 0.5, 1.0), COARSEST)
+    step = min(coarse * radius, 0.9 * apart)
+    cells = cut(paths, step)
+    return cells, conflicts(cells, apart, step)
+
+
+def _knots(cells: Cells, times: Schedule, robot: int) -> tuple[FloatArray, FloatArray]:
+    """A robot's path, (k, 2), with a vertex wherever its velocity changes, and when it is there."""
+    mine = cells.of(robot)
+    points = np.concatenate([cells.begin[mine], cells.end[mine][-1:]])
+    when = np.append(times.enter[mine], times.enter[mine][-1])
+    spans, ways = np.diff(when), np.diff(points, axis=0)
+    same = (spans > ALONG) | (np.abs(ways).max(axis=1) > ALONG)
+    points, when = points[np.append(True, same)], when[np.append(True, same)]
+    if len(points) < 2:
+        return np.repeat(points, 2, axis=0), np.repeat(when, 2)
+    spans, ways = np.diff(when), np.diff(points, axis=0)
+    velocity = np.divide(ways, spans[:, None], out=np.zeros_like(ways), where=spans[:, None] > 0)
+    turns = np.abs(np.diff(velocity, axis=0)).max(axis=1) > 1e-6 * (1 + np.abs(velocity).max())
+    kept = np.concatenate([[True], turns, [True]])
+    return points[kept], when[kept]
+
+
+def _closest(points: FloatArray) -> float:
+    """The least distance between two points, px; infinite where there is only one."""
+    from scipy.spatial import cKDTree
+
+    if len(points) < 2:
+        return float("inf")
+    return float(cKDTree(points).query(points, k=2)[0][:, 1].min())
