@@ -81,6 +81,7 @@ class OpenSessions:
         services.stopped |= self._stopped.get(session, set())
         if old is not None and old.services is not None:
             services.stopped |= old.services.stopped
+            services.view = old.services.view
             services.fleets |= {n: f for n, f in old.services.fleets.items() if f.real}
         fed = FedSession(stored, feed)
         return events, read_conversation(fed, events, self._agents, picture, services)

@@ -32,6 +32,7 @@ from .run_files import Folder
 from .starts import starts as read_starts
 from .terminal import say
 from .terminal_picture import way_of_terminal
+from .window import watching
 
 POINTING = ("--point", "--box", "--outline", "--target", "--mask")
 """Options that point, in the order in which `chat` reads them."""
@@ -64,6 +65,7 @@ def chat(
     plain: o.Plain = False,
     as_json: o.ScriptJson = False,
     out: o.Out = None,
+    watch: o.Watch = False,
     model: o.ModelName = "offline",
     base_url: o.BaseUrl = None,
     planner: o.PlannerName = None,
@@ -90,11 +92,10 @@ def chat(
     fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
     things = _in_order(ctx, arguments.shown((point, box, outline, target), mask, picture))
     begin = Beginning(picture, session, things, arguments.kept_out(keep_out), Settings(**fixed))
-    rules, lines = _rules(policy, auto=auto, plan_only=plan_only), _lines(script, as_json)
-    display = None if as_json else _display(plain=plain or lines is not None)
+    rules, (lines, display) = _rules(policy, auto, plan_only), _front(script, as_json, plain)
     chosen = partial(_agent, (planner, base_url, prompt, prompts, limit, rules), display, lines)
-    with chosen(model) as agent, Folder(out) as home:
-        talk = Talk(Service(agent, store_at(store), auto=auto), home, chosen)
+    with chosen(model) as agent, Folder(out) as home, watching(watch, stays=False) as services:
+        talk = Talk(Service(agent, store_at(store), auto=auto), home, chosen, services.view)
         raise typer.Exit(asyncio.run(_serve(talk, begin, lines, display, plain=plain)))
 
 
@@ -166,10 +167,15 @@ async def _serve(
         await service.close()
 
 
-def _display(*, plain: bool) -> Display:
-    """What shows a chat, in pictures too or in lines of text alone."""
-    console = None if plain else Console(highlight=False)
-    return Display(console, "none" if console is None else way_of_terminal(console))
+def _front(
+    script: Path | None, as_json: bool, plain: bool
+) -> tuple[Iterator[str] | None, Display | None]:
+    """What is said by a program, and what shows the chat, in pictures too or in text alone."""
+    lines = _lines(script, as_json)
+    if as_json:
+        return lines, None
+    console = None if plain or lines is not None else Console(highlight=False)
+    return lines, Display(console, "none" if console is None else way_of_terminal(console))
 
 
 def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
@@ -187,7 +193,7 @@ def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
     return None
 
 
-def _rules(policy: list[str] | None, *, auto: bool, plan_only: bool) -> list[str]:
+def _rules(policy: list[str] | None, auto: bool, plan_only: bool) -> list[str]:
     """The policy's rules, the first of which forbids to move where that is wanted.
 
     Raises:

@@ -14,7 +14,7 @@ from ..agent.outcomes import Answered
 from ..agent.report import Report, Totals
 from ..agent.service import Service
 from ..agent.session import Run, Show
-from ..tools.context import Context
+from ..tools.context import Context, View, unseen
 from ..tools.errors import StorageError
 from ..tools.formation.plan import Plan
 from .chat_commands import COMMANDS, command_named
@@ -51,6 +51,7 @@ class Talk:
     Args:
         folder: for plans and pictures.
         agent_named: the agent with another model.
+        view: shows robots that drive.
     """
 
     session = ""
@@ -60,8 +61,10 @@ class Talk:
         service: Service,
         folder: Folder,
         agent_named: Callable[[str], AbstractContextManager[Agent]],
+        view: View = unseen,
     ) -> None:
         self.service, self.folder, self.agent_named = service, folder, agent_named
+        self._view = view
         self.agents = ExitStack()
         self._turn = 0
 
@@ -83,7 +86,9 @@ class Talk:
         Raises:
             InputError: it cannot be done; nothing was.
         """
-        before = self.run
+        before, services = self.run, self.service.session(self.session).services
+        if services is not None:
+            services.view = self._view
         command = command_named(text) if text.startswith("/") else None
         if command is None:
             done = await self.service.say(self.session, text, show=show)

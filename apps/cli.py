@@ -24,6 +24,7 @@ from .starts import starts as read_starts
 from .stated import decided
 from .terminal import say
 from .terminal_session import TerminalSession
+from .window import watching
 
 app = typer.Typer(
     name="formup",
@@ -70,6 +71,8 @@ def run(
     as_json: o.Json = False,
     out: o.Out = None,
     record: o.Record = None,
+    film: o.Film = None,
+    watch: o.Watch = False,
     model: o.ModelName = "offline",
     base_url: o.BaseUrl = None,
     planner: o.PlannerName = None,
@@ -99,9 +102,10 @@ def run(
     given = arguments.shown((point, box, outline, target), mask, picture)
     things = arguments.numbered(given), arguments.kept_out(keep_out), settings
     who, said = decided(contract, *things, model=model, planner=planner, picture=picture)
-    with agent_of(*who, base_url, prompt, prompts, limit, policy) as agent, Folder(out) as home:
-        made = agent.run(picture, instruction, trace=home.trace, **said)
-        raise typer.Exit(TerminalSession(agent, home, as_json, keep).serve(made))
+    decider = agent_of(*who, base_url, prompt, prompts, limit, policy)
+    with decider as agent, Folder(out) as home, watching(watch) as services:
+        made = agent.run(picture, instruction, trace=home.trace, services=services, **said)
+        raise typer.Exit(TerminalSession(agent, home, as_json, keep, film).serve(made))
 
 
 @app.command()
@@ -116,6 +120,7 @@ def resume(
     base_url: o.BaseUrl = None,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
+    watch: o.Watch = False,
 ) -> None:
     """Go on with a run that waits for a person, was stopped or killed; or say what comes next."""
     if words is not None and (answer is not None or approve is not None):
@@ -123,7 +128,9 @@ def resume(
     path = log_path(folder)
     left = load_run(path, None if image is None else load_picture(image))
     start = read_events(path)[0].data
-    with tracer_of_environment() as tracer, Folder(path.parent, resumed=True) as home:
+    home = Folder(path.parent, resumed=True)
+    with tracer_of_environment() as tracer, home, watching(watch) as services:
+        left.context.services.view = services.view
         agent = Agent(
             model or start["model"],
             base_url=base_url or (None if model else start["base_url"]),

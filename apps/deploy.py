@@ -23,8 +23,9 @@ from ..tools.store import StoredWorld, picture_of, plan_file, read_world, write_
 from ..tools.world import World
 from . import options as o
 from .run_display import show_report
-from .run_files import animate
+from .run_files import write_films
 from .terminal import say
+from .window import watching
 
 
 def deploy(
@@ -32,6 +33,8 @@ def deploy(
     fleet: o.FleetName = "simulated",
     image: o.PictureFile = None,
     as_json: o.Json = False,
+    film: o.Film = None,
+    watch: o.Watch = False,
 ) -> None:
     """Move robots to a certified plan; naming the file is the approval."""
     stored = read_world(plan)
@@ -39,7 +42,7 @@ def deploy(
         raise InputError(f"{plan} holds no plan to deploy; give a plan.json written by formup run.")
     picture = picture_of(stored, plan, None if image is None else load_picture(image))
     settings = Settings(fleet=fleet, approved=stored.plan_id)
-    context = Context.of(picture, settings, stored.world)
+    context = replace(Context.of(picture, settings, stored.world), words=stored.instruction or "")
     context.services.artefacts = FolderArtefacts(plan.parent / PICTURES)
     chosen = stored.world.plans[stored.plan_id].plan
     if chosen.partial is not None:
@@ -48,18 +51,19 @@ def deploy(
     def keep(world: World) -> None:
         write_whole(plan, plan_file(world, chosen.id, stored.instruction or "", picture))
 
-    with _session(plan, context) as session:
-        context = context.at(session.start(context.world))
-        context = context.at(_driven(context, chosen, plan, session, keep))
-    animation = plan.with_name("deploy.gif")
-    drawn = animate(animation, context, chosen, stored.instruction or "")
-    report = _report(chosen, context.world, stored, animation.name if drawn else None)
-    if as_json:
-        say(report.model_dump_json(indent=2))
-        say(f"formup: files in {plan.parent}", error=True)
-    else:
-        show_report(Console(highlight=False), report, str(plan.parent))
-    raise typer.Exit(report.exit_code)
+    with watching(watch) as services:
+        context.services.view = services.view
+        with _session(plan, context) as session:
+            context = context.at(session.start(context.world))
+            context = context.at(_driven(context, chosen, plan, session, keep))
+        films = write_films(plan.parent, film, context, chosen, context.words)
+        report = _report(chosen, context.world, stored, films)
+        if as_json:
+            say(report.model_dump_json(indent=2))
+            say(f"formup: files in {plan.parent}", error=True)
+        else:
+            show_report(Console(highlight=False), report, str(plan.parent))
+        raise typer.Exit(report.exit_code)
 
 
 @dataclass
@@ -123,7 +127,7 @@ def _driven(
     return observed[-1]
 
 
-def _report(plan: Plan, world: World, stored: StoredWorld, animation: str | None) -> Report:
+def _report(plan: Plan, world: World, stored: StoredWorld, films: dict[str, str | None]) -> Report:
     arrival = world.arrivals[plan.id]
     state = "All arrived" if arrival.arrived else arrival.reason or "Not all arrived"
     furthest = length_text(max(arrival.residual_px), world.metres_per_pixel)
@@ -143,5 +147,5 @@ def _report(plan: Plan, world: World, stored: StoredWorld, animation: str | None
         arrival=arrival,
         metric=metric_data(world, plan, arrival),
         model="none",
-        files={"plan": None, "picture": None, "animation": animation, "trace": None},
+        files={"plan": None, "picture": None, "animation": None, "trace": None, **films},
     )

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from .run_files import film_file
+
 Image = Annotated[Path, typer.Argument(help="Picture of the place.", show_default=False)]
 Instruction = Annotated[str, typer.Argument(help="What to do, in your words.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
@@ -110,6 +112,15 @@ Record = Annotated[
     Path | None,
     typer.Option("--record", help="Where to keep the run, for --model replay:FILE."),
 ]
+Film = Annotated[
+    Path | None,
+    typer.Option(
+        "--film",
+        callback=film_file,
+        help="Where a film of the robots goes too: .gif, .mp4, or .png, a strip of moments.",
+    ),
+]
+Watch = Annotated[bool, typer.Option("--watch", help="Show robots in a window while they drive.")]
 LimitList = Annotated[
     list[str] | None,
     typer.Option(

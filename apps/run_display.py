@@ -94,6 +94,9 @@ def _files(console: Console, report: Report, folder: str) -> None:
         written = report.contract.model_dump_json(exclude_defaults=True)
         console.print(styled((f"{'would do':>12}  ", "cyan"), written), soft_wrap=True)
         _line(console, "", f"to have that, run again with --contract {folder}/{files['contract']}")
+    film = files.pop("film", None)
+    if film:
+        _line(console, "film", film)
     if files:
         _line(console, "files", f"{folder}/ {', '.join(files.values())}")
     if files and report.status in GOING_ON:

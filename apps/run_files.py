@@ -12,7 +12,7 @@ from ..agent.session import Run
 from ..agent.store.folder import NAME
 from ..tools.builtin.robots import read_track
 from ..tools.context import Context
-from ..tools.draw import draw_deployment, draw_look, draw_plan, save_gif
+from ..tools.draw import FILMS, draw_look, draw_plan, save_film
 from ..tools.errors import InputError
 from ..tools.formation.plan import Plan
 from ..tools.store import plan_file, write_whole
@@ -78,8 +78,11 @@ class Folder:
                 self.path.parent.rmdir()
 
 
-def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
+def write_files(folder: Folder, run: Run, film: Path | None = None) -> dict[str, str | None]:
     """Write what there is; names relative to the folder, None for what there is not.
+
+    Args:
+        film: a file for the last deployment, beside the one in the folder.
 
     Raises:
         StorageError: something cannot be written.
@@ -99,8 +102,7 @@ def write_files(folder: Folder, run: Run) -> dict[str, str | None]:
     if node is not None and not standing:
         data = plan_file(world, node.plan.id, title, picture)
         write_whole(folder.path / "plan.json", data)
-        if animate(folder.path / "deploy.gif", run.context, node.plan, title):
-            files["animation"] = "deploy.gif"
+        files |= write_films(folder.path, film, run.context, node.plan, title)
     if report.candidates:
         files["picture"] = folder.draw("question.png", draw_choices(run))
     elif standing:
@@ -161,8 +163,34 @@ def draw_choices(run: Run) -> Any:
     return draw_look(run.context.picture, shown, candidates=candidates)
 
 
+def film_file(path: Path | None) -> Path | None:
+    """Where a film goes; that it can is found out before robots move.
+
+    Raises:
+        InputError: no such folder, or another ending than of films.
+    """
+    if path is not None and (path.suffix.lower() not in FILMS or not path.parent.is_dir()):
+        raise InputError(
+            f"--film {path} cannot be written; name a file ending in {', '.join(FILMS)} in a "
+            "folder that is there."
+        )
+    return path
+
+
+def write_films(
+    folder: Path, film: Path | None, context: Context, plan: Plan, title: str
+) -> dict[str, str | None]:
+    """Write the last deployment of a plan as an animation, and where else a film is wanted."""
+    files: dict[str, str | None] = {}
+    if animate(folder / "deploy.gif", context, plan, title):
+        files["animation"] = "deploy.gif"
+        if film is not None and animate(film, context, plan, title):
+            files["film"] = str(film)
+    return files
+
+
 def animate(path: Path, context: Context, plan: Plan, title: str) -> bool:
-    """Write the last deployment of a plan as a GIF; False when it was not deployed."""
+    """Write the last deployment of a plan as a film; False when it was not deployed."""
     arrival = context.world.arrivals.get(plan.id)
     if arrival is None or arrival.track is None:
         return False
@@ -170,7 +198,7 @@ def animate(path: Path, context: Context, plan: Plan, title: str) -> bool:
     place_of = {robot: place for place, robot in enumerate(track.ids)}
     order = [place_of[robot] for robot in plan.formation.robot_of_place]
     frames = [points[order] for points in track.points]
-    save_gif(draw_deployment(context.picture, context.world, plan, frames, title), path)
+    save_film(path, context.picture, context.world, plan, frames, title)
     return True
 
 

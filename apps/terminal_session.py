@@ -27,12 +27,19 @@ class TerminalSession:
         folder: for its files.
         as_json: whether a program reads, which is not asked anything.
         record: a file for a copy of the trace, if wanted.
+        film: a file for a film of the robots, if wanted.
     """
 
     def __init__(
-        self, agent: Agent, folder: Folder, as_json: bool, record: Path | None = None
+        self,
+        agent: Agent,
+        folder: Folder,
+        as_json: bool,
+        record: Path | None = None,
+        film: Path | None = None,
     ) -> None:
-        self._agent, self._folder, self._as_json, self._record = agent, folder, as_json, record
+        self._agent, self._folder, self._as_json = agent, folder, as_json
+        self._record, self._film = record, film
 
     @property
     def can_ask(self) -> bool:
@@ -61,7 +68,7 @@ class TerminalSession:
     def _show(self, run: Run) -> Report:
         report = run.report
         try:
-            report = report.model_copy(update={"files": write_files(self._folder, run)})
+            report = report.model_copy(update={"files": write_files(self._folder, run, self._film)})
             if self._record is not None and run.trace:
                 write_whole(self._record, run.trace.read_bytes())
         except InputError as error:

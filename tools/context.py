@@ -6,12 +6,14 @@ fleet, and caches by content hash. Whatever a tool finds out or decides goes int
 
 import hashlib
 from collections.abc import Awaitable, Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 from .errors import InputError, StorageError, ToolError
 from .fleet.protocol import Fleet, Pose
 from .fleet.registry import FLEETS
+from .formation.plan import Plan
 from .formation.units import check_scale
 from .formation.value import Value
 from .perception.detection import Finder
@@ -140,6 +142,15 @@ def _ignore(*what: object) -> None:
     """Nobody keeps what a tool observes."""
 
 
+Watch = Callable[[tuple[Pose, ...]], None]
+View = Callable[["Context", Plan, Fleet], AbstractContextManager[Watch]]
+
+
+def unseen(context: "Context", plan: Plan, fleet: Fleet) -> AbstractContextManager[Watch]:
+    """Nobody watches the robots."""
+    return nullcontext(_ignore)
+
+
 async def _unrecorded(plan_id: str) -> None:
     """Nobody keeps that robots move."""
 
@@ -159,6 +170,8 @@ class Services:
         claim: what is given a fleet's name and what opens it, and returns the one to use; raises
             where it is another's.
         watch: is given the poses of robots that drive, to be shown.
+        view: is given a plan, in its context, and the fleet that drives to it; what it yields for
+            as long as that lasts is given the poses too.
     """
 
     pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
@@ -170,7 +183,8 @@ class Services:
     )
     stopped: set[str] = field(default_factory=set[str])
     claim: Callable[[str, Callable[[], Fleet]], Awaitable[Fleet]] = _unshared
-    watch: Callable[[tuple[Pose, ...]], None] = _ignore
+    watch: Watch = _ignore
+    view: View = unseen
 
     @property
     def is_stopped(self) -> bool:

@@ -23,6 +23,7 @@ from .formation.site import Other
 from .formation.units import check_scale
 from .formation.value import Value
 from .geometry.outline import Outline
+from .motion.checking import MotionVerdict
 from .outline_field import OutlineField
 from .perception.image import Picture
 from .perception.measure import Deviation
@@ -108,6 +109,8 @@ class PlanNode(Value):
         words: of the person, which it was made for.
         unseen: targets whose outlines are to be looked at before robots move.
         encounters: other things that robots stand on or drive over, as far as is known.
+        motion: the certificate of the way there from where the robots stood when it was made;
+            None where nothing was planned.
     """
 
     plan: Plan
@@ -116,6 +119,7 @@ class PlanNode(Value):
     words: str = ""
     unseen: tuple[str, ...] = ()
     encounters: tuple[Encounter, ...] = ()
+    motion: MotionVerdict | None = None
 
 
 class Step(Value):

@@ -3,18 +3,12 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
 import shapely
 
 from ..context import Context
-from ..errors import FleetError, InputError, ToolError
-from ..fleet.protocol import Pose, points_of
+from ..errors import InputError, ToolError
 from ..formation.contract import Contract
-from ..formation.encounters import Encounter, encounters_of
-from ..formation.plan import Plan
-from ..geometry.outline import MIN_AREA, FloatArray, Outline, outline_of
-from ..motion.avoiding import routes_off
-from ..motion.routes import obstacles
+from ..geometry.outline import MIN_AREA, Outline, outline_of
 from ..perception.target_prompt import TargetPrompt
 from ..world import KeepOut, World
 from .targets import measured_all
@@ -84,27 +78,3 @@ def held_off(contract: Contract, world: World) -> Contract:
     return contract.model_copy(
         update={"keep_out": tuple(dict.fromkeys((*contract.keep_out, *hard)))}
     )
-
-
-def met_by(
-    world: World, plan: Plan, poses: Sequence[Pose] = (), radius: float = 0.0
-) -> tuple[Encounter, ...]:
-    """The other things that robots of a plan stand on or, from where they are, drive over.
-
-    Args:
-        poses: of the whole fleet; none where nothing is known of it.
-        radius: of its robots, px.
-    """
-    contract, names = plan.formation.contract, plan.formation.robot_of_place
-    site, radius = world.site(contract), max(radius, contract.robot_radius)
-    at = {pose.id: (pose.x, pose.y) for pose in poses}
-    idle = points_of([pose for pose in poses if pose.id not in set(names)])
-    paths: dict[str, FloatArray] = {}
-    if site.others and at:
-        starts, solid = np.array([at[name] for name in names]), obstacles(contract, site)
-        try:
-            ways = routes_off(starts, plan.formation.points, solid, site, radius, idle=idle)
-            paths = dict(zip(names, ways, strict=True))
-        except FleetError:
-            pass  # a deployment says so
-    return encounters_of(plan, site, paths, radius)

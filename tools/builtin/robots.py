@@ -11,7 +11,6 @@ import shapely
 from ..context import Context
 from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
 from ..fleet.arrival import Arrival, Deployment, Track
-from ..fleet.assigning import Assigned, assign_robots
 from ..fleet.deploy import ARRIVED_DEG, MAX_AGE, check_turns, deploy, heading_residuals
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
 from ..fleet.registry import FLEETS
@@ -20,11 +19,10 @@ from ..formation.contract import Contract
 from ..formation.encounters import notes_of
 from ..formation.plan import Plan
 from ..formation.site import Other
-from ..geometry.outline import FloatArray
 from ..motion.routes import obstacles
 from ..tool import in_thread, to_its_end
 from ..world import PlanNode, World
-from .others import met_by
+from .motions import Going, going, met_by
 
 MOST_NAMED = 12
 """Idle robots that a note names."""
@@ -58,45 +56,27 @@ async def with_robots(
     try:
         fleet = await _team(context, contract, taking or ())
     except FleetSizeError:  # more than can be driven can still be planned
-        return world.with_plan(_noted(world, node, told, (), 0.0))
+        return world.with_plan(_noted(world, node, told, None))
     check_turns(plan, fleet)
-    poses, points = await fleet.observe(max_age=MAX_AGE), plan.formation.points
-    try:
-        found = await in_thread(lambda: _assigned(poses, points, taking))
-    except FleetSizeError as error:
-        raise ToolError(str(error), "too_many_robots") from None
+    poses = await fleet.observe(max_age=MAX_AGE)
+    found: Going = await in_thread(lambda: going(world, plan, fleet, poses, taking))
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
-    node = node.model_copy(update={"plan": plan})
-    radius = fleet.radius
+    node = node.model_copy(update={"plan": plan, "motion": found.verdict})
     told += _notes(found, poses)
-    node = await in_thread(lambda: _noted(world, node, told, poses, radius))
+    node = await in_thread(lambda: _noted(world, node, told, found))
     return world.having(robots=poses).with_plan(node)
 
 
-def _assigned(
-    poses: tuple[Pose, ...], points: FloatArray, taking: Sequence[str | None] | None
-) -> Assigned:
-    """Who takes which place where some have theirs."""
-    if taking is None:
-        return assign_robots(poses, points)
-    new = [i for i, robot in enumerate(taking) if robot is None]
-    free = [pose for pose in poses if pose.id not in taking]
-    more = iter(assign_robots(free, points[new]).robots if new else ())
-    return Assigned(tuple(next(more) if robot is None else robot for robot in taking), None)
-
-
-def _noted(
-    world: World, node: PlanNode, notes: list[str], poses: tuple[Pose, ...], radius: float
-) -> PlanNode:
+def _noted(world: World, node: PlanNode, notes: list[str], found: Going | None) -> PlanNode:
     """The plan with notes, and with what its robots stand on and drive over."""
     plan = node.plan
-    met = met_by(world, plan, poses, radius)
+    met = met_by(world, plan, found)
     more = (*plan.verdict.notes, *notes, *notes_of(met))
     plan = plan.model_copy(update={"verdict": plan.verdict.model_copy(update={"notes": more})})
     return node.model_copy(update={"plan": plan, "encounters": met})
 
 
-def _notes(found: Assigned, poses: tuple[Pose, ...]) -> list[str]:
+def _notes(found: Going, poses: tuple[Pose, ...]) -> list[str]:
     """What is to be said of who takes which place."""
     notes: list[str] = []
     if found.gap is not None:
@@ -160,13 +140,15 @@ async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
         nonlocal last
         last = poses
         context.services.watch(poses)
+        show(poses)
 
     site = context.world.site(plan.formation.contract)
     robots = plan.formation.robot_of_place
     try:
-        return await deploy(
-            plan, site, fleet, robots, watch=watch, starting=lambda: context.moving(plan.id)
-        )
+        with context.services.view(context, plan, fleet) as show:
+            return await deploy(
+                plan, site, fleet, robots, watch=watch, starting=lambda: context.moving(plan.id)
+            )
     finally:
         if last:
             context.observed(context.world.having(robots=last))

@@ -1,7 +1,17 @@
 """Pictures of scenes, plans and deployments; nothing is decided here."""
 
-from .film import draw_deployment, save_gif
+from .film import draw_deployment
 from .overlay import draw_look, draw_plan
+from .recording import FILMS, save_film, save_gif
 from .view import draw_view, view_scale
 
-__all__ = ["draw_deployment", "draw_look", "draw_plan", "draw_view", "save_gif", "view_scale"]
+__all__ = [
+    "FILMS",
+    "draw_deployment",
+    "draw_look",
+    "draw_plan",
+    "draw_view",
+    "save_film",
+    "save_gif",
+    "view_scale",
+]

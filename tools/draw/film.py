@@ -1,33 +1,25 @@
-"""A deployment as moving pictures: where the robots are, frame by frame, and where they go."""
+"""A deployment frame by frame: where the robots are, and where they go."""
 
 from collections.abc import Sequence
-from io import BytesIO
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from ..errors import InputError
 from ..fleet.deploy import ARRIVED_PX, ARRIVED_SHARE
 from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
 from ..geometry.sampling import nearest
 from ..perception.image import Picture
-from ..store import write_whole
 from ..world import World
 from .canvas import (
     ALLOWED,
     CERTIFIED,
     FINDING,
-    INK,
-    MET,
     MUTED,
     PAPER,
     ROBOT,
-    TARGET,
     WHITE,
     Canvas,
-    Colour,
 )
 from .captions import (
     FOOTER,
@@ -46,7 +38,8 @@ from .overlay import idle_robots
 
 SIDE = 640
 """Greatest side of a frame, page px."""
-UNIT = 0.8
+UNIT = 0.8 / SIDE
+"""Units of strokes and text, as a share of a frame's greatest side."""
 TITLE_LINES = 2
 NARROWEST = 400.0
 NUMBERED, TRAILED = 30, 400
@@ -54,23 +47,6 @@ NUMBERED, TRAILED = 30, 400
 NUMBER_RADIUS = 8.0
 TRAIL = 10
 """Frames a trail is long."""
-GIF_FRAMES, GIF_BYTES = 48, 3_000_000
-GIF_SIDES = (640, 520, 420, 320)
-"""Sides tried in turn until the file is small enough."""
-TICK_MS, LAST_MS = 80, 2000
-STYLE: tuple[Colour, ...] = (
-    ROBOT,
-    WHITE,
-    INK,
-    TARGET,
-    PAPER,
-    MUTED,
-    CERTIFIED,
-    FINDING,
-    ALLOWED,
-    MET,
-)
-"""Colours a palette made from the photograph alone would lose."""
 
 
 def draw_deployment(
@@ -79,21 +55,26 @@ def draw_deployment(
     plan: Plan,
     frames: Sequence[FloatArray],
     title: str,
+    *,
+    moments: Sequence[int] | None = None,
+    side: int = SIDE,
 ) -> list[Image.Image]:
-    """One picture per frame, all of one size, no side over 640 px.
+    """One picture per frame, all of one size.
 
     Args:
         world: what the plan was made in.
         plan: its places are the goals.
         frames: (n, 2) each: where the robots are over time, in the order of their places, px.
         title: usually the instruction.
+        moments: which of the frames are drawn; all by default.
+        side: the greatest that a picture may have, px.
 
     Raises:
         ToolError: the plan names a target that the world does not have.
     """
-    goals = plan.formation.points
-    long = _photo_long_side(picture)
-    canvas, lines = make_page(picture, long, UNIT, title, TITLE_LINES, NARROWEST)
+    goals, unit = plan.formation.points, UNIT * side
+    long = _photo_long_side(picture, side)
+    canvas, lines = make_page(picture, long, unit, title, TITLE_LINES, NARROWEST)
     for name in plan.formation.contract.target_ids:
         draw_outline(canvas, world.outline(name))
     draw_met(canvas, world.met(plan.id).values())
@@ -103,36 +84,14 @@ def draw_deployment(
     draw_bars(canvas, lines)
     return [
         _frame(canvas, frames[max(i - TRAIL, 0) : i + 1], plan, radius, (i, len(frames)))
-        for i in range(len(frames))
+        for i in (range(len(frames)) if moments is None else moments)
     ]
 
 
-def save_gif(frames: Sequence[Image.Image], path: Path) -> None:
-    """Write a looping GIF of 12 frames a second that rests on its last frame for 2 s.
-
-    Of more than 48 frames as many are kept, evenly; the first frame's size goes for all and is
-    reduced to sides of 640 px, or less until the file has under 3 MB. The file appears whole
-    or not at all.
-
-    Raises:
-        InputError: there are no frames, or the file cannot be written.
-    """
-    if not frames:
-        raise InputError("There are no frames to save; draw at least one.")
-    chosen = np.linspace(0, len(frames) - 1, min(len(frames), GIF_FRAMES))
-    kept = [frames[round(float(i))].convert("RGB") for i in chosen]
-    data = b""
-    for side in GIF_SIDES:
-        data = _gif_bytes(kept, side)
-        if len(data) <= GIF_BYTES:
-            break
-    write_whole(path, data)
-
-
-def _photo_long_side(picture: Picture) -> int:
-    """The photograph's long side with which a page of any title stays within SIDE."""
-    bars = (TITLE_LINES * TITLE * LINE + 2 * PAD + FOOTER_HEIGHT) * UNIT + 2
-    factor = min(SIDE / picture.width, (SIDE - bars) / picture.height)
+def _photo_long_side(picture: Picture, side: int) -> int:
+    """The photograph's long side with which a page of any title stays within a side."""
+    bars = (TITLE_LINES * TITLE * LINE + 2 * PAD + FOOTER_HEIGHT) * UNIT * side + 2
+    factor = min(side / picture.width, (side - bars) / picture.height)
     return int(factor * max(picture.size))
 
 
@@ -196,38 +155,3 @@ def _draw_end(canvas: Canvas, now: FloatArray, goals: FloatArray) -> None:
         draw_footer(canvas, "arrived", CERTIFIED, [f"{len(goals)} {noun} in place"])
     else:
         draw_footer(canvas, "not arrived", FINDING, [f"{there} of {len(goals)} {noun} in place"])
-
-
-def _gif_bytes(frames: Sequence[Image.Image], side: int) -> bytes:
-    """The frames as GIF with no side over a length, one palette for all."""
-    width, height = frames[0].size
-    factor = min(side / max(width, height), 1.0)
-    size = (max(round(width * factor), 1), max(round(height * factor), 1))
-    sized = [f if f.size == size else f.resize(size, Image.Resampling.LANCZOS) for f in frames]
-    palette = _shared_palette(sized)
-    # Without dithering what stands still stays the same, which is most of a small file.
-    flat = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in sized]
-    buffer = BytesIO()
-    flat[0].save(
-        buffer,
-        "GIF",
-        save_all=True,
-        append_images=flat[1:],
-        duration=[TICK_MS] * (len(flat) - 1) + [LAST_MS],
-        loop=0,
-        optimize=True,
-        disposal=1,
-    )
-    return buffer.getvalue()
-
-
-def _shared_palette(frames: Sequence[Image.Image]) -> Image.Image:
-    """A palette for all frames: the style's colours, and the rest from first, middle and last."""
-    width, height = frames[0].size
-    sample = Image.new("RGB", (width, 3 * height))
-    for row, frame in enumerate((frames[0], frames[len(frames) // 2], frames[-1])):
-        sample.paste(frame, (0, row * height))
-    colours = sample.quantize(255 - len(STYLE)).getpalette() or []
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([v for colour in STYLE for v in colour] + colours)
-    return palette

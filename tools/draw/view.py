@@ -63,7 +63,7 @@ def draw_view(
     origin = (0, 0)
     long = max(round(view_scale(picture) * max(picture.size)), 1)
     if region is not None:
-        picture, origin = _part(picture, region)
+        picture, origin = part_of(picture, region)
         long = CLOSER
     canvas = Canvas(picture, long, 1.0, (0, 0, RULER[2], RULER[3]), origin)
     if before is not None:
@@ -82,7 +82,7 @@ def draw_view(
     return file.getvalue()
 
 
-def _part(picture: Picture, region: Box) -> tuple[Picture, tuple[int, int]]:
+def part_of(picture: Picture, region: Box) -> tuple[Picture, tuple[int, int]]:
     """A part of the picture, whole pixels, and where it begins."""
     low = np.maximum(np.floor(region[:2]), 0).astype(int)
     high = np.minimum(np.ceil(region[2:]), picture.size).astype(int)

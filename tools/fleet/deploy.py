@@ -5,6 +5,7 @@ import math
 from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import aclosing, suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,8 +16,9 @@ from ..formation.headings import off_heading
 from ..formation.placement.place import Site
 from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
-from ..motion.avoiding import routes_off
-from ..motion.routes import obstacles
+from ..motion.planning import Ground, Team, plan_motion
+from ..motion.routes import named_obstacles
+from ..tool import in_thread
 from .arrival import Arrival, Deployment, Ended, Track
 from .getting_on import GettingOn, nearest_spare, said_of, said_of_replaced
 from .protocol import (
@@ -29,6 +31,7 @@ from .protocol import (
     Pose,
     RobotsFailedError,
     StalePosesError,
+    body_radius,
     points_of,
 )
 
@@ -149,7 +152,7 @@ class _Drive:
         self._goals, self._headings = goals
         self._contract, self._site = contract, site
         self._fleet, self._robots, self._watch = fleet, tuple(robots), watch
-        self._radius = max(contract.robot_radius, fleet.radius)
+        self._radius = body_radius(fleet, contract, self._goals)
         self._tolerance = tolerance(site.room)
         self._poses: dict[str, Pose] = {}
         self._frames: list[FloatArray] = []
@@ -172,14 +175,14 @@ class _Drive:
             )
         await self._observe()
         self._check_idle()
-        corrections, motion = 0, self._motion()
+        corrections, motion = 0, await self._motion()
         if starting is not None:
             await starting()
         try:
             await self._drive(motion)
             while not self._arrived() and not self._fleet.stopped and corrections < CORRECTIONS:
                 corrections += 1
-                await self._drive(self._motion())
+                await self._drive(await self._motion())
         except (asyncio.CancelledError, FleetError) as error:
             with suppress(FleetError):
                 self._saw(await self._fleet.observe())
@@ -286,14 +289,30 @@ class _Drive:
         away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
         return bool(away.min() < max(2 * self._radius, MIN_SPACING))
 
-    def _motion(self) -> Motion:
-        site, radius = self._site, self._radius
-        solid = obstacles(self._contract, site)
-        idle = points_of(self._idle())
-        paths = routes_off(self._points(), self._goals, solid, site, radius, idle=idle)
+    async def _motion(self) -> Motion:
+        """A motion that is certified from where the robots were seen.
+
+        Raises:
+            FleetError: there is none: no way, robots in each other's way, or it does not certify.
+        """
+        ground = Ground(named_obstacles(self._contract, self._site), self._site)
+        fleet, goals = self._fleet, self._goals
+        team = Team(
+            ids=self._robots,
+            starts=self._points(),
+            radius=self._radius,
+            speed=fleet.speed,
+            error=fleet.tracking_error,
+            idle={pose.id: (pose.x, pose.y) for pose in self._idle()},
+        )
+        motion, _, verdict = await in_thread(
+            lambda: plan_motion(team, goals, ground, interchangeable=False)
+        )
+        if not verdict.certified:
+            raise FleetError(f"{verdict.findings[0].sentence} No robot is driven like that.")
         looks = zip(self._robots, self._headings, strict=False)
         headings = {robot: math.radians(angle) for robot, angle in looks if angle is not None}
-        return Motion(dict(zip(self._robots, paths, strict=True)), headings)
+        return replace(motion, headings=headings)
 
     def _residual(self) -> FloatArray:
         return np.linalg.norm(self._points() - self._goals, axis=1)

@@ -14,7 +14,9 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import FleetError
+from ..formation.contract import Contract
 from ..geometry.outline import FloatArray
+from ..geometry.sampling import min_spacing
 from ..motion.motion import Motion
 
 
@@ -96,6 +98,11 @@ class Fleet(Protocol):
         ...
 
     @property
+    def tracking_error(self) -> float:
+        """How far a robot that nothing pushes may come off its path, px."""
+        ...
+
+    @property
     def turns(self) -> bool:
         """Whether its robots can be sent to a heading, which their poses then have."""
         ...
@@ -169,6 +176,21 @@ class FleetRequest:
 
 
 FleetFactory = Callable[[FleetRequest], Fleet]
+
+
+SLACK = 0.98
+"""Share of half the way between a plan's nearest places that a body takes up at most."""
+
+
+def body_radius(fleet: Fleet, contract: Contract, places: FloatArray) -> float:
+    """The radius of a robot that all of its motion reckons with, px.
+
+    That which the contract states, or the fleet's, which for simulated robots that nobody has
+    given one is no more than the places, (n, 2) px, leave room for.
+    """
+    if contract.robot_radius or fleet.real:
+        return max(contract.robot_radius, fleet.radius)
+    return min(fleet.radius, SLACK * min_spacing(places) / 2)
 
 
 def points_of(poses: Sequence[Pose]) -> FloatArray:

@@ -19,7 +19,7 @@ from .protocol import (
     check_ages,
     points_of,
 )
-from .simulator import PERIOD, Simulator
+from .simulator import PERIOD, Simulator, tracking_error
 from .starts import set_down
 
 MAX_ROBOTS = 10_000
@@ -60,6 +60,7 @@ class SimulatedFleet:
             speed=speed, acceleration=speed / FULL_SPEED_S, radius=radius, slip=SLIP
         )
         self.radius, self.speed = physics.radius, physics.speed
+        self.tracking_error = tracking_error(physics)
         self._simulator = Simulator(
             [pose.id for pose in poses],
             points_of(poses),

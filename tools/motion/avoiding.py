@@ -84,8 +84,9 @@ def routes_off(
 
 
 def _with_room(thing: Other, room: float, ends: FloatArray, radius: float) -> BaseGeometry:
-    """A thing with room around it, px, less where a path ends near."""
-    spare = float(distances(thing.region, ends).min(initial=np.inf)) - radius
+    """A thing with room around it, px, less where a path ends near that does not end on it."""
+    off = distances(thing.region, ends)
+    spare = float(off[off > STANDING * radius + 0.1].min(initial=np.inf)) - radius
     reach = min(room, NEAR_END * spare)
     slack = DETAIL * reach
     return thing.region.simplify(slack).buffer(reach + slack, quad_segs=2)

@@ -57,7 +57,7 @@ def cut(paths: Sequence[FloatArray], step: float) -> Cells:
     for path in paths:
         along = arc_lengths(path)
         shares: list[FloatArray] = [along[:1], along[:1]]
-        for begin, end in pairwise(along.tolist()):
+        for begin, end in pairwise(map(float, along)):
             if end > begin:
                 count = int(np.ceil((end - begin) / step - 1e-9)) or 1
                 shares.append(np.linspace(begin, end, count + 1)[1:])

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
@@ -18,6 +19,11 @@ from .motion import Indices, Motion, Passages, arc_lengths
 
 ROUNDING = 1e-6
 """Distances may fall short of what is demanded by so much, px."""
+AS_NEAR = 0.98
+"""Robots that start or end too near to an obstacle come no nearer than this share of that."""
+DETOUR = 3.0
+"""Robots that start or end too near to an obstacle are so for so many times the shortest way out
+and a radius at most."""
 FINDINGS = 12
 """Most findings of a kind."""
 SAMPLE_SHARE, MOST_SAMPLES = 0.25, 60_000
@@ -144,10 +150,11 @@ def _closest_approach(
         return None, ()
     pieces = _Pieces(motion, idle)
     ways = np.stack([pieces.begin, pieces.end], axis=1)
-    tree = shapely.STRtree(shapely.linestrings(ways))
+    lines = np.asarray(shapely.linestrings(ways), dtype=object)
+    tree = shapely.STRtree(lines)
     reach = 2 * demanded
     while True:
-        pairs = tree.query(tree.geometries, predicate="dwithin", distance=reach).T
+        pairs = tree.query(lines, predicate="dwithin", distance=reach).T
         pairs = pairs[pieces.robot[pairs[:, 0]] < pieces.robot[pairs[:, 1]]]
         approach = pieces.approach(pairs)
         closest = float(approach.min(initial=np.inf))
@@ -179,20 +186,18 @@ def _closest_approach(
 def _clearances(
     motion: Motion, radius: float, obstacles: Mapping[str, BaseGeometry]
 ) -> tuple[float | None, tuple[MotionFinding, ...]]:
-    """How near robots come to obstacles, px, and who touches one.
-
-    Who starts or ends nearer than its radius may be so near where it leaves or enters.
-    """
+    """How near robots come to obstacles, px, and who touches one."""
     least, found = np.inf, list[MotionFinding]()
     for name, region in obstacles.items():
         if region.is_empty:
             continue
-        body = region.buffer(radius - ROUNDING)
         for robot, path in motion.paths.items():
-            rest = _between(path, region, radius)
-            near = float(region.distance(rest)) if rest is not None else np.inf
+            way = LineString(path)
+            near = float(region.distance(way))
+            if near < radius - ROUNDING:
+                near = _in_passing(way, region, radius)
             least = min(least, near)
-            if rest is None or near >= radius - 10 * ROUNDING or not rest.intersects(body):
+            if near >= radius - 10 * ROUNDING:
                 continue
             found.append(
                 MotionFinding(
@@ -208,30 +213,23 @@ def _clearances(
     return (None if np.isinf(least) else least), tuple(found[:FINDINGS])
 
 
-def _between(path: FloatArray, region: BaseGeometry, radius: float) -> BaseGeometry | None:
-    """A path without the leg on which it leaves a region and the one on which it enters it."""
-    legs = np.unique(path, axis=0)
-    if len(legs) < 2:
-        return None
-    ends = shapely.distance(region, shapely.points(path[[0, -1]]))
-    begin, end = 0, len(path) - 1
-    if ends[0] < radius:
-        begin = _first_bend(path)
-    if ends[1] < radius:
-        end = len(path) - 1 - _first_bend(path[::-1])
-    return LineString(path[begin : end + 1]) if end > begin else None
+def _in_passing(way: LineString, region: BaseGeometry, radius: float) -> float:
+    """How near a way comes to a region beside where it leaves and enters its surroundings, px.
 
-
-def _first_bend(path: FloatArray) -> int:
-    """The vertex at which a path first turns; its last one where it does not."""
-    ways = np.diff(path, axis=0)
-    length = np.linalg.norm(ways, axis=1)
-    going = np.flatnonzero(length > ROUNDING)
-    if not len(going):
-        return len(path) - 1
-    unit = ways[going] / length[going, None]
-    turned = np.flatnonzero(np.abs(unit - unit[0]).max(axis=1) > 1e-6)
-    return int(going[turned[0]]) if len(turned) else len(path) - 1
+    Where it starts or ends nearer than is allowed, it comes hardly nearer than that there, and
+    goes out or in by nearly the shortest way.
+    """
+    least, body = np.inf, region.buffer(radius - ROUNDING)
+    for part in shapely.get_parts(shapely.intersection(way, body)):
+        if part.length < ROUNDING:
+            continue
+        near = float(region.distance(part))
+        ends = [end for end in way.boundary.geoms if part.distance(end) < ROUNDING]
+        out = sum(float(body.boundary.distance(end)) for end in ends)
+        allowed = min((float(region.distance(end)) for end in ends), default=np.inf)
+        if near < AS_NEAR * allowed or part.length > DETOUR * (out + radius):
+            least = min(least, near)
+    return least
 
 
 def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
@@ -249,9 +247,9 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
     s = np.concatenate(along)
     one, other = pairs.T
     kept = _held(motion.passages, robot[one], s[one], robot[other], s[other])
-    kept |= _held(motion.passages, robot[other], s[other], robot[one], s[one])
+    kept = kept | _held(motion.passages, robot[other], s[other], robot[one], s[one])
     ids = list(motion.paths)
-    loose = np.unique(np.sort(robot[pairs[~kept]], axis=1), axis=0)[:FINDINGS]
+    loose: Indices = np.unique(np.sort(robot[pairs[~kept]], axis=1), axis=0)[:FINDINGS]
     return tuple(
         MotionFinding(
             kind="passage",
@@ -267,7 +265,7 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
 
 def _held(
     rows: Passages, waiting: Indices, at: FloatArray, first: Indices, past: FloatArray
-) -> FloatArray:
+) -> NDArray[np.bool_]:
     """Whether a robot is held before a point as long as another has not gone past one of its own.
 
     The arguments are (p,) columns; so is what comes back, of truth values.

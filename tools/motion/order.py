@@ -6,7 +6,7 @@ the places that are filled first. After Turpin et al. (2014), for robots with bo
 
 import heapq
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,7 +74,7 @@ def circles(before: Indices, count: int) -> list[Indices]:
 
 def ordered(before: Indices, lengths: Sequence[float]) -> list[int]:
     """All robots, each after those that have to go before it; of those free the farthest first."""
-    waits = Counter(before[:, 1].tolist())
+    waits: Counter[int] = Counter(before[:, 1].tolist())
     after: defaultdict[int, list[int]] = defaultdict(list)
     for one, other in before.tolist():
         after[one].append(other)
@@ -115,7 +115,11 @@ def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
         for circle in found.circles:
             for i in circle:
                 for others in (range(len(found.paths)), circle):
-                    ends = [found.paths[j][[0, -1]] for j in others if j != i]
+                    ends = [
+                        path[[0, -1]]
+                        for j, path in enumerate(found.paths)
+                        if j != i and j in others
+                    ]
                     other = _past(better, int(i), np.concatenate(ends), ways, apart)
                     if other is not None:
                         break
@@ -143,14 +147,14 @@ def _worth(found: Matched) -> int:
 def _by_order(found: Matched, circle: Indices) -> tuple[list[int], list[int]]:
     """Goals of a circle as they are filled, and those whose robots, as they leave, take them."""
     length = {int(i): float(arc_lengths(found.paths[i])[-1]) for i in circle}
-    leaving = _sorted(found.leaving.tolist(), length)
-    filled = _sorted(found.arriving.tolist(), {i: -way for i, way in length.items()})
+    leaving = _sorted(found.leaving, length)
+    filled = _sorted(found.arriving, {i: -way for i, way in length.items()})
     return filled, leaving
 
 
-def _sorted(before: Iterable[list[int]], value: dict[int, float]) -> list[int]:
+def _sorted(before: Indices, value: dict[int, float]) -> list[int]:
     """Nodes in an order that breaks as few demands as it can; the least value first of the free."""
-    demands = [(one, other) for one, other in before if one in value and other in value]
+    demands = [(one, other) for one, other in before.tolist() if one in value and other in value]
     left, order = set(value), list[int]()
     while left:
         waits = Counter(other for one, other in demands if one in left and other in left)

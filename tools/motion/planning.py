@@ -4,8 +4,9 @@ Shortest ways, an order in which they can be driven, and the times that this ord
 Frame: image pixels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -13,11 +14,13 @@ from shapely.geometry.base import BaseGeometry
 from ..errors import FleetError
 from ..formation.site import Site
 from ..geometry.outline import FloatArray
+from ..geometry.sampling import min_spacing
 from .avoiding import routes_off
 from .cells import Cells, conflicts, cut
+from .checking import MotionVerdict, check_motion
 from .motion import Indices, Motion
 from .order import Matched, match, matched_anew, ordered, rerouted
-from .routes import NOBODY, way_lengths
+from .routes import NOBODY, union, way_lengths
 from .schedule import Near, NoTimeError, Schedule, passages, schedule
 
 EXACT = 1 - 1e-9
@@ -52,29 +55,36 @@ class Team:
     Attributes:
         ids: of the robots, in the order of `starts`.
         starts: (n, 2) where they stand, px.
-        radius: of their bodies and how far they may be off their paths, px.
+        radius: of their bodies, px.
         speed: greatest, px/s.
-        idle: (m, 2) where robots stand that do not move, px.
+        error: how far they may be off their paths, px; kept where starts and goals leave room.
+        idle: where robots stand that do not move, px, by id.
     """
 
     ids: tuple[str, ...]
     starts: FloatArray
     radius: float
     speed: float
-    idle: FloatArray = field(default_factory=lambda: NOBODY)
+    error: float = 0.0
+    idle: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Where they move: obstacles, which no robot touches, and a site with things they avoid."""
+    """Where they move: obstacles by name, which no robot touches, and things that they avoid."""
 
-    solid: BaseGeometry
+    obstacles: Mapping[str, BaseGeometry]
     site: Site
+
+    @cached_property
+    def solid(self) -> BaseGeometry:
+        """All obstacles as one."""
+        return union(self.obstacles)
 
 
 def plan_motion(
     team: Team, goals: FloatArray, ground: Ground, *, interchangeable: bool
-) -> tuple[Motion, tuple[str, ...]]:
+) -> tuple[Motion, tuple[str, ...], MotionVerdict]:
     """Paths, times and an order of passage onto all goals.
 
     Args:
@@ -82,17 +92,17 @@ def plan_motion(
         interchangeable: whether robots may take each other's goals.
 
     Returns:
-        the motion, and who takes each goal.
+        the motion, who takes each goal, and the certificate of the motion.
 
     Raises:
         NoRouteError: no path leads to a goal.
         NoOrderError: robots stand in each other's way.
     """
-    apart = separation(team.starts, goals, team.radius)
+    apart = separation(team.starts, goals, team.radius + team.error)
     found = _matched(team, goals, ground, apart, interchangeable)
-    ids = tuple(team.ids[i] for i in found.robots)
+    ids = tuple(team.ids[int(i)] for i in found.robots)
     if found.circles:
-        raise NoOrderError([ids[i] for i in np.concatenate(found.circles)])
+        raise NoOrderError([ids[int(i)] for i in np.concatenate(found.circles)])
     cells, pairs = _cut(found.paths, apart, team.radius)
     lengths = cells.leave[cells.goals]
     try:
@@ -106,12 +116,14 @@ def plan_motion(
         times={robot: when for robot, (_, when) in zip(ids, knots, strict=True)},
         passages=passages(cells, pairs, times),
     )
-    return motion, ids
+    demanded = separation(team.starts, goals, team.radius)
+    verdict = check_motion(motion, team.radius, demanded, ground.obstacles, team.idle)
+    return motion, ids, verdict
 
 
 def separation(starts: FloatArray, goals: FloatArray, radius: float) -> float:
     """How far apart robots stay, px: two radii, or as near as they start or end."""
-    return min(2 * radius, _closest(starts), _closest(goals)) * EXACT
+    return min(2 * radius, min_spacing(starts), min_spacing(goals)) * EXACT
 
 
 def assigned(starts: FloatArray, goals: FloatArray, ground: Ground, radius: float) -> Indices:
@@ -134,12 +146,13 @@ def _matched(
     team: Team, goals: FloatArray, ground: Ground, apart: float, interchangeable: bool
 ) -> Matched:
     """Robots, their goals and their ways, without circles where any way around them is found."""
-    ends, site = np.concatenate([team.starts, goals]), ground.site
+    ends, radius = np.concatenate([team.starts, goals]), team.radius + team.error
+    standing = np.array([*team.idle.values()]).reshape(-1, 2)
 
     def ways(starts: FloatArray, ends_of_them: FloatArray, parked: FloatArray) -> list[FloatArray]:
-        idle = np.concatenate([team.idle, parked])
+        idle = np.concatenate([standing, parked])
         return routes_off(
-            starts, ends_of_them, ground.solid, site, team.radius, idle=idle, ends=ends
+            starts, ends_of_them, ground.solid, ground.site, radius, idle=idle, ends=ends
         )
 
     everyone = np.arange(len(goals))
@@ -172,12 +185,3 @@ def _knots(cells: Cells, times: Schedule, robot: int) -> tuple[FloatArray, Float
     turns = np.abs(np.diff(velocity, axis=0)).max(axis=1) > 1e-6 * (1 + np.abs(velocity).max())
     kept = np.concatenate([[True], turns, [True]])
     return points[kept], when[kept]
-
-
-def _closest(points: FloatArray) -> float:
-    """The least distance between two points, px; infinite where there is only one."""
-    from scipy.spatial import cKDTree
-
-    if len(points) < 2:
-        return float("inf")
-    return float(cKDTree(points).query(points, k=2)[0][:, 1].min())

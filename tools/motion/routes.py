@@ -5,7 +5,7 @@ Frame: image pixels. Robots do not yet avoid each other.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -54,8 +54,17 @@ class NoRouteError(FleetError):
 
 def obstacles(contract: Contract, site: Site) -> BaseGeometry:
     """What robots have to drive around: targets no group of the contract stands on."""
-    solid = [site.solid(t, contract) for t in contract.solid_targets]
-    return shapely.union_all(np.asarray(solid, dtype=object)) if solid else Polygon()
+    return union(named_obstacles(contract, site))
+
+
+def named_obstacles(contract: Contract, site: Site) -> dict[str, BaseGeometry]:
+    """The same by the targets' ids."""
+    return {name: site.solid(name, contract) for name in contract.solid_targets}
+
+
+def union(regions: Mapping[str, BaseGeometry]) -> BaseGeometry:
+    """All regions as one; empty where there is none."""
+    return shapely.union_all(np.array([*regions.values()], dtype=object)) if regions else Polygon()
 
 
 def routes(

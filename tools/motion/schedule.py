@@ -165,7 +165,8 @@ def passages(cells: Cells, pairs: Indices, times: Schedule) -> Passages:
     """
     one, other = pairs.T
     forward = times.leave[one] <= times.enter[other]
-    first, waiting = np.where(forward, one, other), np.where(forward, other, one)
+    first = np.asarray(np.where(forward, one, other), dtype=np.intp)
+    waiting = np.asarray(np.where(forward, other, one), dtype=np.intp)
     rank = np.lexsort((cells.enter[waiting], cells.robot[first], cells.robot[waiting]))
     first, waiting = first[rank], waiting[rank]
     who, whom = cells.robot[waiting], cells.robot[first]

@@ -24,6 +24,7 @@ class Carts:
     """Robots that go on driving by themselves until they are held."""
 
     name, real, radius, speed, turns = "example", True, 5.0, SPEED, False
+    tracking_error = 0.1
 
     def __init__(self, width: float) -> None:
         self.stopped = False

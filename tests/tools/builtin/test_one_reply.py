@@ -68,7 +68,8 @@ def test_how_robots_were_assigned_is_said_only_where_it_is_approximate(
     begin: Begin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert "assignment" not in str(propose(begin()).data["notes"])
-    monkeypatch.setattr("formup.tools.geometry.assignment.EXACT", 3)
+    for module in ("geometry.assignment", "builtin.motions"):
+        monkeypatch.setattr(f"formup.tools.{module}.EXACT", 3)
     work = begin()
     data = propose(work).data
     text = data["notes"][-1]

@@ -1,0 +1,118 @@
+"""How the robots of a plan would get to their places, planned and certified before it stands."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import FleetError, ToolError
+from ..fleet.assigning import assign_robots
+from ..fleet.protocol import Fleet, FleetSizeError, Pose, body_radius, points_of
+from ..formation.encounters import Encounter, encounters_of
+from ..formation.plan import Plan
+from ..geometry.assignment import EXACT
+from ..geometry.outline import FloatArray
+from ..motion.checking import MotionVerdict
+from ..motion.planning import Ground, NoOrderError, Team, assigned, plan_motion
+from ..motion.routes import named_obstacles
+from ..world import World
+
+
+@dataclass(frozen=True)
+class Going:
+    """Who of a fleet takes which place, and how all of them get there.
+
+    Attributes:
+        robots: ids; robot i takes place i.
+        gap: share of the summed squared ways another assignment could save at most; None where
+            the least was found.
+        paths: (k, 2) px by id; none where there is no way, as a deployment says.
+        verdict: of the motion; None where there is none.
+        radius: of a body, px.
+    """
+
+    robots: tuple[str, ...]
+    gap: float | None
+    paths: dict[str, FloatArray]
+    verdict: MotionVerdict | None
+    radius: float
+
+
+def going(
+    world: World,
+    plan: Plan,
+    fleet: Fleet,
+    poses: tuple[Pose, ...],
+    taking: Sequence[str | None] | None,
+) -> Going:
+    """How robots get to a plan's places from where they were seen.
+
+    Args:
+        taking: the robot that keeps each place, None for one more; left out, robots are
+            interchangeable.
+
+    Raises:
+        ToolError: too few robots, or those that keep places stand in each other's way.
+    """
+    points, contract = plan.formation.points, plan.formation.contract
+    ground = Ground(named_obstacles(contract, world.site(contract)), world.site(contract))
+    radius = body_radius(fleet, contract, points)
+    robots, gap = _who(poses, points, taking, ground, radius)
+    at = {pose.id: (pose.x, pose.y) for pose in poses}
+    team = Team(
+        ids=robots,
+        starts=np.array([at[robot] for robot in robots]),
+        radius=radius,
+        speed=fleet.speed,
+        error=fleet.tracking_error,
+        idle={robot: place for robot, place in at.items() if robot not in set(robots)},
+    )
+    try:
+        motion, robots, verdict = plan_motion(team, points, ground, interchangeable=taking is None)
+    except NoOrderError as error:
+        if taking is None:
+            return Going(robots, gap, {}, None, radius)
+        raise ToolError(
+            f"Nothing was changed: {error} Proposed anew, robots share the places among themselves."
+        ) from None
+    except FleetError:  # no way to a place: a deployment says so
+        return Going(robots, gap, {}, None, radius)
+    return Going(robots, gap, dict(motion.paths), verdict, radius)
+
+
+def met_by(world: World, plan: Plan, found: Going | None) -> tuple[Encounter, ...]:
+    """The other things that robots of a plan stand on or, on their ways, drive over."""
+    site = world.site(plan.formation.contract)
+    if found is None:
+        return encounters_of(plan, site, {}, plan.formation.contract.robot_radius)
+    return encounters_of(plan, site, found.paths, found.radius)
+
+
+def _who(
+    poses: tuple[Pose, ...],
+    points: FloatArray,
+    taking: Sequence[str | None] | None,
+    ground: Ground,
+    radius: float,
+) -> tuple[tuple[str, ...], float | None]:
+    """Who takes which place, and what another assignment could save."""
+    try:
+        if taking is None:
+            return _interchangeable(poses, points, ground, radius)
+        new = [i for i, robot in enumerate(taking) if robot is None]
+        free = tuple(pose for pose in poses if pose.id not in taking)
+        found = _interchangeable(free, points[new], ground, radius)[0] if new else ()
+    except FleetSizeError as error:
+        raise ToolError(str(error), "too_many_robots") from None
+    more = iter(found)
+    return tuple(next(more) if robot is None else robot for robot in taking), None
+
+
+def _interchangeable(
+    poses: tuple[Pose, ...], points: FloatArray, ground: Ground, radius: float
+) -> tuple[tuple[str, ...], float | None]:
+    if len(poses) > EXACT or len(poses) < len(points):
+        found = assign_robots(poses, points)
+        return found.robots, found.gap
+    rows = assigned(points_of(poses), points, ground, radius)
+    return tuple(poses[int(i)].id for i in rows), None
