@@ -13,6 +13,7 @@ from ..tools.formation.contract import Contract
 from ..tools.formation.encounters import notes_of
 from ..tools.formation.plan import Plan, Shortfall
 from ..tools.formation.units import in_metres, with_metres
+from ..tools.motion.checking import MotionVerdict
 from ..tools.outline_field import rounded_rings
 from ..tools.perception.referring.attributes import Candidate
 from ..tools.perception.target_prompt import Box
@@ -78,6 +79,7 @@ class Report(BaseModel):
     positions: tuple[tuple[float, float], ...] | None = None
     headings_deg: tuple[float | None, ...] | None = None
     verdict: Verdict | None = None
+    motion: MotionVerdict | None = None
     partial: Shortfall | None = None
     arrival: Arrival | None = None
     metric: dict[str, Any] | None = None
@@ -189,6 +191,7 @@ def make_report(
         headings_deg=(plan.formation.headings_deg or None) if plan else None,
         robots=plan.formation.robots or None if plan else None,
         verdict=plan.verdict if plan else None,
+        motion=world.plans[plan.id].motion if plan else None,
         partial=plan.partial if plan else None,
         arrival=arrival,
         metric=metric_data(world, plan, arrival),

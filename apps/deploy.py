@@ -143,6 +143,7 @@ def _report(plan: Plan, world: World, stored: StoredWorld, films: dict[str, str 
         robots=plan.formation.robots or None,
         positions=plan.formation.positions,
         verdict=plan.verdict,
+        motion=world.plans[plan.id].motion,
         partial=plan.partial,
         arrival=arrival,
         metric=metric_data(world, plan, arrival),

@@ -12,6 +12,7 @@ from ..agent.report import Report
 from ..tools.formation.checking.verdict import Measure
 from ..tools.formation.contract import MIN_SPACING, Group
 from ..tools.formation.units import length_text
+from ..tools.motion.checking import MotionVerdict
 from .terminal import say, styled, under
 
 LONGEST = 600
@@ -226,7 +227,22 @@ def certificate_lines(report: Report) -> list[tuple[str, str]]:
     lines += [("finding", finding.sentence) for finding in verdict.findings[:MAX_ROWS]]
     if len(verdict.findings) > MAX_ROWS:
         lines.append(("", f"and {len(verdict.findings) - MAX_ROWS} more findings"))
+    if report.motion is not None:
+        lines.append(("motion", _motion(report.motion, _scale(report))))
     return lines + [("note", note) for note in verdict.notes if note not in report.message]
+
+
+def _motion(motion: MotionVerdict, scale: float | None) -> str:
+    """What the certificate of a motion says."""
+    if not motion.certified:
+        return f"not certified: {motion.findings[0].sentence}"
+    words = [f"{motion.makespan_s:.1f} s, longest way {length_text(motion.longest_px, scale)}"]
+    if motion.separation_px is not None:
+        words.append(f"robots at least {length_text(motion.separation_px, scale)} apart")
+        words.append(f"{length_text(motion.demanded_px, scale)} needed")
+    if motion.clearance_px is not None:
+        words.append(f"{length_text(motion.clearance_px, scale)} off obstacles")
+    return ", ".join(words)
 
 
 def _arrival(console: Console, report: Report) -> None:

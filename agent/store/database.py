@@ -17,6 +17,7 @@ from pydantic_core import from_json, to_json
 from sqlalchemy import Connection, delete, func, insert, select, text, update
 from sqlalchemy.event import listen
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
+from sqlalchemy.pool import ConnectionPoolEntry
 
 from ...tools.errors import StorageError
 from .folder import KINDS
@@ -118,7 +119,7 @@ class DatabaseStore:
 
     def close(self) -> None:
         """See `Store.close`; what a thread still reads with is closed when it has done."""
-        listen(self._engine.pool, "checkin", lambda _, record: record.invalidate())
+        listen(self._engine.pool, "checkin", _invalidate)
         self._engine.dispose()
 
     def lock(self, name: str) -> ExitStack | None:
@@ -301,6 +302,10 @@ class DatabaseFiles:
 
     def _named(self, sha256: str) -> tuple[Any, Any]:
         return FILES.c.session == self._session, FILES.c.sha256 == sha256
+
+
+def _invalidate(_: object, record: ConnectionPoolEntry) -> None:
+    record.invalidate()
 
 
 def _put(connection: Connection, session: str, data: bytes) -> None:

@@ -377,8 +377,7 @@ def _with_clearance(group: Group, clearance: float | None) -> Group:
 
 
 def _sampled(world: World, samples: tuple[str, ...]) -> Any:
-    unknown = [s for s in samples if s not in world.samples]
-    if unknown:
+    if unknown := [s for s in samples if s not in world.samples]:
         known = ", ".join(world.samples) or "none yet"
         raise ToolError(f"There is no sample {unknown[0]!r}. Samples: {known}.")
     return np.concatenate([np.asarray(world.samples[s]) for s in samples] or [np.empty((0, 2))])

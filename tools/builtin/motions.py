@@ -72,9 +72,8 @@ def going(
     except NoOrderError as error:
         if taking is None:
             return Going(robots, gap, {}, None, radius)
-        raise ToolError(
-            f"Nothing was changed: {error} Proposed anew, robots share the places among themselves."
-        ) from None
+        why = f"{error} Asked for anew, robots share the places among themselves."
+        raise ToolError(f"Nothing was changed: {why}", "edit", findings=[why]) from None
     except FleetError:  # no way to a place: a deployment says so
         return Going(robots, gap, {}, None, radius)
     return Going(robots, gap, dict(motion.paths), verdict, radius)

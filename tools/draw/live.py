@@ -148,7 +148,8 @@ class Ground:
         cut = np.clip(np.round(area / scale), 1, whole).astype(int)
         low = np.clip(np.round(self._centre - cut / 2), 0, whole - cut).astype(int)
         self._centre = low + cut / 2
-        part, origin = part_of(self._picture, (*low.tolist(), *(low + cut).tolist()))
+        (x0, y0), (x1, y1) = low, low + cut
+        part, origin = part_of(self._picture, (float(x0), float(y0), float(x1), float(y1)))
         long = max(int(cut.max() * min(scale, float((area / cut).min()))), 1)
         shown = np.array(shown_size(part, long))
         left, top = ((area - shown) // 2 + (0, BAR)).tolist()
@@ -176,7 +177,8 @@ class Ground:
     @property
     def look(self) -> tuple[float, ...]:
         """Which part of the picture is looked at."""
-        return (*self._centre.tolist(), self._magnified)
+        x, y = map(float, self._centre)
+        return x, y, self._magnified
 
     def pan(self, by: tuple[float, float]) -> None:
         """Move the picture by so many px of the page."""

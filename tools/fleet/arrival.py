@@ -30,6 +30,7 @@ class Arrival(Value):
         residual_px: distance of observed to requested.
         heading_residual_deg: of observed to requested headings; empty where none were requested.
         corrections: how many times robots were sent again after the first drive.
+        separation_px: least distance of two robots that was seen on the way; None for one robot.
         track: hash of the file that holds where they were on their way.
     """
 
@@ -46,6 +47,7 @@ class Arrival(Value):
     heading_residual_deg: tuple[float | None, ...] = ()
     tolerance_px: float
     corrections: int
+    separation_px: float | None = None
     track: str | None = None
 
 

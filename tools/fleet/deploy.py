@@ -18,7 +18,6 @@ from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
 from ..motion.planning import Ground, Team, plan_motion
 from ..motion.routes import named_obstacles
-from ..tool import in_thread
 from .arrival import Arrival, Deployment, Ended, Track
 from .getting_on import GettingOn, nearest_spare, said_of, said_of_replaced
 from .protocol import (
@@ -34,6 +33,7 @@ from .protocol import (
     body_radius,
     points_of,
 )
+from .supervisor import Supervisor
 
 CORRECTIONS = 5
 TRIES = 2
@@ -162,6 +162,7 @@ class _Drive:
         self._tried: Counter[str] = Counter()
         self._failed: dict[str, str | None] = {}  # and who took their place
         self._waiting: dict[str, str] = {}
+        self._demanded, self._least = 0.0, math.inf
 
     async def run(self, starting: Callable[[], Awaitable[None]] | None) -> Deployment:
         if len(set(self._robots)) != len(self._goals):
@@ -195,14 +196,18 @@ class _Drive:
         """Drive until the robots are there, or none has got on for a while; then see to those."""
         failing: Sequence[str] = ()
         on, self._waiting = GettingOn(motion), {}
+        watched = Supervisor(self._demanded, self._fleet.tracking_error)
         try:
             async with aclosing(self._fleet.drive(motion)) as moving:
                 async for poses in moving:
                     self._saw(poses)
+                    if not watched.saw(self._points()):
+                        break  # all stand, and go on from where they are
                     if not on.saw(self._poses):
                         failing, self._waiting = on.stuck(), on.waiting()
                         break
             await self._observe()
+            self._least = min(self._least, watched.least)
         except RobotsFailedError as error:
             gone = set(error.ids) - set(self._failed)
             if not gone or not all(self._replace(robot) for robot in gone):
@@ -305,9 +310,10 @@ class _Drive:
             error=fleet.tracking_error,
             idle={pose.id: (pose.x, pose.y) for pose in self._idle()},
         )
-        motion, _, verdict = await in_thread(
+        motion, _, verdict = await asyncio.to_thread(
             lambda: plan_motion(team, goals, ground, interchangeable=False)
         )
+        self._demanded = verdict.demanded_px
         if not verdict.certified:
             raise FleetError(f"{verdict.findings[0].sentence} No robot is driven like that.")
         looks = zip(self._robots, self._headings, strict=False)
@@ -351,6 +357,7 @@ class _Drive:
             heading_residual_deg=self._heading_residual(),
             tolerance_px=round(self._tolerance, 3),
             corrections=corrections,
+            separation_px=None if math.isinf(self._least) else round(self._least, 3),
         )
         track = Track(self._robots, np.stack([*self._frames, points]))
         return Deployment(arrival, tuple(self._poses.values()), track)

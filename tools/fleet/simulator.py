@@ -239,7 +239,7 @@ class Simulator:
         turn = _wrapped(np.arctan2(aim[:, 1], aim[:, 0]) - seen.headings)
         turn = np.where(settled, np.nan_to_num(_wrapped(seen.looks - seen.headings)), turn)
         turn[~settled & (_norms(aim) < NEAR / 4)] = 0.0
-        about = _braking(abs(turn) * radius, self._push, self._smoothing) * np.sign(turn)
+        about = _braking(np.abs(turn) * radius, self._push, self._smoothing) * np.sign(turn)
         about = np.clip(about, -most / 2, most / 2)
         before = seen.rates[:, 1] * radius
         about = np.clip(about, before - change, before + change)

@@ -48,8 +48,7 @@ def routes_off(
     Raises:
         NoRouteError: a goal is walled off by obstacles and robots that stay.
     """
-    paths: dict[int, FloatArray] = {}
-    frame = site.frame(radius)
+    paths, frame = dict[int, FloatArray](), site.frame(radius)
     near = np.concatenate([starts, goals]) if ends is None else ends
 
     def route(robots: Indices, things: Sequence[Other], share: float) -> Indices:
@@ -58,10 +57,9 @@ def routes_off(
         left = np.array(grown, dtype=object)
         around, walled = solid, robots[:0]
         while len(robots):
+            pair = starts[robots], goals[robots]
             try:
-                ways = routes(
-                    starts[robots], goals[robots], around, radius, frame, idle=idle, ends=near
-                )
+                ways = routes(*pair, around, radius, frame, idle=idle, ends=near)
             except NoRouteError as error:
                 if around is solid:
                     raise

@@ -4,7 +4,7 @@ Shares nothing with the planner: closest approaches are exact, from the times of
 the order of passage keeps robots apart when they are late is checked at points along the paths.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
 import numpy as np
@@ -220,11 +220,16 @@ def _in_passing(way: LineString, region: BaseGeometry, radius: float) -> float:
     goes out or in by nearly the shortest way.
     """
     least, body = np.inf, region.buffer(radius - ROUNDING)
-    for part in shapely.get_parts(shapely.intersection(way, body)):
+    parts: Iterable[BaseGeometry] = shapely.get_parts(shapely.intersection(way, body))
+    for part in parts:
         if part.length < ROUNDING:
             continue
         near = float(region.distance(part))
-        ends = [end for end in way.boundary.geoms if part.distance(end) < ROUNDING]
+        ends = [
+            end
+            for end in map(shapely.Point, (way.coords[0], way.coords[-1]))
+            if part.distance(end) < ROUNDING
+        ]
         out = sum(float(body.boundary.distance(end)) for end in ends)
         allowed = min((float(region.distance(end)) for end in ends), default=np.inf)
         if near < AS_NEAR * allowed or part.length > DETOUR * (out + radius):
@@ -259,7 +264,7 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
             sentence=f"Robots {ids[i]} and {ids[j]} could touch if one of them were late: nothing "
             "says which goes first.",
         )
-        for i, j in loose
+        for i, j in loose.astype(int).tolist()
     )
 
 

@@ -105,7 +105,7 @@ def matched_anew(found: Matched, starts: FloatArray, ways: Ways, apart: float) -
         if better is found:
             break
         found = better
-    return _swapped(found, starts, ways, apart)
+    return _pairs_exchanged(found, starts, ways, apart)
 
 
 def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
@@ -146,7 +146,7 @@ def _worth(found: Matched) -> int:
 
 def _by_order(found: Matched, circle: Indices) -> tuple[list[int], list[int]]:
     """Goals of a circle as they are filled, and those whose robots, as they leave, take them."""
-    length = {int(i): float(arc_lengths(found.paths[i])[-1]) for i in circle}
+    length = {i: float(arc_lengths(found.paths[i])[-1]) for i in map(int, circle)}
     leaving = _sorted(found.leaving, length)
     filled = _sorted(found.arriving, {i: -way for i, way in length.items()})
     return filled, leaving
@@ -197,7 +197,7 @@ def _past(
     return match(found.robots, paths, apart)
 
 
-def _swapped(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
+def _pairs_exchanged(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
     """Exchange goals of pairs in circles while that leaves fewer demands in circles."""
     tried: set[tuple[int, ...]] = set()
     while len(tried) < SWAPS:

@@ -27,6 +27,9 @@ EXACT = 1 - 1e-9
 """Distances are kept but for so much, which rounding takes."""
 CROWD, COARSEST = 100, 1.8
 """From so many robots on paths are cut less finely, up to cells of so many radii."""
+ROOMY, MOST_ROOM = 0.5, 8.0
+"""Robots stay apart by this share of how far starts and goals are, at most so many radii, where
+they can."""
 ALONG = 1e-9
 """Times and places that differ by less are the same."""
 
@@ -42,8 +45,7 @@ class NoOrderError(FleetError):
         named = ", ".join(ids[:12]) + (", ..." if len(ids) > 12 else "")
         super().__init__(
             f"Robots {named} stand in each other's way: none of them can go first if each is to "
-            "have exactly its own place. Let them share the places among themselves, or move one "
-            "of them away first."
+            "have its own place."
         )
         self.ids = tuple(ids)
 
@@ -98,12 +100,11 @@ def plan_motion(
         NoRouteError: no path leads to a goal.
         NoOrderError: robots stand in each other's way.
     """
-    apart = separation(team.starts, goals, team.radius + team.error)
-    found = _matched(team, goals, ground, apart, interchangeable)
+    found, apart = _matched(team, goals, ground, interchangeable)
     ids = tuple(team.ids[int(i)] for i in found.robots)
     if found.circles:
         raise NoOrderError([ids[int(i)] for i in np.concatenate(found.circles)])
-    cells, pairs = _cut(found.paths, apart, team.radius)
+    cells, pairs = _cut(found.paths, apart)
     lengths = cells.leave[cells.goals]
     try:
         near = Near.of(pairs, len(cells.robot))
@@ -143,9 +144,13 @@ def assigned(starts: FloatArray, goals: FloatArray, ground: Ground, radius: floa
 
 
 def _matched(
-    team: Team, goals: FloatArray, ground: Ground, apart: float, interchangeable: bool
-) -> Matched:
-    """Robots, their goals and their ways, without circles where any way around them is found."""
+    team: Team, goals: FloatArray, ground: Ground, interchangeable: bool
+) -> tuple[Matched, float]:
+    """Robots, their goals and their ways, without circles where any way around them is found.
+
+    Returns:
+        them, and how far apart they can stay, px.
+    """
     ends, radius = np.concatenate([team.starts, goals]), team.radius + team.error
     standing = np.array([*team.idle.values()]).reshape(-1, 2)
 
@@ -155,17 +160,22 @@ def _matched(
             starts, ends_of_them, ground.solid, ground.site, radius, idle=idle, ends=ends
         )
 
-    everyone = np.arange(len(goals))
-    found = match(everyone, ways(team.starts, goals, NOBODY), apart)
-    if interchangeable and found.circles:
-        found = matched_anew(found, team.starts, ways, apart)
-    return rerouted(found, ways, apart) if found.circles else found
+    everyone, straight = np.arange(len(goals)), ways(team.starts, goals, NOBODY)
+    nearest = min(min_spacing(team.starts), min_spacing(goals))
+    roomy = min(ROOMY * nearest, MOST_ROOM * team.radius)
+    for apart in (roomy, separation(team.starts, goals, radius)):
+        found = match(everyone, straight, apart)
+        if interchangeable and found.circles:
+            found = matched_anew(found, team.starts, ways, apart)
+        if apart >= 2 * radius * EXACT and not found.circles:
+            return found, apart
+    return rerouted(found, ways, apart), apart
 
 
-def _cut(paths: Sequence[FloatArray], apart: float, radius: float) -> tuple[Cells, Indices]:
+def _cut(paths: Sequence[FloatArray], apart: float) -> tuple[Cells, Indices]:
     """Paths in cells, and the pairs of cells that are too near."""
     coarse = min(max((len(paths) / CROWD) ** 0.5, 1.0), COARSEST)
-    step = min(coarse * radius, 0.9 * apart)
+    step = min(coarse / 2, 0.9) * apart
     cells = cut(paths, step)
     return cells, conflicts(cells, apart, step)
 
