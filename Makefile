@@ -69,9 +69,10 @@ wordings: .venv/.ready-dev
 	$(BIN)/python -m formup.evals.wordings
 
 # The tools, placing and checking, who takes which place, cages, each beside the bare library calls;
-# long sessions.
+# long sessions; the simulator, beside pyrvo where that is installed.
 bench: .venv/.ready-dev
-	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions bench_turns bench_big; do \
+	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions bench_turns bench_big \
+	  bench_simulator; do \
 	  echo "== $$what"; $(BIN)/python -m formup.benchmarks.$$what || exit 1; echo; \
 	done
 

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from contextlib import ExitStack
+from urllib.parse import quote
 
 from ..tools.fleet.protocol import Fleet, FleetBusyError
 from ..tools.tool import to_its_end
@@ -30,15 +31,15 @@ class FleetOwner:
         Raises:
             FleetBusyError: another process has it.
         """
-        who = ""
+        who, locked = "", f"fleet.{quote(name, safe='')}"  # a file's name has slashes
         for _ in range(TRIES):
             if name in self._simulated:
                 return opened()
-            who = await to_its_end(lambda: self._store.holder(f"fleet.{name}"))
+            who = await to_its_end(lambda: self._store.holder(locked))
             mine = self._fleets.get(name)
             if mine is not None and who == PROCESS:
                 return mine
-            lock = await to_its_end(lambda: self._store.lock(f"fleet.{name}"))
+            lock = await to_its_end(lambda: self._store.lock(locked))
             if lock is None and mine is not None and not who:
                 return mine  # Windows reads no locked file
             if lock is None:  # perhaps just for as long as a simulated one is opened

@@ -188,7 +188,7 @@ Threshold = Annotated[
 DescriptorName = Annotated[
     str, typer.Option("--descriptor", help="Shapes as edges, edges+vertices or matrix.")
 ]
-FleetName = Annotated[str, typer.Option("--fleet", help="Which robots move.")]
+FleetName = Annotated[str, typer.Option("--fleet", help="Which robots move: NAME, or a YAML FILE.")]
 Starts = Annotated[
     Path | None, typer.Option("--starts", help="Starting positions: x,y a line, or JSON.")
 ]

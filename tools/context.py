@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 from .errors import InputError, StorageError, ToolError
+from .fleet.described import fleet_named
 from .fleet.protocol import Fleet, Pose
-from .fleet.registry import FLEETS
 from .formation.plan import Plan
 from .formation.units import check_scale
 from .formation.value import Value
@@ -88,7 +88,7 @@ def check_settings(settings: Settings) -> None:
         )
     if settings.detector.startswith(BESIDE) and not isinstance(detector, Finder):
         raise InputError(f"{BESIDE} goes with a detector that knows words; got {detector.name!r}.")
-    FLEETS.load(settings.fleet)
+    fleet_named(settings.fleet)
 
 
 class Artefacts(Protocol):

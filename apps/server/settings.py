@@ -35,7 +35,8 @@ class ServerSettings(BaseModel):
         default="offline", description="who decides, as PROVIDER:NAME; several split by commas"
     )
     fleet: str = Field(
-        default="simulated", description="the robots of new sessions: a fleet's name"
+        default="simulated",
+        description="the robots of new sessions: a fleet's name, or a YAML file",
     )
     detector: str = Field(default="standout", description="how new sessions find things")
     segmenter: str = Field(default="grabcut", description="how new sessions make outlines")

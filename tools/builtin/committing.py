@@ -221,8 +221,7 @@ async def deploy(
     }
     if not moved:
         data["already_there"] = True
-    elif arrival.reason is not None:
-        data["reason"] = arrival.reason
+    data |= {"reason": arrival.reason} if arrival.reason and moved else {}
     message = _with_observed(tell, arrival, world) if arrival.arrived else None
     data = with_metres(data, world.metres_per_pixel)
     return ToolResult(data, world=world, message=message)
@@ -358,8 +357,8 @@ def _with_observed(tell: str | None, arrival: Arrival, world: World) -> str | No
     count, worst = len(arrival.observed), max(arrival.residual_px)
     robots = "The robot was" if count == 1 else f"All {count} robots were"
     within = length_text(max(worst, 0.1), world.metres_per_pixel)
-    said = f"{tell.strip()} {robots} observed within {within} of the plan."
-    return f"{said} {arrival.reason or ''}".rstrip()
+    told = f"{robots} observed within {within} of the plan."
+    return " ".join(filter(None, [tell.strip(), told, arrival.reason]))
 
 
 def _held_to(contract: Contract, settings: Settings) -> Contract:

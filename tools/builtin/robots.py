@@ -12,8 +12,8 @@ from ..context import Context
 from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
 from ..fleet.arrival import Arrival, Deployment, Track
 from ..fleet.deploy import ARRIVED_DEG, MAX_AGE, check_turns, deploy, heading_residuals
+from ..fleet.described import fleet_named
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
-from ..fleet.registry import FLEETS
 from ..formation.checking.instruction_doubts import overruled
 from ..formation.contract import Contract
 from ..formation.encounters import notes_of
@@ -191,7 +191,7 @@ async def _team(context: Context, contract: Contract, taking: Sequence[str | Non
 
 def _opened(name: str, request: FleetRequest, others: Sequence[Other]) -> Fleet:
     """A fleet; robots that are set down stand off other things too where there is room."""
-    load = FLEETS.load(name)
+    load = fleet_named(name)
     if others:
         solid = shapely.union_all([request.solid, *(thing.region for thing in others)])
         with suppress(InputError):

@@ -60,6 +60,8 @@ async def check_drive(fleet: Fleet, way: float, tolerance: float) -> None:
     driven = [poses async for poses in fleet.drive(motion)]
     frames = [before, *driven, await fleet.observe()]
     ids = [pose.id for pose in before]
+    assert fleet.radius > 0, f"its robots have the radius {fleet.radius}, which must be above 0"
+    assert fleet.speed > 0, f"its robots have the speed {fleet.speed}, which must be above 0"
     assert len(ids) >= 2, f"the checks need two robots, there are {len(ids)}"
     assert len(set(ids)) == len(ids), f"ids are not unique: {ids}"
     for poses in frames:

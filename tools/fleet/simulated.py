@@ -2,9 +2,13 @@
 
 import math
 from collections.abc import AsyncGenerator, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from ..errors import InputError
+from .described import described
 from .pace import Pace
 from .physics import Physics
 from .protocol import (
@@ -27,6 +31,7 @@ SPEED_SHARE = 0.2
 """Share of the picture's diagonal a robot drives in a second where nobody says how fast it is."""
 FULL_SPEED_S = 0.25
 """Seconds in which a robot comes to its speed where nobody says."""
+RADIUS = 3.0
 SLIP = 0.02
 """A robot makes between 1 - SLIP and all of what it is told: wheels slip, odometry drifts."""
 
@@ -51,7 +56,7 @@ class SimulatedFleet:
         poses: Sequence[Pose],
         *,
         speed: float = 0.0,
-        radius: float = 3.0,
+        radius: float = RADIUS,
         physics: Physics | None = None,
         seed: int = 0,
     ) -> None:
@@ -143,13 +148,41 @@ def open_fleet(request: FleetRequest) -> SimulatedFleet:
 
     Raises:
         FleetSizeError: more robots than are simulated.
-        InputError: starts where no robot can stand, or no room for all.
+        InputError: starts where no robot can stand, no room for all, or a file that describes no
+            fleet or faults of robots that there are not.
     """
     if request.robots > MAX_ROBOTS:
         raise FleetSizeError(
             f"{request.robots} robots can be placed and certified, but motion is simulated only "
             f"up to {MAX_ROBOTS} so far: the plan stands, nothing was moved."
         )
-    speed = SPEED_SHARE * math.hypot(*request.size)
-    radius = request.radius or 3.0
-    return SimulatedFleet(set_down(request), speed=speed, radius=radius, seed=request.seed)
+    speed, radius = SPEED_SHARE * math.hypot(*request.size), request.radius or RADIUS
+    path = request.config
+    if path is None:
+        return SimulatedFleet(set_down(request), speed=speed, radius=radius, seed=request.seed)
+    told = described(path)
+    speed = told.given.get("speed", speed)
+    usual = {"speed": speed, "acceleration": speed / FULL_SPEED_S, "radius": radius}
+    physics = told.physics(usual)
+    if "radius" in told.given:
+        request = replace(request, radius=physics.radius)
+    poses = set_down(request)
+    _check_named(path, physics, [pose.id for pose in poses])
+    fleet = SimulatedFleet(poses, physics=physics, seed=request.seed)
+    fleet.pace.speed = 1.0 if told.pace == "real" else None
+    return fleet
+
+
+def _check_named(path: Path, physics: Physics, ids: Sequence[str]) -> None:
+    """Refuse faults of robots that there are not.
+
+    Raises:
+        InputError: naming them.
+    """
+    faults = (*physics.stuck, *physics.lost, *physics.pushes)
+    unknown = sorted({fault.robot for fault in faults} - set(ids))
+    if unknown:
+        raise InputError(
+            f"{path} has faults of robot {', '.join(unknown)}; the fleet has {len(ids)} robots, "
+            f"{ids[0]} to {ids[-1]}."
+        )

@@ -23,7 +23,7 @@ KEPT = 0.1
 """How far from its path a robot may be taken by a bend that it does not stop at, px."""
 SETTLED = 0.25
 """A robot has come to its end within so many px, beside the noise."""
-CALM = 0.3
+CALM = 0.1
 """Seconds over which robots make up for being off their path where sensing is noisy."""
 LOOK_AHEAD = 4
 """Steps ahead on its path that a robot with wheels steers for."""
@@ -38,18 +38,21 @@ Mask = NDArray[np.bool_]
 
 
 def tracking_error(physics: Physics) -> float:
-    """How far from its path a robot may come that nothing pushes, px."""
-    noise, smoothing = physics.noise, _smoothing(physics)
-    drift = noise.actuation * physics.speed * math.sqrt(PERIOD * smoothing)
-    if physics.drive == "differential":
-        drift *= 1 + physics.speed * smoothing / physics.radius / 4
+    """How far from its path a robot may come that nothing pushes, px.
+
+    A drift of noise is made up for over some seconds, in which it adds up as a random walk does.
+    """
+    noise, wheels = physics.noise, physics.drive == "differential"
+    kept = (KEPT + NEAR) * (2 if wheels else 1) * (2 if physics.drop_outs else 1)
+    seconds = PERIOD * (_smoothing(physics) + physics.delay)
+    drift = noise.actuation * physics.speed * math.sqrt(seconds) * (1.5 if wheels else 1.0)
     late = (noise.actuation + physics.slip) * physics.speed * physics.delay
-    return KEPT + NEAR + SPREAD * (noise.sensing + drift) + late
+    return kept + SPREAD * (noise.sensing + drift) + late
 
 
 def _smoothing(physics: Physics) -> float:
     """Seconds over which robots make up for being off their path."""
-    return PERIOD + 2 * physics.delay + (CALM if physics.noise.sensing else 0.0)
+    return PERIOD + (CALM if physics.noise.sensing else 0.0)
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class _Seen:
         room: px that they may still go along their paths.
         along: unit vectors of their legs, zero at the end.
         off: (n, 2) from where they should be to where they are, px.
-        aims: points of their paths that they steer for.
+        aims: points on the lines of their legs that they steer for.
         looks: how they are to look at the end; nan for any way.
     """
 
@@ -182,27 +185,24 @@ class Simulator:
     def _seen(self, following: Following) -> _Seen:
         rows = self._rows
         points, headings, rates = self.sensed[rows], self.headings[rows], self._told
+        queued = np.zeros(len(rows))
+        for told in self._queue:  # what they are told now takes effect after that
+            points, headings = self._carried(points, headings, told)
+            queued += PERIOD * (abs(told[:, 0]) if self._wheels else _norms(told))
         fresh = self.seen[rows] >= self.now - 1.5 * PERIOD
-        progress = following.advance(points, self._progress)
+        near = NEAR + 2 * self.physics.noise.sensing
+        ahead = following.advance(points, self._ahead, near)
+        self._ahead = ahead = np.where(fresh, ahead, self._ahead)
+        progress = np.maximum(self._progress, ahead - queued)
         self._progress = np.where(fresh, progress, self._progress)
-        if self._queue:
-            for told in self._queue:
-                points, headings = self._carried(points, headings, told)
-            ahead = following.advance(points, np.maximum(self._ahead, self._progress))
-            self._ahead = np.where(fresh, ahead, self._ahead)
-        else:
-            self._ahead = self._progress
-        ahead = self._ahead
-        along, ends = following.legs(ahead)
-        off = points - following.at(ahead)
+        along, off = following.directions(ahead), points - following.at(ahead)
         room = np.minimum(
             following.limits(self._progress) - ahead, following.room(ahead, self._stops)
         )
         room = np.maximum(room - np.einsum("ij,ij->i", off, along), 0.0)
-        reach = _norms(rates) if not self._wheels else rates[:, 0]
-        reach = np.maximum(LOOK_AHEAD * PERIOD * reach, 2 * self.physics.radius)
-        left = np.einsum("ij,ij->i", ends - following.at(ahead), along)
-        aims = following.at(ahead) + along * np.minimum(reach, left)[:, None]
+        reach = abs(rates[:, 0]) * LOOK_AHEAD * PERIOD
+        reach = np.maximum(reach, 2 * self.physics.radius)
+        aims = following.at(ahead) + along * reach[:, None]
         return _Seen(points, headings, rates, room, along, off, aims, self._looks)
 
     def _mark(self, seen: _Seen) -> None:
@@ -210,7 +210,8 @@ class Simulator:
         assert self._following is not None
         noise, off = self.physics.noise.sensing, _norms(seen.off)
         ended = self._progress >= self._following.lengths - EXACT
-        turned = np.isnan(seen.looks) | (abs(_wrapped(seen.looks - seen.headings)) <= LOOKING)
+        still = _wrapped(seen.looks - self.headings[self._rows])  # not as they will look
+        turned = np.isnan(still) | (abs(still) <= LOOKING)
         slow = _norms(seen.rates) <= self._push * PERIOD
         self._there &= off <= SETTLED + 2 * SPREAD * noise
         self._there |= ended & turned & slow & (off <= SETTLED + 3 * noise)
@@ -237,9 +238,11 @@ class Simulator:
         settled = ended & (size <= SETTLED + 3 * self.physics.noise.sensing)
         aim = np.where(ended[:, None], -seen.off, seen.aims - seen.points)
         turn = _wrapped(np.arctan2(aim[:, 1], aim[:, 0]) - seen.headings)
-        turn = np.where(settled, np.nan_to_num(_wrapped(seen.looks - seen.headings)), turn)
+        looks = np.where(np.isnan(seen.looks), seen.headings, seen.looks)
+        turn = np.where(settled, _wrapped(looks - seen.headings), turn)
         turn[~settled & (_norms(aim) < NEAR / 4)] = 0.0
-        about = _braking(np.abs(turn) * radius, self._push, self._smoothing) * np.sign(turn)
+        arc = np.asarray(abs(turn) * radius, dtype=float)
+        about = _braking(arc, self._push, self._smoothing) * np.sign(turn)
         about = np.clip(about, -most / 2, most / 2)
         before = seen.rates[:, 1] * radius
         about = np.clip(about, before - change, before + change)
@@ -342,7 +345,7 @@ def _braking(room: FloatArray, deceleration: float, step: float) -> FloatArray:
 
 def _norms(vectors: FloatArray) -> FloatArray:
     """Their lengths, (n,)."""
-    return np.hypot(vectors[:, 0], vectors[:, 1])
+    return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1]))
 
 
 def _ratio(a: FloatArray | float, b: FloatArray) -> FloatArray:

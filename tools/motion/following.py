@@ -96,18 +96,17 @@ class Following:
         """How far on each robot has to be able to stand, for the bends before it, (n,) px."""
         return stops[self._after(progress)] - self._base - progress
 
-    def legs(self, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Unit vectors along the legs that robots are on, (n, 2), and the legs' ends, (n, 2) px."""
-        after = self._after(progress)
-        along = self._directions[after - 1].copy()
+    def directions(self, progress: FloatArray) -> FloatArray:
+        """Unit vectors along the legs that robots are on, (n, 2); zero at the end."""
+        along = self._directions[self._after(progress) - 1]
         along[progress >= self.lengths - EXACT] = 0.0
-        return along, self._points[after]
+        return along
 
-    def advance(self, points: FloatArray, progress: FloatArray) -> FloatArray:
+    def advance(self, points: FloatArray, progress: FloatArray, near: float = NEAR) -> FloatArray:
         """How far along its path each robot seen at a point, (n, 2) px, is, (n,) px.
 
-        That is where the leg it is on comes nearest; a vertex within NEAR has been come to, and
-        the next leg is begun there. Nobody's progress goes back.
+        That is where the leg it is on comes nearest; vertices within `near` px have been come to,
+        and the next leg is begun there. Nobody's progress goes back.
         """
         progress, rows = progress.copy(), np.arange(len(progress))
         while len(rows):
@@ -116,7 +115,7 @@ class Following:
             begin, vertex = self._along[before] - base, self._along[after] - base
             ahead = points[rows] - self._points[before]
             way = begin + np.einsum("ij,ij->i", ahead, self._directions[before])
-            way = np.where(way >= vertex - NEAR, vertex, np.maximum(way, progress[rows]))
+            way = np.where(way >= vertex - near, vertex, np.maximum(way, progress[rows]))
             progress[rows] = way
             rows = rows[(way >= vertex - EXACT) & (vertex < self.lengths[rows] - EXACT)]
         return progress

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from formup.tools.builtin.robots import read_track
 from formup.tools.errors import InputError, ToolError
-from formup.tools.fleet.simulated import MAX_ROBOTS
 from formup.tools.formation.contract import Contract
 from formup.tools.formation.plan import Formation, Plan, make_plan
 from formup.tools.geometry.outline import make_outline
@@ -27,6 +26,9 @@ OUTLINE = make_outline([(120, 90), (200, 90), (200, 150), (120, 150)])
 BOX = Target(
     id="t1", label="box", box=OUTLINE.bounds, confidence=1.0, outline=OUTLINE, prompt="outline"
 )
+
+MOST = 1_000
+"""Robots that are simulated here."""
 
 
 @pytest.fixture
@@ -244,14 +246,17 @@ def test_a_plan_from_before_a_deployment_may_find_its_places_taken(work: "ToolCa
     assert work.call("deploy").data["arrived"]
 
 
-def test_more_robots_than_are_simulated_can_be_planned_only(work: "ToolCalls") -> None:
+def test_more_robots_than_are_simulated_can_be_planned_only(
+    work: "ToolCalls", monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("formup.tools.fleet.simulated.MAX_ROBOTS", MOST)
     grid = np.stack(np.meshgrid(np.arange(0, 318, 8), np.arange(0, 238, 8)), axis=-1)
-    positions = grid.reshape(-1, 2)[: MAX_ROBOTS + 1].tolist()
+    positions = grid.reshape(-1, 2)[: MOST + 1].tolist()
     group = {"relation": "shape", "robots": len(positions)}
     data = work.call("propose_formation", contract={"groups": [group]}, positions=positions).data
     assert data["certified"]
     formation = work.world.plan().plan.formation
-    assert (formation.robots, len(formation.positions)) == ((), MAX_ROBOTS + 1)
+    assert (formation.robots, len(formation.positions)) == ((), MOST + 1)
     with pytest.raises(ToolError, match="nothing was moved") as caught:
         work.call("deploy")
     assert caught.value.kind == "too_many_robots"

@@ -175,7 +175,18 @@ class OpenAfterClosing(SimulatedFleet):
         pass
 
 
+class HasNoBody(SimulatedFleet):
+    @property
+    def radius(self) -> float:
+        return 0.0
+
+    @radius.setter
+    def radius(self, radius: float) -> None:
+        pass
+
+
 BROKEN = [
+    (HasNoBody, "radius 0.0, which must be above 0"),
     (Reorders, "ids or their order"),
     (IgnoresAge, "that are too old must be refused"),
     (Silent, "not seen on its way"),
