@@ -42,6 +42,7 @@ from .session_start import prompt_facts, start_facts
 from .store.folder import FolderLog
 from .store.folder_store import FolderSession
 from .store.protocol import StoredSession
+from .wrappers.model_finder import asking, check_sees
 from .wrappers.telemetry import traced_model, traced_run, traced_tool
 from .wrappers.two_stages import offered, prompt_named, staged
 
@@ -140,8 +141,7 @@ class Agent:
             instruction: what, in the person's words.
             pointed: the things meant, if the person points.
             targets: the things meant, where they are measured already.
-            keep_out: what no robot may stand on or drive over: boxes and outlines as they are
-                drawn, things at points, candidates.
+            keep_out: what no robot may stand on or drive over.
             settings: what the person fixed.
             trace: a file, or a new session of a store, to write to as it goes: it can be resumed
                 and replayed from there, by default in another process.
@@ -156,6 +156,7 @@ class Agent:
         pointed = pointed_at(pointed, world := World.of(picture, targets=tuple(targets)))
         context = Context.of(picture, settings, world, services)
         check_turn(context, instruction, pointed)
+        self.check(context.settings)
         context = context.at(with_keep_outs(context, keep_out))
         context = replace(context, steps=(context.world.step,))
         begin, stored = None, FolderSession(trace) if isinstance(trace, Path) else trace
@@ -235,6 +236,7 @@ class Agent:
             context = in_new_picture(context, picture)
         pointed = pointed_at(pointed, context.world)
         check_turn(context, words, pointed)
+        self.check(context.settings)
         context = context.at(with_keep_outs(context, keep_out))
         messages = closed(run.outcome.messages, "No result: the person interrupted it, or went on.")
         async with reopened(run, show) as recorder:
@@ -331,12 +333,13 @@ class Agent:
         approved: Approval | None = None,
     ) -> Run:
         began, context = time.perf_counter(), left.context
+        asked = (self.model, self.library, self.limits.reply_seconds)
         traced = traced_run(self._tracer, self.model.name, messages)
-        with traced as describe:
+        with traced as describe, asking(context, *asked) as asks:
             outcome = await run_loop(
                 self.model,
                 self.tools,
-                context,
+                replace(context, asks=asks),
                 messages,
                 system=self.system,
                 offered=self.offered,
@@ -355,6 +358,14 @@ class Agent:
                 report = report.model_copy(update={"message": text})
             describe(outcome, report)
         return Run(report, outcome, context, left.began, left.stored, recorder.events)
+
+    def check(self, settings: Settings) -> None:
+        """Refuse what a person fixed where the model cannot do it.
+
+        Raises:
+            InputError: its detector asks the model, which does not see.
+        """
+        check_sees(settings, self.model)
 
     def facts(self, picture: Picture, artefacts: Artefacts) -> dict[str, Any]:
         """What a log begins with, enough to go on in another process."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from pydantic import ConfigDict
 
 from ..tools.errors import InputError
-from .messages import History, Reply, Result, turn_of
+from .messages import History, Result, replies_of, turn_of
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ DEFAULT_LIMITS = Limits()
 
 def exhausted(history: History, limits: Limits) -> str | None:
     """The limit that the last turn has reached, as a sentence."""
-    replies = [m for m in turn_of(history) if isinstance(m, Reply)]
+    replies = replies_of(turn_of(history))
     if limits.requests is not None and len(replies) >= limits.requests:
         return f"The limit of {_counted(limits.requests, 'request')} was reached."
     if reason := calls_exhausted(history, limits):

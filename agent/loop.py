@@ -24,9 +24,10 @@ from .messages import (
     plan_of_reply,
     unanswered,
 )
-from .model import Model, Request
+from .model import Model, Request, reply_in_time
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 from .policy import Decision, Policy
+from .wrappers.model_finder import ModelFinder
 
 ANYTHING = Policy()
 
@@ -112,17 +113,8 @@ class Turn:
     async def ask(self, messages: History) -> Reply:
         """The model's next reply, whole and in time."""
         sent = messages if getattr(self.model, "reads_all", False) else compacted(messages)
-        clock = asyncio.timeout(self.limits.reply_seconds)
-        try:
-            async with clock:
-                return await self.model.reply(Request(self.system, sent, self.offered))
-        except TimeoutError:
-            if not clock.expired():
-                raise
-            raise ModelError(
-                f"{self.model.name} did not finish a reply within {self.limits.reply_seconds:g} s; "
-                "ask again, or allow it more with --limit reply_seconds=NUMBER."
-            ) from None
+        request = Request(self.system, sent, self.offered)
+        return await reply_in_time(self.model, request, self.limits.reply_seconds)
 
 
 async def run(
@@ -216,6 +208,8 @@ async def _settle(
             result = await answer(turn.tools, context, call, turn.limits.tool_seconds)
     except ApprovalError as needed:
         return Paused(talk.messages, talk.world, call, needed.plan_id)
+    if isinstance(turn.context.asks, ModelFinder):
+        result = result.model_copy(update={"asides": turn.context.asks.taken()})
     await talk.add(result)
     return _ended(talk)
 

@@ -83,6 +83,13 @@ class Reply(_Value):
     opaque: Opaque | None = None
 
 
+class Aside(_Value):
+    """What a tool asked the model on its way, and the reply, which counts as one of the turn's."""
+
+    text: str
+    reply: Reply
+
+
 class Result(_Value):
     """A tool's answer to one call.
 
@@ -91,6 +98,7 @@ class Result(_Value):
         cause: the kind of the tool's error, see `tools.errors.Kind`; what code reacts to.
         facts: that error's numbers and ids; else `plan_id`, of the plan that was made.
         message: what the person is told, where the call has ended the turn.
+        asides: what the tool asked the model.
     """
 
     role: Literal["tool"] = "tool"
@@ -102,6 +110,7 @@ class Result(_Value):
     facts: dict[str, Any] | None = None
     images: tuple[bytes, ...] = ()
     message: str | None = None
+    asides: tuple[Aside, ...] = ()
 
 
 Message = User | Reply | Result
@@ -151,6 +160,15 @@ def doubts_told(history: Sequence[Message]) -> frozenset[str]:
     last = max((i for i, m in enumerate(turn) if isinstance(m, Reply)), default=0)
     told = (m for m in turn[:last] if isinstance(m, Result) and m.cause == "doubt")
     return frozenset(doubt for m in told for doubt in (m.facts or {}).get("doubts", ()))
+
+
+def replies_of(messages: Sequence[Message]) -> list[Reply]:
+    """The model's replies, to tools too."""
+    found: list[Reply] = []
+    for m in messages:
+        found += [m] if isinstance(m, Reply) else []
+        found += [a.reply for a in m.asides] if isinstance(m, Result) else []
+    return found
 
 
 def turn_of(history: Sequence[Message]) -> Sequence[Message]:

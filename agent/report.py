@@ -18,7 +18,7 @@ from ..tools.outline_field import rounded_rings
 from ..tools.perception.referring.attributes import Candidate
 from ..tools.perception.target_prompt import Box
 from ..tools.world import PlanNode, Target, World
-from .messages import Call, History, Message, Reply, Result, failed_before, turn_of
+from .messages import Call, History, Message, Reply, Result, failed_before, replies_of, turn_of
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
 
 Status = Literal[
@@ -306,7 +306,7 @@ def _candidates(outcome: Outcome, context: Context) -> tuple[dict[str, object], 
 
 
 def _totals(messages: Sequence[Message], seconds: float) -> Totals:
-    replies = [m for m in messages if isinstance(m, Reply)]
+    replies = replies_of(messages)
     return Totals(
         requests=len(replies),
         tool_calls=sum(len(m.calls) for m in replies),

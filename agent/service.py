@@ -86,6 +86,7 @@ class Service:
             keep_out=tuple(keep_out),
         )
         decides = self.agent_named(opening.agent)
+        decides.check(opening.settings)
         stored = self.store.create(name, owner=owner)
         facts = decides.facts(picture, stored.artefacts)
         with closing(stored.write(0)) as log:

@@ -13,7 +13,7 @@ from .terminal import styled
 SCORES = ("success", "95 %", "GCR", "strict", "chance SR", "chance GCR")
 PLACED = (
     *("trials", "placed", "success", "strict"),
-    *("right thing,\nif placed", "success,\nif placed", "mean IoU"),
+    *("right,\nif placed", "success,\nif placed", "mean\nIoU", "e95"),
 )
 MISSES = 200
 """Misses that are listed; the report shows all."""
@@ -52,7 +52,7 @@ def print_placed(found: Sequence[Cell]) -> None:
             _share(cell.strict, cell.scored),
             _share(right, known),
             _share(cell.placed_passed, cell.placed),
-            "-" if cell.iou is None else f"{cell.iou:.3f}",
+            *("-" if mean is None else f"{mean:.3f}" for mean in (cell.iou, cell.e95)),
         )
     Console(highlight=False).print(table)
 

@@ -177,10 +177,10 @@ Plain = Annotated[
 ]
 TraceFile = Annotated[Path, typer.Argument(help="A run's trace, or its folder.")]
 DetectorName = Annotated[
-    str, typer.Option("--detector", help="How things are found: NAME or NAME:CHECKPOINT.")
+    str | None, typer.Option("--detector", help="How things are found: NAME or NAME:CHECKPOINT.")
 ]
 SegmenterName = Annotated[
-    str, typer.Option("--segmenter", help="How outlines are made: NAME or NAME:CHECKPOINT.")
+    str | None, typer.Option("--segmenter", help="How outlines are made: NAME or NAME:CHECKPOINT.")
 ]
 Threshold = Annotated[
     str | None, typer.Option("--threshold", help="Least confidence a mask is used at, 0 to 1.")

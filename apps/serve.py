@@ -10,8 +10,9 @@ import typer
 from ..agent.agent import Agent
 from ..agent.service import Service
 from ..agent.store.places import data_folder, store_at
+from ..tools.context import check_settings
 from ..tools.errors import InputError
-from ..tools.fleet.described import fleet_named
+from . import arguments
 from . import options as o
 from .agents import agent_of
 from .terminal import say
@@ -46,6 +47,9 @@ def serve(
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
     fleet: Annotated[str | None, typer.Option(help="The robots of new sessions.")] = None,
+    detector: o.DetectorName = None,
+    segmenter: o.SegmenterName = None,
+    threshold: o.Threshold = None,
 ) -> None:
     """The team over HTTP: an API of its own, OpenAI's, and MCP, for chatbots and programs."""
     try:
@@ -61,13 +65,15 @@ def serve(
         store=store,
         tokens_file=tokens_file,
         fleet=fleet,
+        detector=detector,
+        segmenter=segmenter,
+        threshold=arguments.share("--threshold", threshold),
         model=model and ",".join(model),
     )
     usual = data_folder() / TOKENS
     if settings.tokens_file is None and usual.exists():
         settings = settings.model_copy(update={"tokens_file": usual})
     check_reach(settings)
-    fleet_named(settings.fleet)
     with service_of(settings, planner, base_url, prompt, prompts, limit, policy) as service:
         raise typer.Exit(run(service, settings))
 
@@ -78,11 +84,16 @@ def service_of(settings: "ServerSettings", *rest: Any) -> Generator[Service]:
 
     Args:
         rest: options of its agents, as `agent_of` takes them.
+
+    Raises:
+        InputError: no session can be begun with such settings.
     """
+    check_settings(begun := settings.of_session())
     with ExitStack() as stack:
         agents: dict[str, Agent] = {}
         for name in map(str.strip, settings.model.split(",")):
             agents[name] = stack.enter_context(agent_of(name, *rest, talks=True))
+            agents[name].check(begun)
         yield Service(agents, store_at(settings.store))
 
 

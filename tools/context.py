@@ -19,6 +19,7 @@ from .formation.value import Value
 from .perception.detection import Finder
 from .perception.detectors.protocol import Detector
 from .perception.detectors.registry import detector_named
+from .perception.detectors.vlm import VlmDetector
 from .perception.image import Picture
 from .perception.named import with_named
 from .perception.referring.attributes import Candidate
@@ -70,6 +71,24 @@ class Settings(Value):
     approved: str | None = None
     numbered: bool = False
     metres_per_pixel: float | None = None
+
+
+def check_settings(settings: Settings) -> None:
+    """Refuse names of what is not there, and what does not go together.
+
+    Raises:
+        InputError: saying so.
+    """
+    segmenter = segmenter_named(settings.segmenter)
+    detector = detector_named(settings.detector.removeprefix(BESIDE))
+    if isinstance(detector, Finder) and "box" not in segmenter.takes:
+        raise InputError(
+            f"The detector {detector.name!r} gives boxes, which the segmenter "
+            f"{segmenter.name!r} does not take; choose another of the two."
+        )
+    if settings.detector.startswith(BESIDE) and not isinstance(detector, Finder):
+        raise InputError(f"{BESIDE} goes with a detector that knows words; got {detector.name!r}.")
+    fleet_named(settings.fleet)
 
 
 class Artefacts(Protocol):
@@ -146,6 +165,7 @@ class Services:
         artefacts: files that events and the world name by their hash.
         found: what detectors found in pictures, by detector, picture, segmenter and phrases; shared
             by all services that are not given their own.
+        asked: the same where a model was asked, which is this conversation's alone.
         stopped: fleets that were stopped when they were let go of.
         claim: what is given a fleet's name and what opens it, and returns the one to use; raises
             where it is another's.
@@ -158,7 +178,9 @@ class Services:
     fleets: dict[str, Fleet] = field(default_factory=dict[str, Fleet])
     artefacts: Artefacts = field(default_factory=MemoryArtefacts)
     found: dict[tuple[str, ...], tuple[Candidate, ...]] = field(default_factory=lambda: _FOUND)
-
+    asked: dict[tuple[str, ...], tuple[Candidate, ...]] = field(
+        default_factory=dict[tuple[str, ...], tuple[Candidate, ...]]
+    )
     stopped: set[str] = field(default_factory=set[str])
     claim: Callable[[str, Callable[[], Fleet]], Awaitable[Fleet]] = _unshared
     watch: Watch = _ignore
@@ -191,6 +213,7 @@ class Context:
         words: what the person said last; the contract is held against it.
         doubted: doubts that the model was told of in this turn, which its `reading` may answer.
         proposed: id of the plan that an earlier call of the same reply made.
+        asks: asks the model that decides where things are; None outside of its turns.
         steps: those of the turns that changed the plan, after the one that undo ends at.
         observed: puts a world in place at once, because what it says was observed and holds even
             if the call fails or is cut off: measured things, poses of robots.
@@ -203,6 +226,7 @@ class Context:
     words: str = ""
     doubted: frozenset[str] = frozenset()
     proposed: str | None = None
+    asks: VlmDetector | None = None
     steps: tuple[Step, ...] = ()
     observed: Callable[[World], None] = _ignore
     moving: Callable[[str], Awaitable[None]] = _unrecorded
@@ -231,17 +255,7 @@ class Context:
         Raises:
             InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
         """
-        segmenter, detector = segmenter_named(self.settings.segmenter), self._detector
-        if isinstance(detector, Finder) and "box" not in segmenter.takes:
-            raise InputError(
-                f"The detector {detector.name!r} gives boxes, which the segmenter "
-                f"{segmenter.name!r} does not take; choose another of the two."
-            )
-        if self.settings.detector.startswith(BESIDE) and not isinstance(detector, Finder):
-            raise InputError(
-                f"{BESIDE} goes with a detector that knows words; got {detector.name!r}."
-            )
-        fleet_named(self.settings.fleet)
+        check_settings(self.settings)
         scale = self.settings.metres_per_pixel
         if scale is None or scale == self.world.metres_per_pixel:
             return self
@@ -259,7 +273,8 @@ class Context:
 
     @property
     def _detector(self) -> Detector:
-        return detector_named(self.settings.detector.removeprefix(BESIDE))
+        detector = detector_named(self.settings.detector.removeprefix(BESIDE))
+        return self.asks if self.asks and detector.name == self.asks.name else detector
 
     @property
     def finder(self) -> Finder | None:
@@ -285,7 +300,11 @@ class Context:
             phrases = ()
         names = (settings.segmenter, *phrases) if phrases else ()
         key = (settings.detector, self.world.picture.sha256, *names)
-        if key not in self.services.found:
+        asks = phrases and isinstance(finder, VlmDetector)
+        kept = self.services.asked if asks else self.services.found
+        if asks and key not in kept and self.asks is None:
+            return self._candidates(phrases[:-1])
+        if key not in kept:
             if finder is not None and phrases:
                 before, masks = self._candidates(phrases[:-1]), segmenter_named(settings.segmenter)
                 found = with_named(before, self.picture, phrases[-1], finder, masks)
@@ -293,10 +312,10 @@ class Context:
                 beside = settings.detector.startswith(BESIDE)
                 detector = detector_named("standout") if beside else self._detector
                 found = detector.detect(self.picture)
-            for old in [*self.services.found][: 1 - MOST_FOUND]:
-                self.services.found.pop(old, None)
-            self.services.found[key] = found
-        return self.services.found[key]
+            for old in [*kept][: 1 - MOST_FOUND]:
+                kept.pop(old, None)
+            kept[key] = found
+        return kept[key]
 
     def candidate(self, name: str) -> Candidate:
         """The candidate with an id; one that was shown is the one at the place it was shown.

@@ -305,9 +305,9 @@ class World(Value):
         """Every outline and everything in the picture, whatever a contract may come to name."""
         hard = {k.id: k.outline for k in self.keep_out if k.hard}
         outlines = {t.id: t.outline for t in self.targets} | hard
-        things = [Other(t.id, t.label, t.outline.filled) for t in self.targets]
+        things = [Other(t.id, t.label, t.outline.polygon) for t in self.targets]
         things += [
-            Other(k.id, k.reason, k.outline.filled, k.confidence)
+            Other(k.id, k.reason, k.outline.polygon, k.confidence)
             for k in self.keep_out
             if not k.hard
         ]

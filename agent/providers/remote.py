@@ -114,7 +114,12 @@ class RemoteModel:
 
     async def _ask(self, request: Request) -> Reply:
         body = self._wire.body(request, stream=self._streams)
-        return await self._transport.ask(self._wire, request, body, self._show)
+        show = _ignore if request.aside and self._show is not None else self._show
+        return await self._transport.ask(self._wire, request, body, show)
+
+
+def _ignore(text: str | None) -> None:
+    """Nobody is shown what a tool asks."""
 
 
 def remote_model(

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ...tools.errors import ModelError
-from ..messages import Reply
+from ..messages import Aside, Reply
 from ..model import Request
 from ..recording import message_facts
 from ..session import model_name, prompt_name
@@ -43,6 +43,8 @@ class ReplayModel:
         Raises:
             ModelError: they are others, or the recording ends here.
         """
+        if request.aside:
+            return self._aside(request)
         count = len(request.messages)
         for number, message in enumerate(request.messages):
             then, now = self._at(number), message_facts(message)
@@ -53,6 +55,16 @@ class ReplayModel:
         if line["role"] != "assistant":
             raise ModelError(self._parted(count + 1, line, "the model's turn"))
         return Reply.model_validate(facts)
+
+    def _aside(self, request: Request) -> Reply:
+        """The recorded reply to what a tool asked."""
+        (message,) = request.messages
+        text = getattr(message, "text", "")
+        for line in self._lines:
+            for aside in line.get("asides", ()):
+                if aside["text"] == text:
+                    return Aside.model_validate(aside).reply
+        raise ModelError(f"In the recording {self._path} no tool asks {_short(text)!r}.")
 
     def _at(self, number: int) -> Mapping[str, Any]:
         if number >= len(self._lines):
@@ -71,7 +83,9 @@ class ReplayModel:
 def _facts(line: Mapping[str, Any]) -> dict[str, Any]:
     """What two messages must share, as far as a model sees it: of images the number alone, for
     libraries that draw and compress write other bytes in other versions."""
-    facts = {k: v for k, v in line.items() if k not in ("cause", "facts") and v is not None}
+    facts = {
+        k: v for k, v in line.items() if k not in ("cause", "facts", "asides") and v is not None
+    }
     return facts | {"images": len(line["images"])}
 
 

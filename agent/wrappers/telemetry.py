@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ...tools.errors import InputError
 from ...tools.tool import Tool
-from ..messages import History, Reply
+from ..messages import History, Reply, replies_of
 from ..model import Model, Request
 from ..outcomes import Outcome, Stopped
 from ..report import Report
@@ -99,7 +99,7 @@ def traced_run(tracer: "Tracer | None", model: str, before: History) -> Generato
 
         def told(outcome: Outcome, report: Report) -> None:
             made = outcome.messages[len(before) :]
-            replies = tuple(m for m in made if isinstance(m, Reply))
+            replies = tuple(replies_of(made))
             span.set_attributes(_usage(replies))
             span.set_attribute("formup.status", report.status)
             span.set_attribute("formup.requests", len(replies))

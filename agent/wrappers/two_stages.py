@@ -62,6 +62,8 @@ class TwoStages:
         Raises:
             ModelError: it cannot.
         """
+        if request.aside:
+            return await self._looker.reply(request)
         tools, turn = request.tools, tuple(turn_of(request.messages))
         found, stands = measuring(turn), _plan_stands(turn)
         if found is None and (not stands or _is_to_look(turn)):

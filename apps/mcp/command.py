@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...tools.errors import InputError
+from .. import arguments, serve
 from .. import options as o
-from .. import serve
 from ..main import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -44,6 +44,9 @@ def mcp(
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
     fleet: Annotated[str | None, typer.Option(help="The robots of new sessions.")] = None,
+    detector: o.DetectorName = None,
+    segmenter: o.SegmenterName = None,
+    threshold: o.Threshold = None,
 ) -> None:
     """The team for a client of the Model Context Protocol, over stdio."""
     try:
@@ -58,8 +61,16 @@ def mcp(
         raise InputError(NEEDED) from None
     rest = (base_url, planner, prompt, prompts, limit, policy)
     if http:
-        return serve.serve(host, port, tokens_file, store, model, *rest, fleet)
-    settings = ServerSettings.of(store=store, fleet=fleet, model=model and ",".join(model))
+        named = (host, port, tokens_file, store, model)
+        return serve.serve(*named, *rest, fleet, detector, segmenter, threshold)
+    settings = ServerSettings.of(
+        store=store,
+        fleet=fleet,
+        detector=detector,
+        segmenter=segmenter,
+        threshold=arguments.share("--threshold", threshold),
+        model=model and ",".join(model),
+    )
     folders = [folder.resolve() for folder in pictures or [Path()]]
     for folder in folders:
         if not folder.is_dir():

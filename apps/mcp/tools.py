@@ -21,7 +21,6 @@ from pydantic import BaseModel, Field, WithJsonSchema
 
 from ...agent.turns import Asked
 from ...tools.context import Context as ToolContext
-from ...tools.context import Settings
 from ...tools.errors import InputError
 from ...tools.formation.editing.edit_kinds import EDIT_SCHEMA
 from ..server.forms import Key, Pointed, Words
@@ -63,12 +62,11 @@ async def open_scene(
     need(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     seen = await picture_named(ctx, image)
-    settings = Settings(
+    settings = hub.settings.of_session(
         robots=robots,
         metres_per_pixel=metres_per_pixel,
         robot_radius=robot_radius,
         clearance=clearance,
-        fleet=hub.settings.fleet,
     )
     ToolContext.of(seen, settings)  # what cannot be is said before anything is kept
     made = hub.service.open(seen, settings=settings, owner=person.name)

@@ -20,7 +20,6 @@ from ...agent.outcomes import Cancelled, Paused
 from ...agent.report import Totals
 from ...agent.session import Run
 from ...agent.turns import Turn
-from ...tools.context import Settings
 from ...tools.draw import draw_plan
 from ...tools.errors import FormupError, InputError
 from ..run_display import choice_words
@@ -249,7 +248,7 @@ async def _open_session(hub: Hub, person: Person, said: Said) -> tuple[str, str]
     data = _data(pictured[-1].pictures[0])
     made = hub.service.open(
         await asyncio.to_thread(checked_picture, data, "picture", hub),
-        settings=Settings(fleet=hub.settings.fleet),
+        settings=hub.settings.of_session(),
         name=name_of(said, key),
         agent=agents(hub)[said.model],
         owner=person.name,

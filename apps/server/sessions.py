@@ -11,7 +11,6 @@ from PIL import Image, UnidentifiedImageError
 
 from ...agent.session import Run
 from ...agent.store.protocol import owner_of
-from ...tools.context import Settings
 from ...tools.draw import draw_plan
 from ...tools.errors import InputError
 from ...tools.perception.image import Picture, picture_from_bytes
@@ -95,13 +94,12 @@ async def begin(
     need(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     picture = await picture_sent(request, hub, name or "picture")
-    settings = Settings(
+    settings = hub.settings.of_session(
         robots=robots,
         metres_per_pixel=metres_per_pixel,
         robot_radius=robot_radius,
         clearance=clearance,
         seed=seed,
-        fleet=hub.settings.fleet,
     )
     made = await asyncio.to_thread(
         lambda: hub.service.open(

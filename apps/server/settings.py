@@ -3,10 +3,11 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from ...tools.context import Settings
 from ...tools.errors import InputError
 
 PREFIX = "FORMUP_"
@@ -37,6 +38,11 @@ class ServerSettings(BaseModel):
         default="simulated",
         description="the robots of new sessions: a fleet's name, or a YAML file",
     )
+    detector: str = Field(default="standout", description="how new sessions find things")
+    segmenter: str = Field(default="grabcut", description="how new sessions make outlines")
+    threshold: float | None = Field(
+        default=None, ge=0, le=1, description="least confidence that a mask of theirs is used at"
+    )
     origins: str = Field(
         default="",
         description="other origins whose pages may call it, as https://HOST, split by commas",
@@ -64,6 +70,11 @@ class ServerSettings(BaseModel):
     shutdown_seconds: float = Field(
         default=3, gt=0, description="longest that requests have at the end"
     )
+
+    def of_session(self, **given: Any) -> Settings:
+        """The settings of a new session, with what was given for it."""
+        names = ("fleet", "detector", "segmenter", "threshold")
+        return Settings(**{name: getattr(self, name) for name in names}, **given)
 
     @classmethod
     def of(cls, environment: Mapping[str, str] = os.environ, **given: object) -> Self:

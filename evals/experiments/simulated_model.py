@@ -49,6 +49,7 @@ DUTIES = (
         "own lengths",
         (
             "no length it does not name",
+            "no length they do not name",
             "leave out lengths the person did not name",
             "leave lengths out",
         ),

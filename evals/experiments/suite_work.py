@@ -81,6 +81,7 @@ class SuiteWork:
             strict=graded.strict,
             object_correct=graded.object_correct,
             iou=graded.iou,
+            e95=graded.e95,
             feedback=graded.feedback[:LONGEST] if self.attempts is not None else "",
             **cost,
         )

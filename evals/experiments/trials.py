@@ -123,6 +123,7 @@ class TrialRow(Trial):
         strict: success at the tighter tolerances.
         object_correct: whether it was about the right thing; None if that was not graded.
         iou: overlap of the best outline measured with the true one; None where none was.
+        e95: how near 95 % of its boundary and the true one lie, see `grading.grades`.
         feedback: what was wrong, in a sentence.
         cached_tokens: input in tokens of full price, with the prompt and the tools in the cache.
         turns: of a dialogue, whose gcr is the share of them that were right; else None.
@@ -135,6 +136,7 @@ class TrialRow(Trial):
     strict: bool | None = None
     object_correct: bool | None = None
     iou: Share | None = None
+    e95: Share | None = None
     feedback: str = ""
     requests: Count = 0
     input_tokens: Count = 0

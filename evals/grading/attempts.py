@@ -13,6 +13,7 @@ from shapely.geometry import Polygon
 from ...agent.report import Status
 from ...tools.geometry.outline import FloatArray
 from ..tasks.task import Goal, Thing
+from .boundaries import boundary_error
 from .grades import Graded, Part, distinct
 from .infill import infill
 from .lines import centre, corners, line_between, side
@@ -120,17 +121,27 @@ def grade_attempt(goals: Sequence[Goal], expects: Sequence[Status], attempt: Att
     if graded.sr != planned.sr:
         feedback += f" (as planned: {'right' if planned.sr else planned.feedback})"
     things = {thing.id: thing for goal in goals for thing in goal.things}
-    overlaps = [goals[0].target.overlap(outline) for outline in attempt.measured]
+    iou, e95 = _outlined(goals[0].target, attempt.measured)
     return Graded(
         sr=graded.sr,
         gcr=graded.gcr,
         strict=graded.strict,
         object_correct=_meant(attempt.found, list(things.values())) if attempt.found else None,
-        iou=round(max(overlaps), 4) if overlaps else None,
+        iou=iou,
+        e95=e95,
         feedback=feedback,
         measures={**graded.measures, "planned_gcr": planned.gcr},
         right=graded.right,
     )
+
+
+def _outlined(thing: Thing, measured: Sequence[Polygon]) -> tuple[float | None, float | None]:
+    """The overlap of the best outline with a thing, and its boundary error."""
+    if not measured:
+        return None, None
+    best = max(measured, key=thing.overlap)
+    error = boundary_error(best, shapely.make_valid(thing.region))
+    return round(thing.overlap(best), 4), round(error, 4)
 
 
 def _graded_refusal(expects: Sequence[Status], attempt: Attempt) -> Graded:

@@ -63,6 +63,8 @@ class Graded:
         object_correct: whether it was about the thing meant; None where that is not known.
         iou: overlap of the best outline that was measured with the first thing's true one; None
             where none was.
+        e95: of that outline: 95 % of either boundary lie so near to the other one, as a share of
+            the square root of the true area.
         feedback: what was wrong, in a sentence.
         measures: of all goals, named after them where there are several.
         right: whether each robot graded stands right, in the order given.
@@ -73,6 +75,7 @@ class Graded:
     strict: bool
     object_correct: bool | None = None
     iou: float | None = None
+    e95: float | None = None
     feedback: str = ""
     measures: Mapping[str, float] = field(default_factory=dict[str, float])
     right: tuple[bool, ...] = ()

@@ -7,18 +7,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal, get_args
 
-import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 
 from ...tools.errors import InputError
-from ...tools.geometry.outline import FloatArray, distances
 from ...tools.perception.contours import outline_of_mask
 from ...tools.perception.image import Picture, load_picture
 from ...tools.perception.segmenters.grabcut import Bytes, box_region, grabcut, trimap, window_around
 from ...tools.perception.segmenters.protocol import Segmenter
 from ...tools.perception.target_prompt import TargetPrompt
 from ..experiments.pointing import can_point, pointing
+from ..grading.boundaries import boundary_error
 from ..tasks.suites import load_suite
 from ..tasks.task import Task
 
@@ -26,8 +24,6 @@ Mode = Literal["outline", "box", "point"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 TRIALS = 3
 """Each thing is pointed at so often, off in another way each time."""
-SPACING = 0.5
-"""Of the points of a boundary whose distances are taken, px."""
 
 
 @dataclass(frozen=True)
@@ -88,24 +84,6 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def boundary_error(found: BaseGeometry, truth: BaseGeometry) -> float:
-    """The larger of the two directions' 95 % quantiles of the distance between boundaries.
-
-    As a share of the square root of the true area, for regions in px.
-    """
-    one, other = found.boundary, truth.boundary
-    apart = (distances(other, _along(one)), distances(one, _along(other)))
-    return max(float(np.quantile(d, 0.95)) for d in apart) / float(np.sqrt(truth.area))
-
-
-def _along(line: BaseGeometry) -> FloatArray:
-    parts = [
-        shapely.line_interpolate_point(part, np.arange(0.0, part.length, SPACING))
-        for part in shapely.get_parts(line)
-    ]
-    return shapely.get_coordinates(np.concatenate(parts))
-
-
 def _sample(
     suite: str, task: Task, path: Path, prompt: TargetPrompt, segmenter: Segmenter
 ) -> Sample:
@@ -120,7 +98,7 @@ def _sample(
     except InputError:  # nothing was found
         pass
     else:
-        overlap, error = thing.overlap(outline), min(1.0, boundary_error(outline, truth))
+        overlap, error = thing.overlap(outline), boundary_error(outline, truth)
     return Sample(
         suite=suite,
         picture=path.stem,

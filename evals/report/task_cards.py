@@ -109,6 +109,7 @@ def _figures(row: TrialRow) -> str:
     figures += ["strict"] if row.strict else []
     figures += ["wrong thing"] if row.object_correct is False else []
     figures += [] if row.iou is None else [f"IoU {row.iou:.2f}"]
+    figures += [] if row.e95 is None else [f"e95 {row.e95:.3f}"]
     if row.input_tokens or row.output_tokens:
         figures.append(f"{row.requests} requests")
         figures.append(f"{row.input_tokens:,} in, {row.output_tokens:,} out tokens")

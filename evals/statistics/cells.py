@@ -43,6 +43,7 @@ class Cell:
         placed: trials in which robots were placed; of these passed, and of those of which it is
             known about the thing meant: (right, known).
         iou: mean overlap of the outlines measured with the true ones.
+        e95: mean of their boundary errors.
         invalid: trials whose output could not be used.
         lost: infrastructure errors.
         chance: of these tasks.
@@ -59,6 +60,7 @@ class Cell:
     placed_passed: int
     right_thing: tuple[int, int]
     iou: float | None
+    e95: float | None
     invalid: int
     lost: int
     chance: Chance
@@ -103,7 +105,6 @@ def _cell(name: str, rows: Sequence[TrialRow], level: Chance) -> Cell:
     placed = [row for row in scored if row.placed]
     passed = sum(bool(row.sr) for row in scored)
     known = [row.object_correct for row in placed if row.object_correct is not None]
-    overlaps = [row.iou for row in scored if row.iou is not None]
     return Cell(
         name=name,
         tasks=len({row.task for row in rows}),
@@ -115,8 +116,13 @@ def _cell(name: str, rows: Sequence[TrialRow], level: Chance) -> Cell:
         placed=len(placed),
         placed_passed=sum(bool(row.sr) for row in placed),
         right_thing=(sum(known), len(known)),
-        iou=float(np.mean(overlaps)) if overlaps else None,
+        iou=_mean([row.iou for row in scored if row.iou is not None]),
+        e95=_mean([row.e95 for row in scored if row.e95 is not None]),
         invalid=sum(row.status == "model_invalid" for row in scored),
         lost=len(rows) - len(scored),
         chance=level,
     )
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return float(np.mean(values)) if values else None

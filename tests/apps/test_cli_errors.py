@@ -111,6 +111,7 @@ def test_no_number_of_robots(cli: Cli, picture: Path, count: str) -> None:
         ("--target", "١", ("'١'", "c3")),
         ("--target", "c123456", ("'c123456'", "c3")),
         ("--target", "", ("''", "c3")),
+        ("--detector", "vlm", "sees no picture; choose a model"),
         ("--threshold", "2", ("'2'", "0 to 1")),
         ("--threshold", "high", ("'high'",)),
         ("--robot-radius", "-3", ("'-3'", "pixels")),
@@ -249,3 +250,24 @@ def test_no_scale_of_a_picture(cli: Cli, picture: Path, scale: str) -> None:
 def test_metric_options_take_a_scale(cli: Cli, picture: Path, option: str) -> None:
     refused(cli("run", picture, *CAR, option, "1.5m"), f"{option} '1.5m'", "--metres-per-pixel")
     refused(cli("run", picture, *CAR, option, "1.5 miles"), "1.5 miles", "1.5m or 40cm")
+
+
+@pytest.mark.parametrize(
+    "command", [("serve",), ("mcp",), ("mcp", "--http"), ("chat", "scene.png")]
+)
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--detector", "owl", "Unknown detector 'owl'"),
+        ("--segmenter", "scissors", "Unknown segmenter 'scissors'"),
+        ("--detector", "vlm", "sees no picture; choose a model"),
+        ("--threshold", "2", "--threshold '2' cannot be used; give a number from 0 to 1"),
+    ],
+)
+def test_who_serves_or_chats_is_told_at_the_start(
+    cli: Cli, picture: Path, command: tuple[str, ...], option: str, value: str, said: str
+) -> None:
+    code, out, err = cli(*command, option, value, "--store", picture.parent / "store")
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1

@@ -107,7 +107,9 @@ def test_some_tasks_are_pointed_at_and_the_whole_goes_on(
     out = tmp_path / "run"
     box: list[Any] = ["eval", "run", suite, "--mode", "box", "--out", out]
     assert formup(*box, "--task", "ring_03") == 0
-    assert "if placed" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "if placed" in shown
+    assert "e95" in shown
     assert [(row.task, row.trial) for row in read_rows(out)] == [("ring_03", n) for n in range(3)]
     assert formup("eval", "run", suite, "--out", out) == 0
     assert formup(*box, "--task", "ring_03") == 0

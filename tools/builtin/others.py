@@ -28,8 +28,9 @@ def with_others(context: Context) -> World:
         return world
     pixels = math.prod(world.picture.size)
     for c in context.candidates():
-        region, seen = c.outline.filled.simplify(DETAIL), round(c.salience, 3)
-        if seen >= FAINT and max(SPECK * pixels, MIN_AREA) <= region.area <= GROUND * pixels:
+        area, seen = c.outline.filled.area, round(c.salience, 3)
+        if seen >= FAINT and max(SPECK * pixels, MIN_AREA) <= area <= GROUND * pixels:
+            region = c.outline.polygon.simplify(DETAIL)
             outline = outline_of(shapely.transform(region, lambda at: at.round(DECIMALS)))
             thing = {"id": c.id, "reason": c.label, "hard": False, "confidence": seen}
             found.append(KeepOut.model_validate({"outline": outline, **thing}))

@@ -67,7 +67,7 @@ def draw_areas(canvas: Canvas, contract: Contract, site: Site, points: FloatArra
             canvas.tint(shown, ALLOWED, 0.26)
             canvas.strokes(rings(shown), ALLOWED, 1.0, 0.8)
     for name in contract.keep_out:
-        canvas.tint(site.outlines[name].filled, FORBIDDEN, 0.35)
+        canvas.tint(site.solid(name, contract), FORBIDDEN, 0.35)
     for name in contract.target_ids:
         draw_outline(canvas, site.outlines[name])
 
@@ -81,7 +81,7 @@ def draw_outline(canvas: Canvas, outline: Outline, colour: tuple[int, int, int] 
 def draw_met(canvas: Canvas, outlines: Iterable[Outline]) -> None:
     """Other things that robots stand on or drive over."""
     for outline in outlines:
-        canvas.tint(outline.filled, MET, 0.25)
+        canvas.tint(outline.polygon, MET, 0.25)
         draw_outline(canvas, outline, MET)
 
 

@@ -5,6 +5,7 @@ Frame: image pixels, x right, y down.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from shapely.geometry import LineString, Polygon
 from ..geometry.outline import FloatArray, Outline, distances
 from .contract import Contract
 from .plan import Plan
-from .site import Other, Site
+from .site import Other, Site, closed
 from .value import Value
 
 TOUCHING = 2.0
@@ -63,14 +64,17 @@ def notes_of(encounters: Sequence[Encounter]) -> list[str]:
 def others_than(
     contract: Contract, outlines: Mapping[str, Outline], things: Iterable[Other]
 ) -> tuple[Other, ...]:
-    """The things that are no targets, parts of targets, or what targets lie on or in.
+    """The things that are no targets, parts of targets, or what targets lie on.
+
+    Their holes are filled, but those in which a target lies.
 
     Args:
         things: of two that are the same the first is meant.
     """
     entered = {name for group in contract.groups if group.enters for name in group.targets}
     kept: list[Other] = []
-    for thing in things:
+    for found in things:
+        thing = replace(found, region=closed(found.region, outlines.values()))
         targets = [
             outline.filled
             for name, outline in outlines.items()

@@ -1,7 +1,7 @@
 """Where positions are judged: the targets' outlines and the picture; what does not fit there."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import shapely
@@ -10,11 +10,14 @@ from shapely.geometry import Polygon
 from ..errors import ToolError
 from ..geometry.curves import Frame
 from ..geometry.outline import MIN_AREA, Outline, largest_part, outline_of
-from .contract import Group
+from .contract import Contract, Group
 from .units import length_text
 
 SURE = 0.55
 """What was found with at least this confidence is a thing."""
+WITHIN, ROOMY = 0.8, 0.7
+"""What is meant lies in a hole if more than WITHIN of it does, and has room there if it covers less
+than ROOMY of the hole; else the thing with the hole is what it lies on."""
 BLUR = 0.2
 """How far off the outline of a thing of no confidence may be, as a share of its size."""
 
@@ -23,7 +26,7 @@ BLUR = 0.2
 class Other:
     """A thing in the picture that a contract does not name: robots keep off it where they can.
 
-    Its region is in px, its confidence from 0 to 1.
+    Its region is in px, holes and all, its confidence from 0 to 1.
     """
 
     id: str
@@ -40,6 +43,19 @@ class Other:
     def blur(self) -> float:
         """How far off its outline may be, px."""
         return BLUR * (1 - self.confidence) * math.sqrt(self.region.area)
+
+
+def closed(region: Polygon, meant: Iterable[Outline]) -> Polygon:
+    """A region with its holes filled, but those in which something that is meant lies with room."""
+    solid = [outline.filled for outline in meant] if region.interiors else []
+    holes = [Polygon(ring) for ring in region.interiors]
+    open_ = [h for h in holes if any(_holds(h, r) for r in solid)]
+    return Polygon(region.exterior, [h.exterior for h in open_])
+
+
+def _holds(hole: Polygon, region: Polygon) -> bool:
+    within = region.intersection(hole).area > WITHIN * region.area
+    return bool(within and region.area < ROOMY * hole.area)
 
 
 @dataclass(frozen=True)
@@ -81,6 +97,11 @@ class Site:
         if seen is None or seen.area < MIN_AREA:
             raise ToolError(f"{name} lies outside the picture.")
         return outline_of(seen)
+
+    def solid(self, name: str, contract: Contract) -> Polygon:
+        """What of a target robots keep off: its holes too, where no other target lies in them."""
+        others = [self.outlines[other] for other in contract.target_ids if other != name]
+        return closed(self.outlines[name].polygon, others)
 
     def frame(self, radius: float) -> Frame:
         """Where robots of a radius stand wholly inside the picture."""

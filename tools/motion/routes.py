@@ -59,7 +59,7 @@ def obstacles(contract: Contract, site: Site) -> BaseGeometry:
 
 def named_obstacles(contract: Contract, site: Site) -> dict[str, BaseGeometry]:
     """The same by the targets' ids."""
-    return {name: site.outlines[name].filled for name in contract.solid_targets}
+    return {name: site.solid(name, contract) for name in contract.solid_targets}
 
 
 def union(regions: Mapping[str, BaseGeometry]) -> BaseGeometry:

@@ -16,11 +16,13 @@ class Detection:
         score: the detector's own, in [0, 1]: that it is such a thing. What a mask is worth is
             another matter, and its own score.
         mask: where one was made.
+        most: the greatest confidence that a mask of it is given.
     """
 
     box: Box
     score: float
     mask: Segmentation | None = None
+    most: float = 1.0
 
 
 @runtime_checkable

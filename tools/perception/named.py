@@ -69,7 +69,8 @@ def _naming(
         outline = outline_of_mask(mask.mask)
     except InputError:
         return None
-    return Naming(phrase, detection.score, outline, mask.confidence, mask.parts)
+    confidence = min(mask.confidence, detection.most)
+    return Naming(phrase, detection.score, outline, confidence, mask.parts)
 
 
 def _covers(detection: Detection, picture: Picture) -> bool:

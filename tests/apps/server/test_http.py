@@ -336,3 +336,16 @@ def test_settings_come_from_the_environment() -> None:
     assert (made.host, made.port) == ("::1", 81)
     with pytest.raises(InputError, match="FORMUP_PORT is 'x'"):
         ServerSettings.of({"FORMUP_PORT": "x"})
+
+
+def test_new_sessions_see_as_the_settings_say(serve: Serve) -> None:
+    server = serve(threshold=1.0)
+    coin = {"pointed": [{"box": [175, 30, 314, 160]}]}
+    refused = server.say(server.begin(), "Cage it", **coin)
+    assert refused["report"]["positions"] is None
+    assert "below the threshold 1.00" in json.dumps(refused)
+    told = {"FORMUP_SEGMENTER": "sam", "FORMUP_DETECTOR": "standout+groundingdino"}
+    settings = ServerSettings.of(told | {"FORMUP_THRESHOLD": ".3"}, segmenter="langsam")
+    chosen = settings.of_session(robots=3)
+    assert (chosen.detector, chosen.segmenter) == ("standout+groundingdino", "langsam")
+    assert (chosen.threshold, chosen.robots) == (0.3, 3)

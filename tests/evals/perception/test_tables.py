@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 from formup.apps.cli import app
 from formup.evals.perception.fit import CUES, fitted, left_out
-from formup.evals.perception.samples import TRIALS, Sample, boundary_error, measured
+from formup.evals.perception.samples import TRIALS, Sample, measured
 from formup.evals.perception.tables import markdown, reliability, row
 from formup.tools.errors import InputError
 from formup.tools.perception.segmenters.confidence import fitted_weights
 from formup.tools.perception.segmenters.grabcut_segmenter import GrabCutSegmenter
-from hypothesis import given
-from hypothesis import strategies as st
-from shapely import affinity
 from shapely.geometry import box
 
 SQUARE = box(0, 0, 100, 100)
@@ -21,21 +18,6 @@ SQUARE = box(0, 0, 100, 100)
 
 def sample(overlap: float, confidence: float, picture: str = "p", **cues: float) -> Sample:
     return Sample("s", picture, "t", overlap, 0.05, confidence, 0.5, cues, 0.2, 0.1)
-
-
-@given(st.floats(0.5, 12))
-def test_the_boundary_error_of_a_grown_square_is_how_far_it_grew(by: float) -> None:
-    grown = SQUARE.buffer(by)
-    assert boundary_error(grown, SQUARE) == pytest.approx(by / 100, rel=0.05)
-    assert boundary_error(SQUARE, SQUARE) < 1e-9
-
-
-def test_the_boundary_error_sees_a_part_that_is_missing_or_too_much() -> None:
-    spur = SQUARE.union(box(100, 40, 140, 60))
-    assert boundary_error(spur, SQUARE) == pytest.approx(boundary_error(SQUARE, spur), abs=0.05)
-    assert boundary_error(spur, SQUARE) > 0.1
-    holed = SQUARE - affinity.scale(SQUARE, 0.3, 0.3)
-    assert boundary_error(SQUARE, holed) > 0.1
 
 
 def test_a_row_counts_what_is_right_and_what_is_placed() -> None:

@@ -94,6 +94,7 @@ def test_pointed_runs_are_reproducible_and_mostly_right(tmp_path: Path) -> None:
     assert rows == tried(some, arm, tmp_path)
     assert all(row.sr for row in rows)
     assert np.mean([row.iou or 0.0 for row in rows]) > 0.85
+    assert 0 < np.mean([row.e95 or 0.0 for row in rows]) < 0.1
 
 
 def test_each_trial_points_in_another_way() -> None:

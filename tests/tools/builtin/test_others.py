@@ -60,6 +60,25 @@ def test_robots_are_placed_and_driven_off_things_that_nobody_named(tool_calls: B
     assert node.encounters == ()
 
 
+def test_what_has_the_target_in_its_hole_is_kept_off(tool_calls: Begin) -> None:
+    pixels = np.full((600, 800, 3), 150, np.uint8)
+    cv2.rectangle(pixels, (60, 60), (340, 340), (40, 40, 200), 24)
+    cv2.rectangle(pixels, (150, 150), (250, 250), (200, 40, 40), -1)
+    work = tool_calls(picture_from_array(pixels))
+    (note,) = propose(work, group("around", 8))["notes"]
+    assert "drive over c2 (blue thing): no way around it" in note
+    (frame,) = work.world.site(work.world.plan().plan.formation.contract).others
+    assert np.abs(work.world.plan().plan.formation.points - 200).max() < 126
+    tight = propose(work, group("along", 3, side="right", clearance=(84, 90)))
+    assert f"stand on or right beside {frame.id} (blue thing)" in " ".join(tight["notes"])
+    work.keep(with_keep_outs(work.context, [TargetPrompt(candidate=frame.id)]))
+    assert propose(work, group("around", 8))["certified"]
+    assert np.abs(work.world.plan().plan.formation.points - 200).max() < 126
+    tight = propose(work, group("along", 3, side="right", clearance=(84, 90)))
+    assert not tight["certified"]
+    assert any("k1" in finding for finding in tight["findings"])
+
+
 def test_where_they_cannot_be_robot_and_thing_are_named_and_certified_all_the_same(
     tool_calls: Begin,
 ) -> None:

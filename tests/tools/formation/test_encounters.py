@@ -20,7 +20,7 @@ TARGET = outline_of(shapely.box(200, 150, 300, 250))
 
 
 def thing(region: BaseGeometry, name: str = "c1", confidence: float = 1.0) -> Other:
-    return Other(name, "red oval", outline_of(region).filled, confidence)
+    return Other(name, "red oval", outline_of(region).polygon, confidence)
 
 
 def others(*things: Other, entered: bool = False, target: Outline = TARGET) -> list[str]:
@@ -47,6 +47,21 @@ def test_targets_their_parts_and_their_ground_are_no_other_things(
 def test_what_lies_in_the_hole_of_a_target_belongs_to_it() -> None:
     frame = outline_of(shapely.box(200, 150, 300, 250) - shapely.box(210, 160, 290, 240))
     assert others(thing(shapely.box(230, 180, 260, 210)), target=frame) == []
+
+
+def test_what_has_a_hole_with_room_for_the_target_is_another_thing_with_that_hole_alone() -> None:
+    middle, second = shapely.box(180, 130, 320, 270), shapely.box(340, 180, 370, 210)
+    handle = thing(shapely.box(150, 100, 400, 300) - middle - second)
+    group = Group(relation="around", targets=("t1",), robots=2)
+    kept = others_than(Contract(groups=(group,)), {"t1": TARGET}, [handle])
+    assert [len(thing.region.interiors) for thing in kept] == [1]
+    assert not kept[0].region.intersects(TARGET.polygon)
+    assert kept[0].region.contains(second)
+
+
+def test_what_shows_nothing_round_the_target_but_a_rim_is_what_it_lies_on() -> None:
+    rim = shapely.box(195, 145, 305, 255)
+    assert others(thing(shapely.box(100, 50, 500, 350) - rim)) == []
 
 
 def test_on_a_target_that_robots_enter_only_what_is_sure_and_small_stands() -> None:

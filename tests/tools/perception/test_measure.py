@@ -33,7 +33,7 @@ def lamp() -> Picture:
 
 def test_what_is_built_in_goes_in_as_other_packages_do() -> None:
     assert SEGMENTERS.names() == ("grabcut", "clipseg", "langsam", "sam", "sam2.1")
-    assert DETECTORS.names() == ("standout", "groundingdino", "mm-groundingdino")
+    assert DETECTORS.names() == ("standout", "groundingdino", "mm-groundingdino", "vlm")
     assert segmenter_named("grabcut") is segmenter_named("grabcut")
     assert segmenter_named("grabcut").name == "grabcut"
     assert detector_named("standout").name == "standout"

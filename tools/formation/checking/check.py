@@ -124,7 +124,7 @@ def _check_keep_out(points: FloatArray, contract: Contract, site: Site, audit: A
         foreign = ~np.isin(groups, owners)  # a group's own rule speaks of its own target
         if not foreign.any():
             continue
-        distance = distances(site.outlines[name].filled, points)
+        distance = distances(site.solid(name, contract), points)
         for i in np.flatnonzero(foreign & (distance <= contract.robot_radius)):
             audit.find("keep_out", distance[i], contract.robot_radius, robot=i, about=name)
 

@@ -87,7 +87,7 @@ class _Slides:
         self._left = min(MOST_TRIED, TRIED_TOGETHER // plan.formation.contract.robots)
         contract = plan.formation.contract
         regions = [thing.region for thing in site.others if thing.sure]
-        regions += [site.outlines[name].filled for name in contract.keep_out]
+        regions += [site.solid(name, contract) for name in contract.keep_out]
         self._solid: BaseGeometry = shapely.union_all(regions)
         self._floor, self._near = contract.spacing_floor, contract.robot_radius + TOUCHING
 

@@ -68,7 +68,7 @@ class _Search:
         self.best, self._site, self._contract = plan, site, plan.formation.contract
         self._radius, self._room = self._contract.robot_radius, PLACE_SHARE * room_of(site)
         self._left = min(MOST_TRIED, TRIED_TOGETHER // self._contract.robots)
-        hard = [site.outlines[name].filled for name in self._contract.keep_out]
+        hard = [site.solid(name, self._contract) for name in self._contract.keep_out]
         sure, faint = ([t.region for t in site.others if t.sure is yes] for yes in (True, False))
         self._regions = [shapely.union_all(regions) for regions in (hard, sure, faint)]
 

@@ -90,7 +90,7 @@ def stand_of(
 
 def _foreign(contract: Contract, group: Group, site: Site) -> list[Polygon]:
     """What a group's robots may not stand on, other than its own targets."""
-    return [site.outlines[t].filled for t in contract.solid_targets if t not in group.targets]
+    return [site.solid(t, contract) for t in contract.solid_targets if t not in group.targets]
 
 
 def _stands_on(solid: list[Polygon], points: FloatArray, radius: float) -> bool:

@@ -14,6 +14,7 @@ DETECTORS = Registry[Callable[..., Detector]](
         "standout": f"{_HERE}.candidates:StandoutDetector",
         "groundingdino": f"{_HERE}.grounding_dino:GroundingDinoDetector",
         "mm-groundingdino": f"{_HERE}.grounding_dino:MmGroundingDinoDetector",
+        "vlm": f"{_HERE}.vlm:VlmDetector",
     },
 )
 
