@@ -220,7 +220,7 @@ def _in_passing(way: BaseGeometry, region: BaseGeometry, radius: float) -> float
     goes out or in by nearly the shortest way.
     """
     least, body = np.inf, region.buffer(radius - ROUNDING)
-    for part in _parts(shapely.intersection(way, body)):
+    for part in _pieces_of(shapely.intersection(way, body)):
         near = float(region.distance(part))
         ends = [end for end in _ends(way) if part.distance(end) < ROUNDING]
         out = sum(float(body.boundary.distance(end)) for end in ends)
@@ -230,7 +230,7 @@ def _in_passing(way: BaseGeometry, region: BaseGeometry, radius: float) -> float
     return least
 
 
-def _parts(geometry: BaseGeometry) -> list[BaseGeometry]:
+def _pieces_of(geometry: BaseGeometry) -> list[BaseGeometry]:
     parts = shapely.get_parts(geometry)
     return [part for part in parts if not part.is_empty]
 
