@@ -6,6 +6,7 @@ at most 30 times a second, with rests as long as it takes, so that robots are no
 
 import asyncio
 import os
+import sys
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -281,9 +282,11 @@ def _window() -> Window | None:
     except ImportError:
         raise InputError("--watch needs an extra: pip install 'formup[sim]'.") from None
     chosen, why = "SDL_VIDEODRIVER" in os.environ, "this machine has no display"
+    screens = os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
     try:
-        pygame.display.init()
-        if chosen or pygame.display.get_driver() not in HEADLESS:
+        if sys.platform != "linux" or screens:  # SDL complains on its own where there is none
+            pygame.display.init()
+        if pygame.display.get_init() and (chosen or pygame.display.get_driver() not in HEADLESS):
             pygame.display.set_mode(SIZE, pygame.HIDDEN)
             return Window()
     except pygame.error as error:
