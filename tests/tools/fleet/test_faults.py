@@ -198,3 +198,15 @@ def test_a_fleet_that_fails_ends_the_deployment_with_its_reason() -> None:
     arrival = deployed(fleet)
     assert (arrival.ended, arrival.reason) == ("failed", "The radio has no power.")
     assert arrival.certified is False
+
+
+def test_robots_that_are_pushed_onto_each_other_stand_and_go_on_from_there() -> None:
+    push = {"robot": 3, "at": 0.1, "by": (55.0, 0.0)}
+    fleet = SimulatedFleet(poses(0), physics=physics(pushes=[push], slip=0.0), seed=1)
+    pushed = deployed(fleet)
+    undisturbed = deployed(SimulatedFleet(poses(0), physics=physics(slip=0.0), seed=1))
+    assert (pushed.ended, undisturbed.ended) == ("arrived", "arrived")
+    assert pushed.corrections > undisturbed.corrections
+    assert pushed.separation_px is not None
+    assert undisturbed.separation_px is not None
+    assert pushed.separation_px < 2 * RADIUS <= undisturbed.separation_px
