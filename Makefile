@@ -71,7 +71,8 @@ wordings: .venv/.ready-dev
 # The tools, placing and checking, who takes which place, cages, each beside the bare library calls;
 # long sessions.
 bench: .venv/.ready-dev
-	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions bench_turns bench_big; do \
+	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions bench_turns bench_big \
+	  bench_motion; do \
 	  echo "== $$what"; $(BIN)/python -m formup.benchmarks.$$what || exit 1; echo; \
 	done
 
