@@ -141,16 +141,16 @@ def scene_rows(sizes: Sequence[int], seeds: range) -> Iterator[str]:
                 f"{n:6} {len(done):8} {sum(o.arrived for o in done):7} "
                 f"{min(o.separation for o in done):8.3f} {min(o.seen for o in done):6.3f} "
                 f"{min(o.clearance for o in done):6.3f} "
-                f"{_spread([o.over_bound for o in done]):>14} "
-                f"{_spread([o.planning for o in done]):>13} "
-                f"{_spread([o.checking for o in done]):>13}"
+                f"{_median_and_worst([o.over_bound for o in done]):>14} "
+                f"{_median_and_worst([o.planning for o in done]):>13} "
+                f"{_median_and_worst([o.checking for o in done]):>13}"
             )
         for seed, outcome in found.items():
             if outcome.why:
                 yield f"       {scene(seed, n).name} (seed {seed}): {outcome.why}"
 
 
-def _spread(values: Sequence[float]) -> str:
+def _median_and_worst(values: Sequence[float]) -> str:
     return f"{median(values):.2f} / {max(values):.2f}"
 
 
@@ -260,7 +260,7 @@ def orca_rows(sizes: Sequence[int], seeds: range) -> Iterator[str]:
             yield (
                 f"{n:6} {name:8} {len(ended):6}/{len(rows):3} {np.mean(arrived):8.1%} "
                 f"{sum(a < 1 - 1e-3 for a in apart):7} {min(apart):8.3f} "
-                f"{_spread(ended) if ended else '-':>14} {_spread(spent):>13}"
+                f"{_median_and_worst(ended) if ended else '-':>14} {_median_and_worst(spent):>13}"
             )
 
 

@@ -34,6 +34,8 @@ ROOM = 5_000.0
 """Picture for each robot, px^2, in a picture of 640 x 480 at least."""
 PITCH, RANDOM_PITCH = 2.6 * RADIUS, 2.1 * RADIUS
 """How far apart robots start that are packed, and random ones at least, px."""
+TARGET = (0.15, 0.45)
+"""How large targets are, as a share of the picture's shorter side."""
 TRIES = 60
 DRAWN = {
     "square": ((0, 0), (1, 0), (1, 1), (0, 1)),
@@ -108,7 +110,9 @@ def _made(
     """A scene, or None where the formation or the robots do not fit."""
     middle, side = np.array(size) / 2, min(size)
     things = {
-        "t1": _outline(random, shape, middle * random.uniform(0.8, 1.2, 2), side * _share(random))
+        "t1": _outline(
+            random, shape, middle * random.uniform(0.8, 1.2, 2), side * random.uniform(*TARGET)
+        )
     }
     for k in range(random.integers(1, 5)):
         angle, away = random.uniform(0, 2 * math.pi), random.uniform(0.3, 0.5)
@@ -133,11 +137,6 @@ def _made(
     if points is None or not plan.verdict.certified or plan.partial is not None:
         return None
     return Scene(f"{shape}, {starts}, {relation}", plan, site, points)
-
-
-def _share(random: np.random.Generator) -> float:
-    """How large a target is, as a share of the picture's shorter side."""
-    return float(random.uniform(0.15, 0.45))
 
 
 @lru_cache(maxsize=1)
