@@ -72,7 +72,7 @@ wordings: .venv/.ready-dev
 # long sessions; the simulator, beside pyrvo where that is installed.
 bench: .venv/.ready-dev
 	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions bench_turns bench_big \
-	  bench_simulator; do \
+	  bench_simulator bench_motion; do \
 	  echo "== $$what"; $(BIN)/python -m formup.benchmarks.$$what || exit 1; echo; \
 	done
 

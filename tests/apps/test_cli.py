@@ -29,6 +29,7 @@ KEYS = [
     "positions",
     "headings_deg",
     "verdict",
+    "motion",
     "partial",
     "arrival",
     "metric",
