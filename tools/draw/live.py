@@ -147,9 +147,9 @@ class Ground:
         scale = self._magnified * float((area / whole).min())
         cut = np.clip(np.round(area / scale), 1, whole).astype(int)
         low = np.clip(np.round(self._centre - cut / 2), 0, whole - cut).astype(int)
-        self._centre = low + cut / 2
-        (x0, y0), (x1, y1) = low, low + cut
-        part, origin = part_of(self._picture, (float(x0), float(y0), float(x1), float(y1)))
+        self._centre = np.asarray(low + cut / 2, dtype=float)
+        x0, y0, x1, y1 = np.concatenate([low, low + cut], dtype=float).tolist()
+        part, origin = part_of(self._picture, (x0, y0, x1, y1))
         long = max(int(cut.max() * min(scale, float((area / cut).min()))), 1)
         shown = np.array(shown_size(part, long))
         left, top = ((area - shown) // 2 + (0, BAR)).tolist()
@@ -177,8 +177,7 @@ class Ground:
     @property
     def look(self) -> tuple[float, ...]:
         """Which part of the picture is looked at."""
-        x, y = map(float, self._centre)
-        return x, y, self._magnified
+        return (*self._centre.astype(float).tolist(), self._magnified)
 
     def pan(self, by: tuple[float, float]) -> None:
         """Move the picture by so many px of the page."""

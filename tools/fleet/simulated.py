@@ -26,7 +26,8 @@ from .protocol import (
 from .simulator import PERIOD, Simulator, tracking_error
 from .starts import set_down
 
-MAX_ROBOTS = 10_000
+MAX_ROBOTS = 1_000
+"""Above this, motion takes too long to plan."""
 SPEED_SHARE = 0.2
 """Share of the picture's diagonal a robot drives in a second where nobody says how fast it is."""
 FULL_SPEED_S = 0.25

@@ -20,6 +20,9 @@ from .routes import NOBODY, NoRouteError
 REACHES, SPOKES, SPOTS = (1.2, 2.0, 3.0, 4.5, 7.0, 10.0), 12, 8
 """Robots wait so many times as far from their starts as they stay apart, in so many directions;
 so many of those spots are tried."""
+PARKED, REROUTED, ASIDE = 100, 200, 40
+"""Most robots whose starts and goals others are led around, most such ways that are tried, and most
+robots that are asked to step aside."""
 ROUNDS, SWAPS = 12, 200
 """Most times that robots in circles are matched anew, and most pairs that are exchanged."""
 
@@ -128,20 +131,20 @@ def matched_anew(found: Matched, starts: FloatArray, ways: Ways, apart: float) -
 
 def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
     """Robots in circles on ways around the starts and goals of the others, where it helps."""
+    everyone, left = list(range(len(found.paths))), REROUTED
     for _ in range(ROUNDS):
         better = found
         for circle in found.circles:
-            for i in circle:
-                for others in (range(len(found.paths)), circle):
-                    ends = [
-                        path[[0, -1]]
-                        for j, path in enumerate(found.paths)
-                        if j != i and j in others
-                    ]
-                    other = _past(better, int(i), np.concatenate(ends), ways, apart)
+            for i in map(int, circle):
+                for others in (everyone, [int(j) for j in circle]):
+                    if len(others) > PARKED or not left:
+                        continue
+                    left -= 1
+                    ends = [found.paths[j][[0, -1]] for j in others if j != i]
+                    other = _past(better, i, np.concatenate(ends), ways, apart)
                     if other is not None:
+                        better = _best(better, other)
                         break
-                better = _best(better, other)
         if better is found or not better.circles:
             return better
         found = better
@@ -161,7 +164,7 @@ def stepped_aside(
         inside = Counter(int(i) for circle in found.circles for i in circle)
         demands = Counter(found.before.ravel().tolist())
         left = [i for i in inside if i < len(found.robots) and i not in {*tried, *found.aside}]
-        if not left:
+        if not left or len(tried) == ASIDE:
             break
         robot = max(left, key=lambda i: demands[i])
         tried.add(robot)

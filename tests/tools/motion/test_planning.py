@@ -104,7 +104,8 @@ def test_nobody_is_touched_however_late_anybody_is(seed: int, n: int, stops: boo
 def test_a_packed_block_moves_into_a_packed_block(n: int) -> None:
     side = int(np.sqrt(n))
     block = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
-    starts, goals = 20 + 2.1 * RADIUS * block, np.array([500, 200]) + 2.1 * RADIUS * block
+    starts = np.asarray(20 + 2.1 * RADIUS * block, dtype=float)
+    goals = starts + np.array([480.0, 180.0])
     motion = planned(starts, goals)
     longest = max(float(arc_lengths(path)[-1]) for path in motion.paths.values())
     assert motion.makespan < 2 * longest / SPEED
