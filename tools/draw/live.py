@@ -139,7 +139,7 @@ class Ground:
     ) -> None:
         self._picture, self._world, self._plan = picture, world, plan
         self._title, self._radius = drawable(title), radius
-        self._centre, self._magnified = np.array(picture.size) / 2, 1.0
+        self._centre, self._magnified = np.array(picture.size, dtype=float) / 2, 1.0
 
     def draw(self, size: tuple[int, int]) -> Image.Image:
         """A page of a size."""
@@ -177,7 +177,7 @@ class Ground:
     @property
     def look(self) -> tuple[float, ...]:
         """Which part of the picture is looked at."""
-        return (*self._centre.astype(float).tolist(), self._magnified)
+        return float(self._centre[0]), float(self._centre[1]), self._magnified
 
     def pan(self, by: tuple[float, float]) -> None:
         """Move the picture by so many px of the page."""
