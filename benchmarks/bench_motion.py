@@ -111,7 +111,10 @@ def measured(of: Scene) -> Outcome:
     if not verdict.certified:
         return Outcome(f"not certified: {verdict.findings[0].sentence}")
     fleet = SimulatedFleet(of.poses(), physics=PHYSICS)
-    arrival = asyncio.run(deploy(of.plan, of.site, fleet, made.robots)).arrival
+    try:
+        arrival = asyncio.run(deploy(of.plan, of.site, fleet, made.robots)).arrival
+    except FleetError as error:
+        return Outcome(f"not driven: {error}")
     off = (np.array(arrival.residual_px) > arrival.tolerance_px).nonzero()[0]
     unnamed = {arrival.robots[i] for i in off} - {*arrival.failed, *arrival.waiting}
     return Outcome(

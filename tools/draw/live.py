@@ -139,7 +139,8 @@ class Ground:
     ) -> None:
         self._picture, self._world, self._plan = picture, world, plan
         self._title, self._radius = drawable(title), radius
-        self._centre, self._magnified = np.array(picture.size, dtype=float) / 2, 1.0
+        self._centre: FloatArray = np.array(picture.size, dtype=float) / 2
+        self._magnified = 1.0
 
     def draw(self, size: tuple[int, int]) -> Image.Image:
         """A page of a size."""

@@ -114,7 +114,8 @@ def encounters_of(
 
     found: list[Encounter] = []
     for thing in site.others:
-        on, least = placed(distances(thing.region, points) - body < TOUCHING), max(radius, 1e-9)
+        least = max(radius, 1e-9)
+        on = placed(distances(thing.region, points) < max(body + TOUCHING, least))
         over = [n for n, x in lines.items() if shapely.distance(thing.region, x) < least]
         moving = tuple(sorted({*over} - {*on}, key=rank.__getitem__))
         met = Encounter(how="on", robots=on, thing=thing.id, label=thing.label, sure=thing.sure)

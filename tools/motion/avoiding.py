@@ -1,10 +1,9 @@
 """Paths that also keep off the other things in a picture, as far as there is a way around them.
 
-What a robot starts or is to stand on is not in its way, and what would wall it off is driven over:
-less certain things before certain ones. Frame: image pixels.
+What a robot starts or is to stand on it leaves or enters by the shortest way, and what would wall
+it off is driven over: less certain things before certain ones. Frame: image pixels.
 """
 
-from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,8 +17,8 @@ from ..formation.site import Other, Site
 from ..geometry.outline import FloatArray, distances
 from .routes import NOBODY, NoRouteError, routes
 
-STANDING = 1.1
-"""A robot whose centre is no further from a thing than so many radii stands on it."""
+BESIDE = 1.1
+"""A robot whose centre is no further from a thing than so many radii leaves it before it drives."""
 ROOM_SHARES = (1.0, 0.3, 0.0)
 """How much of the room beside things is kept: less where there is no other way."""
 NEAR_END = 0.5
@@ -73,34 +72,18 @@ def routes_off(
             around, left = shapely.union_all([around, *left[met]]), left[~met]
         return walled
 
-    for robots, things in _by_things_stood_on(starts, goals, site.others, radius):
-        for off in (things, [thing for thing in things if thing.sure]):
-            for share in ROOM_SHARES:
-                robots = route(robots, off, share)
-        route(robots, (), 0.0)
+    robots = np.arange(len(starts))
+    for things in (site.others, [thing for thing in site.others if thing.sure]):
+        for share in ROOM_SHARES:
+            robots = route(robots, things, share)
+    route(robots, (), 0.0)
     return [paths[i] for i in range(len(starts))]
 
 
 def _with_room(thing: Other, room: float, ends: FloatArray, radius: float) -> BaseGeometry:
-    """A thing with room around it, px, less where a path ends near that does not end on it."""
+    """A thing with room around it, px, less where a path ends near that does not end at it."""
     off = distances(thing.region, ends)
-    spare = float(off[off > STANDING * radius + 0.1].min(initial=np.inf)) - radius
+    spare = float(off[off > BESIDE * radius + 0.1].min(initial=np.inf)) - radius
     reach = min(room, NEAR_END * spare)
     slack = DETAIL * reach
     return thing.region.simplify(slack).buffer(reach + slack, quad_segs=2)
-
-
-def _by_things_stood_on(
-    starts: FloatArray, goals: FloatArray, others: Sequence[Other], radius: float
-) -> list[tuple[Indices, list[Other]]]:
-    """Robots with the things that each can keep off: it neither starts nor is to stand on them."""
-    groups: defaultdict[bytes, list[int]] = defaultdict(list)
-    ends = np.concatenate([starts, goals])
-    near = [distances(thing.region, ends).reshape(2, -1).min(axis=0) for thing in others]
-    on: NDArray[np.bool_] = np.reshape(near, (-1, len(starts))) <= STANDING * radius + 0.1
-    for robot in range(len(starts)):
-        groups[on[:, robot].tobytes()].append(robot)
-    return [
-        (np.array(same), [t for t, under in zip(others, on[:, same[0]], strict=True) if not under])
-        for same in groups.values()
-    ]

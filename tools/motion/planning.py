@@ -6,7 +6,7 @@ Frame: image pixels.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import shapely
@@ -167,18 +167,19 @@ def _matched(
     everyone, straight = np.arange(len(goals)), ways(team.starts, goals, NOBODY)
     nearest = min(min_spacing(team.starts), min_spacing(goals))
     roomy = min(ROOMY * nearest, MOST_ROOM * team.radius)
-    for apart in (roomy, separation(team.starts, goals, radius)):
+    found, apart = match(everyone, straight, roomy), roomy
+    for apart in (roomy, *(separation(team.starts, goals, r) for r in (radius, team.radius))):
+        if apart == roomy < 2 * radius * EXACT:
+            continue
         found = match(everyone, straight, apart)
         if interchangeable and found.circles:
             found = matched_anew(found, team.starts, ways, apart)
-        if apart >= 2 * radius * EXACT and not found.circles:
-            return found, apart
-    found = rerouted(found, ways, apart)
-
-    def free(spots: FloatArray) -> NDArray[np.bool_]:
-        return _off(spots, ground, standing, radius, apart)
-
-    return stepped_aside(found, ways, apart, free), apart
+        if found.circles and apart != roomy:
+            free = partial(_off, ground=ground, standing=standing, radius=radius, apart=apart)
+            found = stepped_aside(rerouted(found, ways, apart), ways, apart, free)
+        if not found.circles:
+            break
+    return found, apart
 
 
 def _off(

@@ -24,8 +24,11 @@ from ..geometry.outline import FloatArray, distances
 MAX_NODES, EACH_NODES = 80, 12
 """Vertices kept of obstacles, and of each further part of them: enough for a path within a percent
 of the shortest."""
-BEND_SEGMENTS = 3
-"""Segments of a quarter circle around an obstacle's corner."""
+Bend = tuple[int, float]
+BEND: Bend = (3, 0.01)
+CLOSE: Bend = (8, 0.001)
+"""Segments of a quarter circle around a corner, and by which share paths keep off it further than
+they must; close to it where nothing else leads through."""
 ROOM_SHARES = (0.7, 0.3, 0.03)
 """How much of the smallest clearance at starts and goals paths keep: well away where there is
 room, squeezing past where not."""
@@ -130,7 +133,7 @@ def way_lengths(
     """
     from scipy.spatial.distance import cdist
 
-    graph = _graph(solid.wkb, radius, None)
+    graph = _graph(solid.wkb, radius, None, BEND)
     lengths = cdist(starts, goals)
     lines = np.stack(np.broadcast_arrays(starts[:, None], goals[None]), axis=2)
     bent = shapely.intersects(shapely.linestrings(lines), graph.barrier)
@@ -179,12 +182,22 @@ class _Ground:
         away = max(float(distances(self.solid, goals).min()), LEAST_EXIT)
         rim = self.solid.buffer(away / ROUND_DIP, quad_segs=ROUND_SEGMENTS)
         free = shapely.difference(rim.boundary, shapely.union_all(bodies))
-        inside = shapely.intersection(free, self.frame.box)
-        line = next(part for part in (inside, free, rim.boundary) if not part.is_empty)
+        open_ = shapely.intersection(free, self._within_reach(goals, bodies))
+        tried = [shapely.intersection(part, self.frame.box) for part in (open_, free)]
+        tried = [tried[0], open_, tried[1], free, rim.boundary]
+        line = next(part for part in tried if not part.is_empty)
         exits = starts.copy()
         shortest = shapely.shortest_line(shapely.points(starts[on]), line)
         exits[on] = shapely.get_coordinates(shortest)[1::2]
         return exits
+
+    def _within_reach(self, goals: FloatArray, bodies: Bodies) -> BaseGeometry:
+        """Where a robot can be that some goal can be driven to from, off obstacles and bodies."""
+        taken = shapely.union_all([self.solid.buffer(0.99 * self.radius), *bodies])
+        ground = self.frame.box.buffer(self.far).difference(taken)
+        parts = shapely.get_parts(ground)
+        at = shapely.multipoints(goals)
+        return shapely.union_all(parts[shapely.intersects(parts, at)])
 
     def paths(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> list[FloatArray]:
         """Shortest paths past the obstacles and those bodies that would be in the way."""
@@ -215,12 +228,12 @@ class _Ground:
         paths = list(ways)
         for group, keeps in self._groups(starts, goals):
             left = group
-            for keep, bounded in [*((keep, True) for keep in keeps), (keeps[-1], False)]:
-                frame = self.frame if bounded else None
+            tries = [(keep, self.frame, BEND) for keep in keeps]
+            for keep, frame, bend in [*tries, (keeps[-1], None, BEND), (keeps[-1], None, CLOSE)]:
                 if len(bodies):
-                    graph = _graph_past(self.solid, keep, bodies, frame)
+                    graph = _graph_past(self.solid, keep, bodies, frame, bend)
                 else:
-                    graph = _graph(self.solid.wkb, keep, frame)
+                    graph = _graph(self.solid.wkb, keep, frame, bend)
                 straight = shapely.linestrings(ways[left])
                 left = left[shapely.intersects(straight, graph.barrier)]
                 found = {int(i): graph.path(*ways[i]) for i in left}
@@ -266,13 +279,13 @@ class _Ground:
 
 
 @lru_cache(maxsize=32)
-def _graph(solid: bytes, keep: float, frame: Frame | None) -> "_Visibility":
+def _graph(solid: bytes, keep: float, frame: Frame | None, bend: Bend) -> "_Visibility":
     """Around obstacles alone, which are asked for again and again."""
-    return _graph_past(shapely.from_wkb(solid), keep, NOBODIES, frame)
+    return _graph_past(shapely.from_wkb(solid), keep, NOBODIES, frame, bend)
 
 
 def _graph_past(
-    solid: BaseGeometry, keep: float, bodies: Bodies, frame: Frame | None
+    solid: BaseGeometry, keep: float, bodies: Bodies, frame: Frame | None, bend: Bend
 ) -> "_Visibility":
     """What sees what around obstacles and bodies, within a frame if there is one.
 
@@ -282,7 +295,7 @@ def _graph_past(
     if len(bodies):
         barrier = shapely.union_all([barrier, *bodies])
     shapely.prepare(barrier)
-    nodes = _nodes(solid, keep, bodies, barrier)
+    nodes = _nodes(solid, keep, bodies, barrier, bend)
     if frame is not None:
         nodes = nodes[shapely.intersects_xy(frame.box, nodes)]
     return _Visibility(nodes, barrier)
@@ -294,10 +307,13 @@ def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
     return shapely.get_coordinates(shapely.line_interpolate_point(lines, shares, normalized=True))
 
 
-def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeometry) -> FloatArray:
+def _nodes(
+    solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeometry, bend: Bend
+) -> FloatArray:
     """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
-    dip = round_join_dip(BEND_SEGMENTS)
-    grown = solid.buffer((1.01 * keep + 0.05) * dip, quad_segs=BEND_SEGMENTS)
+    segments, spare = bend
+    dip = round_join_dip(segments)
+    grown = solid.buffer(((1 + spare) * keep + 5 * spare) * dip, quad_segs=segments)
     tolerance, most = 0.0, MAX_NODES + EACH_NODES * (shapely.get_num_geometries(grown) - 1)
     while True:
         coarse = grown.simplify(tolerance).buffer(1.05 * tolerance, join_style="mitre")
@@ -306,8 +322,8 @@ def _nodes(solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeomet
             break
         tolerance = max(1.5 * tolerance, 0.25)
     x0, _, x1, _ = shapely.bounds(bodies).reshape(-1, 4).T
-    reach = (1.01 * (x1 - x0) / 2 + 0.05) * dip
-    corners = shapely.buffer(shapely.centroid(bodies), reach, quad_segs=BEND_SEGMENTS)
+    reach = ((1 + spare) * (x1 - x0) / 2 + 5 * spare) * dip
+    corners = shapely.buffer(shapely.centroid(bodies), reach, quad_segs=segments)
     bends = shapely.get_coordinates(corners)
     free = bends[~shapely.intersects_xy(barrier, bends)]
     return np.unique(np.concatenate([coordinates, free]), axis=0)

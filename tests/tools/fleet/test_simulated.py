@@ -107,7 +107,7 @@ def test_more_robots_than_there_is_room_for_are_refused_in_words() -> None:
 
 
 def test_more_robots_than_are_simulated_are_refused() -> None:
-    with pytest.raises(FleetSizeError, match="10001 robots can be placed"):
+    with pytest.raises(FleetSizeError, match="1001 robots can be placed"):
         open_fleet(request(MAX_ROBOTS + 1))
 
 

@@ -123,3 +123,26 @@ def test_what_one_robot_stands_on_is_still_in_the_way_of_the_others() -> None:
     on, past = around(starts, goals, [thing], 2.0)
     assert crossed(on, thing)
     assert not crossed(past, thing, 2.0)
+
+
+def test_a_robot_beside_or_on_a_thing_leaves_it_and_enters_it_by_the_shortest_way() -> None:
+    thing = box("c1", 280, 200, 360, 280)
+    beside, deep, far = (320, 197.5), (320, 275), (600, 250)
+    starts, goals = ends(beside, deep, (320, 400), (320, 390)), ends((320, 400), far, beside, deep)
+    for path in around(starts, goals, [thing], 2.0):
+        over = thing.region.intersection(LineString(path)).length
+        assert over <= 5.01, path
+
+
+@settings(max_examples=60, deadline=None)
+@given(SEEDS)
+def test_robots_that_stand_at_a_thing_do_not_drive_over_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    things = scattered(rng, 6)
+    off = rng.uniform(1.0, 6.0, len(things))
+    rims = [t.region.buffer(o).exterior for t, o in zip(things, off, strict=True)]
+    at = shapely.line_interpolate_point(np.repeat(np.array(rims), 2), rng.random(12), True)
+    starts = shapely.get_coordinates(at)
+    for path in around(starts, np.roll(starts, 1, axis=0), things, 3.0):
+        over = shapely.union_all([t.region for t in things]).intersection(LineString(path))
+        assert over.length == 0

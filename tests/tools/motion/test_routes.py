@@ -147,6 +147,7 @@ def test_who_stands_on_a_target_leaves_it_by_the_shortest_way_and_stays_off(
 @settings(max_examples=60)
 @given(st.sampled_from(["none", *sorted(SOLIDS)]), RADII, st.integers(1, 40), SEEDS)
 @example("needle", 9, 11, 501)
+@example("three", 9, 32, 9911743)
 def test_idle_robots_are_driven_around(name: str, radius: float, count: int, seed: int) -> None:
     solid, rng = SOLIDS.get(name, Polygon()), np.random.default_rng(seed)
     if name == "none":
