@@ -10,6 +10,7 @@ from itertools import pairwise
 from .demand_fields import LENGTHS, Fields
 from .demands import Item, demands_in, items_of, says_inside, says_more, sentences, stops_in
 from .drawn_forms import form_in
+from .evidence import weighed
 from .languages import foreign_language
 from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
 from .reading import Reading
@@ -43,6 +44,13 @@ PLACES = {
 CLOSING = {"enclose", "enclosure", "prevent"}
 MAY_CLOSE = 0.2
 """Least probability of a cage for one of these classes to settle it."""
+PREPOSITIONS = frozenset(word for words in PLACES.values() for word in words)
+DEFINITE = frozenset(("the", "this", "that", "these", "those", "my", "our", "your"))
+"""Articles after which a phrase for a thing goes on."""
+SUBJECTS = frozenset(("nobody", "none", "nothing", "no", "anything"))
+"""Negations that are what a sentence is about, whoever it is told to."""
+OUTWARD = frozenset(("off", "away", "clear", "out", "outside"))
+"""Words with a distance that is kept outside the thing."""
 ENDS = frozenset(",.;:!?()")
 """Signs at which a stretch of words that was not understood ends."""
 
@@ -52,8 +60,8 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
     form, span = form_in(text)
     words = tokens(text)
     tagging = tag(words)
-    relation = max(tagging.meaning, key=lambda m: tagging.meaning[m])
-    known = may_command([w.text for w in words], relation)
+    meaning = weighed(tagging.meaning, items_of(text, words, tagging))
+    known = may_command([w.text for w in words], max(meaning, key=lambda m: meaning[m]))
     tagging = tag(words, known)
     items = [_drawn(item, span) for item in items_of(text, words, tagging)]
     meaning = _meaning(words, tagging, items)
@@ -66,14 +74,15 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
 
 def _meaning(words: Sequence[Token], tagging: Tagging, items: Sequence[Item]) -> dict[str, float]:
     """What the command means, where lengths with the words about them say nothing of it."""
-    lengths = [d for d in demands_in(items) if d.sets in (*LENGTHS, "robot_diameter")]
+    lengths = [d for d in demands_in(items) if d.sets in (*LENGTHS, "robot_diameter", "apart")]
     spans = [(items[d.first].start, items[d.last - 1].end) for d in lengths]
     labels = [
         "length" if any(a <= word.start < b for a, b in spans) else label
         for word, label in zip(words, tagging.labels, strict=True)
     ]
     bare = in_use().meaning([w.text for w in words], labels)
-    return max(bare, tagging.meaning, key=lambda m: max(m.values()))
+    meaning = max(bare, tagging.meaning, key=lambda m: max(m.values()))
+    return weighed(meaning, items)
 
 
 def _drawn(item: Item, span: tuple[int, int]) -> Item:
@@ -176,12 +185,22 @@ class _Reader:
             forced = "shape"
         elif self._parts():
             forced = "between"
-        elif "rings" in sets and reading.relation in ("several", "shape"):
+        elif sets & {"rings", "rings_of"} and reading.relation in ("several", "shape"):
             forced = next(m for m, _ in reading.meanings if m in ("around", "cage", "along"))
         elif "groups" in sets and reading.relation in ("several", "around", "along"):
             forced = "along"
+        elif "atop" in sets and reading.relation in ("several", "along", "around"):
+            forced = "inside"
+        elif reading.relation in ("around", "cage", "inside") and self._stands_off():
+            forced = forced or (reading.relation if reading.sure else "around")
         if forced and reading.relation != "ask":
             reading.meanings = [(forced, 1.0), *reading.meanings]
+
+    def _stands_off(self) -> bool:
+        """Whether a distance is said as one that is kept outside: "20 px off"."""
+        kept = [d for d in self.demands if d.sets == "clearance"]
+        said = {i.symbol for d in kept for i in self.items[d.first : d.last]}
+        return bool(said & OUTWARD)
 
     def _parts(self) -> bool:
         """Whether the command says between: the arrangement is no other then."""
@@ -196,8 +215,8 @@ class _Reader:
             return True
         closing = any(
             classes & CLOSING and not classes & {"surround", "ring", "near"}
-            for classes, item in zip(self.classes, self.items, strict=True)
-            if item.label == "command"
+            for k, classes in enumerate(self.classes)
+            if self.items[k].label == "command" and not self._is_forbidden(k)
         )
         return self.reading.relation == "around" and closing and likely >= MAY_CLOSE
 
@@ -209,12 +228,30 @@ class _Reader:
             place = [k for k in range(at, at + len(sentence)) if k not in demanded]
             at += len(sentence)
             symbols = {self.items[k].symbol for k in place}
-            negated = symbols & (NEGATIONS - {"without"})
+            negated = any(self._forbids_others(k, place) for k in place)
             if negated and any("prevent" in self.classes[k] for k in place):
                 return True
             if "kept" in symbols and symbols & {"out", "away", "in"}:
                 return True
         return False
+
+    def _is_forbidden(self, k: int) -> bool:
+        """Whether robots are told not to do it: "and do not block it"."""
+        clause = next((c for c in self.clauses if k in c), range(0))
+        before = [j for j in clause if j < k and self.items[j].symbol in NEGATIONS]
+        return any(not self._forbids_others(j, clause) for j in before)
+
+    def _forbids_others(self, k: int, sentence: Sequence[int]) -> bool:
+        """Whether a negation is about somebody else: "nobody", but not "they must not touch it"."""
+        symbol = self.items[k].symbol
+        if symbol not in NEGATIONS or symbol == "without":
+            return False
+        clause = next(c for c in self.clauses if k in c)
+        before = [j for j in sentence if j in clause and j < k]
+        told = {self.items[j].symbol for j in before}
+        orders = not told - {"and", "but", "so", "please", "they", "do"}
+        to_robots = bool(told & {"they", "you"}) or any("robot" in self.classes[j] for j in before)
+        return symbol in SUBJECTS or not (orders or to_robots)
 
     def _refer(self) -> None:
         """Phrases for things: the arrangement is about those that no demand took."""
@@ -260,15 +297,28 @@ class _Reader:
         kinds = [self._kind(k) for k in range(len(self.items))]
         for first, last in self._runs():
             within = kinds[first:last]
-            if "unread" in within and self._gives_reason(first, last):
-                self.reading.background.append(self._quote(first, last))
-                continue
             if "unread" in within:
-                self.reading.unread.append(self._quote(first, last))
+                self._account_unread(first, last)
                 continue
             aside = [k for k in range(first, last) if kinds[k] == "background"]
             if any(self.items[k].symbol not in fillers() | REASONS for k in aside):
                 self.reading.background.append(self._quote(aside[0], aside[-1] + 1))
+
+    def _account_unread(self, first: int, last: int) -> None:
+        """A reason changes nothing; what stands after "around the" is the thing, if no other is."""
+        reading, words = self.reading, [i.symbol for i in self.items[first:last]]
+        named = words[0] in PREPOSITIONS and len(words) > 2 and words[1] in DEFINITE
+        if self._gives_reason(first, last):
+            reading.background.append(self._quote(first, last))
+        elif named and not reading.things and self._only_names(first + 1, last):
+            reading.things.append(self._quote(first + 1, last))
+        else:
+            reading.unread.append(self._quote(first, last))
+
+    def _only_names(self, first: int, last: int) -> bool:
+        """Whether words can be a phrase for a thing that says nothing else."""
+        says = any(i.quantity or i.symbol in NEGATIONS for i in self.items[first:last])
+        return not says and not self._demands(self._quote(first, last))
 
     def _gives_reason(self, first: int, last: int) -> bool:
         """Whether a stretch of words is a reason or purpose that demands nothing more."""
@@ -284,6 +334,8 @@ class _Reader:
             return True
         if words[0].symbol not in REASONS or weighty:
             return False
+        if {"opening", "sides"} & set(self.reading.group):
+            return True
         return not any(self.classes[k] & ASKED_CLASSES for k in range(first, last))
 
     def _runs(self) -> Iterator[tuple[int, int]]:

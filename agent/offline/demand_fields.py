@@ -1,5 +1,6 @@
 """Demands of an instruction to fields of the contract, one rule after another."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,6 +22,8 @@ COUNTING = frozenset(
 DEGREES = {"right": 0, "bottom": 90, "down": 90, "left": 180, "top": 270, "up": 270}
 LEAST_BARE = 5
 """Numbers without a unit below this, px, are hardly lengths."""
+SEVERAL = re.compile(r"\b(?:two|three|four|five|six|both|pair|[a-z]+[^s\W]s)\b")
+"""What a phrase for more than one thing has in it."""
 LENGTHS = ("clearance", "pitch", "min_spacing", "max_gap", "radius", "diameter", "opening")
 
 
@@ -49,6 +52,10 @@ class Fields:
         if group.get(name, value) != value:
             return False
         group[name] = value
+        return True
+
+    def _replace(self, name: str, value: Any) -> bool:
+        self.reading.group[name] = value
         return True
 
     def _length(self, demand: Demand) -> bool:
@@ -96,8 +103,11 @@ class Fields:
         if low < 0:
             return False
         inside = self.reading.relation == "inside"
-        if demand.bound == "most":
-            return self._set("clearance", [0.0, high])
+        least, most = self.reading.group.get("clearance", (0.0, FARTHEST))
+        if demand.bound == "most" and most == FARTHEST and least <= high:
+            return self._replace("clearance", [least, high])
+        if demand.bound == "least" and least == 0.0 and low <= most:
+            return self._replace("clearance", [low, most])
         if demand.bound == "least" or (inside and low == high):
             return self._set("clearance", [low, FARTHEST])
         return self._set("clearance", [low, high if high > low else low + 1])
@@ -182,13 +192,14 @@ class Fields:
         return words - fillers()
 
     def _groups(self, demand: Demand) -> bool:
-        counts = [q.whole or 0 for q in demand.numbers] or [0, 0]
-        if len(demand.sides) != 2 or len(counts) != 2 or self.reading.shares:
+        sides, counts = dict.fromkeys(demand.sides), [q.whole or 0 for q in demand.numbers]
+        if demand.value == "each" and not any(n > 1 for n in counts):
+            counts = [1] * len(sides)
+        counts = counts or [0] * len(sides)
+        if len(sides) != len(counts) or self.reading.shares or not sides.keys() <= OPPOSITE.keys():
             return False
-        self.reading.shares = list(zip(demand.sides, counts, strict=True))
-        if all(counts):
-            self._robots_are(sum(counts))
-        return True
+        self.reading.shares = list(zip(sides, counts, strict=True))
+        return not all(counts) or self._robots_are(sum(counts))
 
     def _rings(self, demand: Demand) -> bool:
         count = next((q.whole for q in demand.numbers), 2)
@@ -196,6 +207,19 @@ class Fields:
             return False
         self.reading.rings = count
         return self.reading.relation in ("around", "cage", "along")
+
+    def _rings_of(self, demand: Demand) -> bool:
+        """Two rings of six, or four in the inner ring and six in the outer one."""
+        counts = [q.whole or 0 for q in demand.numbers]
+        if demand.value == "alike":
+            rings, counts = (2, counts * 2) if len(counts) == 1 else (counts[0], counts[1:] * 2)
+        else:
+            rings, counts = 2, counts[1:3] if counts[0] == 2 < len(counts) else counts[:2]
+        known = self.reading.ring_counts or (self.reading.rings > 1 and rings != self.reading.rings)
+        if known or rings != 2 or len(counts) != 2 or 0 in counts:
+            return False
+        self.reading.rings, self.reading.ring_counts = rings, counts
+        return self.reading.relation in ("around", "cage") and self._robots_are(sum(counts))
 
     def _robots(self, demand: Demand) -> bool:
         number = next((q for q in demand.numbers if q.kind in ("number", "compound")), None)
@@ -254,14 +278,31 @@ class Fields:
     def _adverb(self, demand: Demand) -> bool:
         return True
 
+    def _apart(self, demand: Demand) -> bool:
+        """Robots of a certified plan never touch."""
+        return True
+
+    def _which_of(self, demand: Demand) -> bool:
+        """Which of several things, "the upper of the drums"; of one it would be a part."""
+        after = self.items[demand.last]
+        return SEVERAL.search(self.text[after.start : after.end].lower()) is not None
+
+    def _left_alone(self, demand: Demand) -> bool:
+        """Other things, which robots keep off as it is."""
+        self.reading.background.append(self._quote(demand.first, demand.last))
+        return True
+
     def _at_each(self, demand: Demand) -> bool:
         if self.reading.relation != "corners" or any(q.whole is None for q in demand.numbers):
             return False
         self.corners += [q.whole for q in demand.numbers if q.whole and q.whole > 1]
+        self.reading.one_a_corner = not self.corners
         return True
 
     def _one_each(self, demand: Demand) -> bool:
-        return self.reading.relation == "corners" and all(q.least == 1 for q in demand.numbers)
+        one = self.reading.relation == "corners" and all(q.least == 1 for q in demand.numbers)
+        self.reading.one_a_corner |= one
+        return one
 
     def _side(self, demand: Demand) -> bool:
         side = demand.value or demand.sides[0]

@@ -80,7 +80,8 @@ def _groups(
     relation = reading.relation
     if reading.shares:
         counts = [count or robots // 2 for _, count in reading.shares]
-        counts = counts if sum(counts) == robots else [robots - robots // 2, robots // 2]
+        if sum(counts) != robots and len(counts) == 2:
+            counts = [robots - robots // 2, robots // 2]
         sides = [side for side, _ in reading.shares]
         rows = zip(sides, counts, strict=True)
         return [basics | {"relation": "along", "side": s, "robots": n} for s, n in rows]
@@ -89,7 +90,7 @@ def _groups(
         if "clearance" in basics:
             outer["clearance"] = [2 * d for d in basics["clearance"]]
         less = robots * 2 // 5 or 1
-        pair = zip((basics, outer), (less, robots - less), strict=True)
+        pair = zip((basics, outer), reading.ring_counts or (less, robots - less), strict=True)
         return [_related(reading, g | {"robots": n}) for g, n in pair]
     if relation == "shape":
         drawn = _drawn(reading, basics, attempt)

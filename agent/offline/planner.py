@@ -27,6 +27,7 @@ from .several import about_several, shares
 from .spelling import instructed, spelled
 
 MAX_LABEL = 100
+USUAL_CORNERS = 4
 READING = "The rules account for every word; the rest of them says which thing is meant."
 """Answers a doubt, which comes of single words."""
 
@@ -103,8 +104,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         return chosen
     shown, task = task.pointed, chosen
     reading = read_instruction(task.instruction, task.metres_per_pixel)
-    wording = reading.robots or (reading.form.robots if reading.form else None)
-    robots = task.robots or wording or _number_answered(history) or _standing_count(task)
+    robots = _robot_count(task, reading, history)
     question = question_of(task, reading, robots)
     if question or robots is None:
         asked: dict[str, Any] = {"question": question or "How many robots?"}
@@ -267,6 +267,26 @@ def _standing_count(task: Task) -> int | None:
     return len(task.standing["robots"]) if task.standing else None
 
 
+def _robot_count(task: Task, reading: Reading, history: History) -> int | None:
+    """How many robots are asked for; None where that has to be asked."""
+    wording = reading.robots or (reading.form.robots if reading.form else None)
+    robots = task.robots or wording or _number_answered(history) or _standing_count(task)
+    return robots or (_corner_count(history) if _counts_corners(reading) else None)
+
+
+def _counts_corners(reading: Reading) -> bool:
+    return reading.relation == "corners" and reading.one_a_corner and reading.robots is None
+
+
+def _corner_count(history: History) -> int | None:
+    """As many as the outline of the thing has corners, which is measured by a first proposal."""
+    measured = [m for m in history if isinstance(m, Result) and m.name == "propose_formation"]
+    if not measured or measured[-1].error:
+        return USUAL_CORNERS
+    target = json.loads(measured[-1].text)["targets"][0]
+    return int(target["corners"]) if target["kind"] == "polygonal" else None
+
+
 def _label(wording: str) -> str:
     """What a thing is called: the words for it without their article."""
     return wording.split(" ", 1)[-1][:MAX_LABEL]
@@ -286,6 +306,10 @@ def _after_proposal(task: Task, result: Result, history: History, before: Histor
             return _call("ask_user", {"question": facts.get("plain", result.text)})
         return _impossible(history, facts.get("plain", result.text), facts.get("partial_plan"))
     plan = json.loads(result.text)
+    reading = read_instruction(task.instruction, task.metres_per_pixel)
+    counts = _counts_corners(reading) and plan["robots"] != _robot_count(task, reading, history)
+    if counts and not task.standing:
+        return _begin(task, history, before)
     if not plan["certified"]:
         partial = plan.get("partial")
         reason = [*plan["findings"], *([partial["sentence"]] if partial else [])]

@@ -30,6 +30,8 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     for start, end in _runs(found, "thing"):
         while start < end - 1 and (words[start] in _lists()["leading"] or _is_verb(words, start)):
             found[start], start = "command", start + 1
+        headed = _after_verb(words, start, end)
+        found[start:headed], start = ["command"] * (headed - start), headed
         while end > start and words[end - 1] in _lists()["trailing"]:
             found[end - 1], end = "demand", end - 1
         cut = _passive(words, start, end)
@@ -67,6 +69,15 @@ def _mark_beside(words: Sequence[str], found: list[str]) -> None:
 def _is_verb(words: Sequence[str], at: int) -> bool:
     """Whether a word before a determiner is no noun: "circle the" at the very beginning."""
     return at == 0 and not may_open(words[0]) and may_open(words[1])
+
+
+def _after_verb(words: Sequence[str], start: int, end: int) -> int:
+    """Where a thing begins behind a verb nobody knows: "desired around" the court."""
+    opens = (k for k in range(start, end) if words[k] in _lists()["determiners"])
+    first = next(opens, start)
+    verb = words[start].endswith(("ed", "ing")) or words[start - 1] in _lists()["before_verbs"]
+    leads = first > start and words[first - 1] in _lists()["leading"]
+    return first if verb and leads else start
 
 
 def may_open(word: str) -> bool:

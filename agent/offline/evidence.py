@@ -1,0 +1,58 @@
+"""What the words right before a thing say of the arrangement, whatever else is in the sentence.
+
+"Around the helipad" is no row and nothing in it, however unlike the sentences a model has seen.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+
+from .demands import Item
+from .tagging import word_classes
+
+UNLIKELY, LESS_LIKELY = 0.002, 0.3
+"""What is left of the probability of an arrangement that the words rule out, and of several."""
+LIKELY = 0.1
+"""What is added to that of the arrangement that they are usually said of."""
+ANY = frozenset(("several", "ask"))
+TIPS = r"(?:corners?|vertex|vertices|tips?|points|apex(?:es)?|apices|peaks|cusps?)"
+EVIDENCE = tuple(
+    (re.compile(rf"(?<!\S)(?:{words})(?!\S)"), tuple(meanings.split()))
+    for words, meanings in (
+        (rf"(?:on|at|by|near|in|per|for|to|each|every|all) (?:\S+ ){{0,3}}{TIPS}", "corners"),
+        (r"between (?:<t>|both|the <n>|these <n>)", "between"),
+        (r"(?:around|round|about|encircl\S+|surround\S*|circling|enclosing) (?:it|<t>)",
+         "around cage shape along"),
+        (r"<t> (?:\S+ ){0,3}(?:around|round) it", "around cage shape along"),
+        (r"(?:in|inside|into|within|throughout|upon|aboard) (?:it|<t>)",
+         "inside centre shape"),
+        (r"(?:on|onto|across|over|all over) (?:it|<t>)", "inside centre shape along"),
+        (r"(?:alongside|beside|next to|along|parallel to|in front of|behind|beneath|below|above) "
+         r"(?:it|<t>)", "along shape between"),
+    )
+)  # fmt: skip
+"""Words before a thing, and the arrangements that they can be said of, the usual one first."""
+ENCLOSING = ("enclose", "enclosure", "prevent", "surround", "watch")
+"""After verbs of these classes "in" and "on" belong to the verb: "fence in", "close in on"."""
+
+
+def weighed(meaning: Mapping[str, float], items: Sequence[Item]) -> dict[str, float]:
+    """Probabilities of arrangements, less likely where the words before the thing rule them out."""
+    line = " ".join(i.symbol for i in items)
+    found = dict(meaning)
+    for pattern, fitting in EVIDENCE:
+        match = pattern.search(line)
+        if match is None or _of_verb(line[: match.start()], match[0]):
+            continue
+        others = {m: LESS_LIKELY if m in ANY else UNLIKELY for m in found}
+        found = {m: p * (1.0 if m in fitting else others[m]) for m, p in found.items()}
+        found[fitting[0]] += LIKELY
+        break
+    total = sum(found.values())
+    return {m: p / total for m, p in found.items()}
+
+
+def _of_verb(before: str, words: str) -> bool:
+    """Whether a preposition belongs to the verb before it."""
+    near = words.split()[0] in ("in", "on", "over", "about", "round")
+    verbs = word_classes(before.split()[-2:])
+    return near and any({*ENCLOSING} & {*classes} for classes in verbs)
