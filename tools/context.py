@@ -213,6 +213,7 @@ class Context:
         words: what the person said last; the contract is held against it.
         doubted: doubts that the model was told of in this turn, which its `reading` may answer.
         proposed: id of the plan that an earlier call of the same reply made.
+        agreed: whether a person has said yes to this very call.
         asks: asks the model that decides where things are; None outside of its turns.
         steps: those of the turns that changed the plan, after the one that undo ends at.
         observed: puts a world in place at once, because what it says was observed and holds even
@@ -226,6 +227,7 @@ class Context:
     words: str = ""
     doubted: frozenset[str] = frozenset()
     proposed: str | None = None
+    agreed: bool = False
     asks: VlmDetector | None = None
     steps: tuple[Step, ...] = ()
     observed: Callable[[World], None] = _ignore

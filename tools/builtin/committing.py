@@ -8,7 +8,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from ..context import Context, Settings
 from ..errors import ToolError
-from ..fleet.arrival import Arrival
+from ..fleet.follow import Follow
 from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, exact_clearance, nominal
 from ..formation.placement.avoidance import off_others
@@ -22,7 +22,7 @@ from ..perception.target_prompt import Point, TargetPrompt
 from ..tool import FilledBy, ToolResult, in_thread, tool
 from ..world import PlanNode, ShownCandidate, Target, World
 from .others import held_off, with_others
-from .robots import drive_to, with_robots
+from .robots import drive_to, with_observed, with_robots
 from .seeing import sighting
 from .targets import (
     closer_views,
@@ -196,20 +196,24 @@ def _unseen(world: World, held: Contract) -> tuple[str, ...]:
 
 @tool("actuate")
 async def deploy(
-    context: Context, plan_id: str | None = None, tell: str | None = None
+    context: Context,
+    plan_id: str | None = None,
+    tell: str | None = None,
+    follow: SkipJsonSchema[Follow | None] = None,
 ) -> ToolResult:
     """Move the robots to a certified plan; says where they arrived.
 
     Args:
         plan_id: left out: of this reply, else as stood before.
         tell: to the person on arrival; ends the turn.
+        follow: the thing, as it moves, from then on; a person's, in no schema.
     """
     plan_id, made = plan_id or _standing_id(context), context.proposed
     node = context.world.plan(plan_id or made)
     _check_may_move(context, node.plan)
     if plan_id is None and (advice := _to_see(context, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
-    arrival, world, moved = await drive_to(context, node)
+    arrival, world, moved = await drive_to(context, node, follow)
     worst = int(np.argmax(arrival.residual_px))
     data = {
         "plan_id": node.plan.id,
@@ -222,7 +226,8 @@ async def deploy(
     if not moved:
         data["already_there"] = True
     data |= {"reason": arrival.reason} if arrival.reason and moved else {}
-    message = _with_observed(tell, arrival, world) if arrival.arrived else None
+    data |= {"followed": arrival.follow.told(world.metres_per_pixel)} if arrival.follow else {}
+    message = with_observed(tell, arrival, world) if arrival.done else None
     data = with_metres(data, world.metres_per_pixel)
     return ToolResult(data, world=world, message=message)
 
@@ -348,17 +353,6 @@ def _slack(plan: Plan, name: str) -> float:
     groups = (g for g in plan.formation.contract.groups if name in g.targets)
     kept = [nominal(g.clearance) for g in groups if g.clearance is not None]
     return max(SLACK_SHARE * min(kept, default=MIN_CLEARANCE), SLACK_PX)
-
-
-def _with_observed(tell: str | None, arrival: Arrival, world: World) -> str | None:
-    """The model's words and, after them, what was observed."""
-    if not tell:
-        return None
-    count, worst = len(arrival.observed), max(arrival.residual_px)
-    robots = "The robot was" if count == 1 else f"All {count} robots were"
-    within = length_text(max(worst, 0.1), world.metres_per_pixel)
-    told = f"{robots} observed within {within} of the plan."
-    return " ".join(filter(None, [tell.strip(), told, arrival.reason]))
 
 
 def _held_to(contract: Contract, settings: Settings) -> Contract:

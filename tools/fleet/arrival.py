@@ -8,6 +8,7 @@ from pydantic import Field
 from ..formation.plan import Point
 from ..formation.value import Value
 from ..geometry.outline import FloatArray
+from .follow import Followed
 from .protocol import Pose
 
 Ended = Literal["arrived", "short", "stopped", "failed"]
@@ -32,6 +33,7 @@ class Arrival(Value):
         corrections: how many times robots were sent again after the first drive.
         separation_px: least distance of two robots that was seen on the way; None for one robot.
         track: hash of the file that holds where they were on their way.
+        follow: how they followed the thing after that; None where they were not to.
     """
 
     arrived: bool
@@ -49,6 +51,12 @@ class Arrival(Value):
     corrections: int
     separation_px: float | None = None
     track: str | None = None
+    follow: Followed | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether all that was wanted was done."""
+        return self.arrived and (self.follow is None or self.follow.ended == "time")
 
 
 @dataclass(frozen=True)
