@@ -12,6 +12,7 @@ from typing import Literal, Protocol
 
 from .errors import InputError, StorageError, ToolError
 from .fleet.described import fleet_named
+from .fleet.follow import Rigid
 from .fleet.protocol import Fleet, Pose
 from .formation.plan import Plan
 from .formation.units import check_scale
@@ -143,10 +144,20 @@ def _ignore(*what: object) -> None:
 
 
 Watch = Callable[[tuple[Pose, ...]], None]
-View = Callable[["Context", Plan, Fleet], AbstractContextManager[Watch]]
 
 
-def unseen(context: "Context", plan: Plan, fleet: Fleet) -> AbstractContextManager[Watch]:
+class Shown(Protocol):
+    """Is given the poses of robots that drive and, of a thing they follow, how it has moved."""
+
+    def __call__(self, poses: tuple[Pose, ...], moved: Rigid | None = None, /) -> None:
+        """Show them."""
+        ...
+
+
+View = Callable[["Context", Plan, Fleet], AbstractContextManager[Shown]]
+
+
+def unseen(context: "Context", plan: Plan, fleet: Fleet) -> AbstractContextManager[Shown]:
     """Nobody watches the robots."""
     return nullcontext(_ignore)
 

@@ -6,14 +6,15 @@ import numpy as np
 
 from ..context import Context
 from ..errors import FleetError, ToolError
-from ..fleet.arrival import Arrival
-from ..fleet.deploy import tolerance
+from ..fleet.arrival import Arrival, Track
+from ..fleet.deploy import TRACK_FRAMES, tolerance
 from ..fleet.escort import escort, lost, rigid_of, sighted
 from ..fleet.follow import Follow, Rigid
-from ..fleet.protocol import Fleet, Pose
+from ..fleet.protocol import Fleet, Pose, points_of
 from ..formation.plan import Plan
 from ..formation.units import length_text
 from ..world import World
+from .tracks import read_track, with_track
 
 
 async def stands_about(context: Context, plan: Plan, fleet: Fleet, follow: Follow | None) -> bool:
@@ -51,12 +52,14 @@ async def followed(
     """
     world, last = context.world, context.world.robots
     context.observed(world)
+    seen: list[tuple[tuple[Pose, ...], Rigid]] = []
 
     def watch(poses: tuple[Pose, ...], rigid: Rigid) -> None:
         nonlocal last
         last = poses
+        seen.append((poses, rigid))
         context.services.watch(poses)
-        show(poses)
+        show(poses, rigid)
 
     site, robots = world.site(plan.formation.contract), by_place(plan, arrival.robots)
     try:
@@ -68,12 +71,27 @@ async def followed(
             )
     finally:
         context.observed(world.having(robots=last))
-    arrival = arrival.model_copy(update={"follow": came})
+    arrival = await _filmed(context, arrival.model_copy(update={"follow": came}), seen)
     world = world.having(robots=last).with_arrival(plan.id, arrival)
     if came.ended in ("stopped", "failed"):
         context.observed(world)
         raise FleetError(came.reason or "")
     return arrival, world
+
+
+async def _filmed(
+    context: Context, arrival: Arrival, seen: Sequence[tuple[tuple[Pose, ...], Rigid]]
+) -> Arrival:
+    """An arrival whose track goes on with what was seen of a follow."""
+    if arrival.track is None or not seen:
+        return arrival
+    track = read_track(context.services.artefacts.get(arrival.track))
+    kept = [seen[int(i)] for i in np.linspace(0, len(seen) - 1, min(len(seen), TRACK_FRAMES))]
+    by_id = [{pose.id: pose for pose in poses} for poses, _ in kept]
+    points = np.stack([points_of([poses[robot] for robot in track.ids]) for poses in by_id])
+    moved = np.array([rigid.numbers for _, rigid in kept])
+    points, moved = np.concatenate([track.points, points]), np.concatenate([track.moved, moved])
+    return await with_track(context, arrival, Track(track.ids, points, moved))
 
 
 def by_place(plan: Plan, robots: Sequence[str]) -> list[str]:

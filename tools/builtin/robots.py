@@ -1,6 +1,5 @@
 """Robots for plans: which robot takes which place, and the drive there."""
 
-import json
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -9,8 +8,8 @@ import numpy as np
 import shapely
 
 from ..context import Context
-from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
-from ..fleet.arrival import Arrival, Deployment, Track
+from ..errors import ApprovalError, FleetError, InputError, ToolError
+from ..fleet.arrival import Arrival, Deployment
 from ..fleet.deploy import ARRIVED_DEG, MAX_AGE, check_turns, deploy, heading_residuals
 from ..fleet.described import fleet_named
 from ..fleet.escort import check_follow
@@ -23,10 +22,11 @@ from ..formation.plan import Plan
 from ..formation.site import Other
 from ..formation.units import length_text
 from ..motion.routes import obstacles
-from ..tool import in_thread, to_its_end
+from ..tool import in_thread
 from ..world import PlanNode, World
 from .follows import followed, stands_about
 from .motions import Going, going, met_by
+from .tracks import with_track
 
 MOST_NAMED = 12
 """Idle robots that a note names."""
@@ -121,7 +121,8 @@ async def drive_to(
         fleet = await _team(context, plan.formation.contract, plan.formation.robots)
         if follow is not None:
             await check_follow(plan, fleet, follow.most(world.picture.size))
-        if fleet.real and not (context.agreed if follow else context.settings.approved == plan.id):
+        agreed = context.settings.approved == plan.id and (follow is None or context.agreed)
+        if fleet.real and not agreed:
             raise ApprovalError(plan.id)
         before, arrival = world.arrivals.get(plan.id), None
         there = await stands_about(context, plan, fleet, follow)
@@ -145,10 +146,7 @@ async def _arrived(context: Context, plan: Plan, fleet: Fleet) -> tuple[Arrival,
     """What was observed after a deployment, and the world then."""
     made = await _deployed(context, plan, fleet)
     arrival = _in_robot_order(made.arrival, plan)
-    with suppress(StorageError):  # a film is not worth failing for
-        file, put = _track_file(made.track), context.services.artefacts.put
-        stored = await to_its_end(lambda: put(file))
-        arrival = arrival.model_copy(update={"track": stored})
+    arrival = await with_track(context, arrival, made.track)
     world = context.world.having(robots=made.poses).with_arrival(plan.id, arrival)
     if arrival.ended in ("stopped", "failed"):
         context.observed(world)
@@ -266,15 +264,3 @@ def _in_robot_order(arrival: Arrival, plan: Plan) -> Arrival:
             ),
         }
     )
-
-
-def _track_file(track: Track) -> bytes:
-    """Robots on their way as JSON, to a tenth of a pixel."""
-    points = np.round(track.points, 1).tolist()
-    return json.dumps({"robots": track.ids, "points": points}, separators=(",", ":")).encode()
-
-
-def read_track(data: bytes) -> Track:
-    """The track of a file that a deployment left."""
-    content = json.loads(data)
-    return Track(tuple(content["robots"]), np.asarray(content["points"], dtype=float))

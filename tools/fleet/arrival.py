@@ -1,8 +1,9 @@
 """What came of a deployment: requested against observed, and the way there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from ..formation.plan import Point
@@ -66,10 +67,13 @@ class Track:
     Attributes:
         ids: of the robots, in the order of their places.
         points: (f, n, 2) px at f moments, evenly thinned; the last is the last observation.
+        moved: (m, 3) how far the thing that was followed had moved at the last m of them, px, and
+            turned, radians.
     """
 
     ids: tuple[str, ...]
     points: FloatArray
+    moved: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
 
 
 @dataclass(frozen=True)

@@ -108,6 +108,11 @@ class Rigid:
         return np.array([[c, s], [-s, c]])  # of rows
 
     @property
+    def numbers(self) -> tuple[float, float, float]:
+        """How far it has moved, px, and turned, radians."""
+        return self.sighting.dx, self.sighting.dy, self.sighting.turn
+
+    @property
     def way(self) -> FloatArray:
         """How far it has moved, (2,) px."""
         return np.array([self.sighting.dx, self.sighting.dy])
