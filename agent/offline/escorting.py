@@ -14,7 +14,7 @@ VERB = (
     r"(?:follow|escort|accompany|shadow|"
     r"(?:keep up|keep pace|go along|move along|come along|travel|stay|stick|move|go) with)"
 )
-WHAT = r"(?P<what>it|them|him|her|this|that|(?:the|this|that) (?:[\w-]+ ){0,3}?[\w-]+?)"
+WHAT = r"(?P<what>it|them|him|her|this|that|t[0-9]+|(?:the|this|that) (?:[\w-]+ ){0,3}?[\w-]+?)"
 COUNTED = r"(?:[0-9]+(?:[.,][0-9]+)? ?|(?:[a-z]+[ -]){1,4}?)"
 MOST = r"(?:no|not) (?:more|faster) than|at most|up to|a maximum of"
 MOVING = r"(?:moves?|goes|go|drives?|travels?|walks?)(?: around| along| on| off)?"
