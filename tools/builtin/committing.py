@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
+from pydantic import WithJsonSchema
 from pydantic.json_schema import SkipJsonSchema
 
 from ..context import Context, Settings
@@ -58,8 +59,8 @@ async def propose_formation(
         contract: its robots add up to Robots, or the words' number. unit: of lengths, where
             Metres per pixel is told; places are px. keep_out: further ids no robot may touch.
             reading: only after a doubt, why this is meant.
-        targets: things meant, not measured yet or to correct.
-        positions: (x, y) of all robots in order of the groups, to place them.
+        targets: things not measured yet, or to correct.
+        positions: (x, y) of all robots in order of the groups.
         samples: names of samples (s1, ...) to use.
         tell: to the person, where Deploy is false; ends the turn.
     """
@@ -199,14 +200,14 @@ async def deploy(
     context: Context,
     plan_id: str | None = None,
     tell: str | None = None,
-    follow: SkipJsonSchema[Follow | None] = None,
+    follow: Annotated[Follow | None, WithJsonSchema({"type": "object"})] = None,
 ) -> ToolResult:
-    """Move the robots to a certified plan; says where they arrived.
+    """Move the robots to a plan that is certified.
 
     Args:
-        plan_id: left out: of this reply, else as stood before.
-        tell: to the person on arrival; ends the turn.
-        follow: the thing, as it moves, from then on; a person's, in no schema.
+        plan_id: left out: of this reply, else what stands.
+        tell: on arrival; ends the turn.
+        follow: {seconds, speed (px/s)}: keep up with what moves.
     """
     plan_id, made = plan_id or _standing_id(context), context.proposed
     node = context.world.plan(plan_id or made)
@@ -277,7 +278,7 @@ def ask_user(
 
     Args:
         question: one, clear.
-        candidates: ids to choose from (c3, t1).
+        candidates: to choose from (c3, t1).
         contract: that would do, shown to the person; the offline planner's, in no schema.
     """
     found = {c: context.candidate(c) for c in candidates if c.startswith("c")}
@@ -303,8 +304,8 @@ def report_impossible(
     """Say that it cannot be done; ends the turn.
 
     Args:
-        reason: one sentence with the numbers.
-        robots_needed: how many would do, if that is why.
+        reason: a sentence with the numbers.
+        robots_needed: how many would do.
         plan_id: the best plan found.
         contract: that would do, as of ask_user.
     """
