@@ -8,7 +8,6 @@ from pydantic import BaseModel, ConfigDict
 
 from ..tools.context import Context
 from ..tools.fleet.arrival import Arrival
-from ..tools.fleet.escort import followed_target
 from ..tools.fleet.follow import Follow
 from ..tools.formation.checking.verdict import Verdict
 from ..tools.formation.contract import Contract
@@ -287,7 +286,7 @@ def _last_words(outcome: Outcome) -> str:
         asked = f"A person must approve plan {outcome.plan_id} before robots move."
         node = outcome.world.plans.get(outcome.plan_id)
         if node is not None and (leave := call.arguments.get("follow")):
-            target = followed_target(node.plan.formation.contract)
+            target = " and ".join(node.plan.formation.contract.groups[0].targets)
             bounds = Follow.model_validate(leave).said(target, outcome.world.picture.size)
             asked = f"A person must approve plan {outcome.plan_id} and to {bounds}."
         if node is not None and node.plan.partial is not None:

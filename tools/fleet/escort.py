@@ -11,6 +11,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import aclosing
 
 import numpy as np
+import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
@@ -120,7 +121,9 @@ async def escort(
     try:
         async with aclosing(fleet.accompany(going.places)) as moving:
             while ending is None:
-                poses = await anext(moving)
+                poses = await anext(moving, None)
+                if poses is None:
+                    raise FleetError(f"The fleet {fleet.name} drove no further.")
                 ending = await going.saw(poses, await sighted(fleet, sighting.id))
                 watch(poses, going.rigid)
     except FleetError as error:
@@ -242,15 +245,17 @@ class _Going:
             demanded = f"{self._touching:.1f} px are needed"
             return "separation", f"Two robots came within {self._least:.1f} px; {demanded}."
         ahead = self._past[-1][1] + AHEAD * self._velocity
-        room = self._follow.room(self._site.room)
-        for robot, place in zip(self._robots, ahead, strict=True):
-            body = Point(place).buffer(self._radius)
-            if not room.covers(body):
-                where = "({:.0f}, {:.0f})".format(*place)
-                return "area", f"Robot {robot} would leave the area for {where}."
-            for name, region in (self._obstacles or {}).items():
-                if region.intersects(body):
-                    return "obstacle", f"Robot {robot} would touch {name}."
+        inside = self._follow.room(self._site.room).buffer(
+            -self._plan.formation.contract.robot_radius
+        )
+        out = np.flatnonzero(~shapely.covers(inside, shapely.points(ahead)))
+        if len(out):
+            where = "({:.0f}, {:.0f})".format(*ahead[out[0]])
+            return "area", f"Robot {self._robots[out[0]]} would leave the area for {where}."
+        for name, region in (self._obstacles or {}).items():
+            near = distances(region, ahead)
+            if near.min() < self._radius:
+                return "obstacle", f"Robot {self._robots[near.argmin()]} would touch {name}."
         return None
 
     def _off(self) -> Ending | None:
