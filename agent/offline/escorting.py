@@ -66,16 +66,16 @@ def _leave(tail: str, scale: float | None) -> dict[str, float] | None:
     leave: dict[str, Any] = {}
     for part in re.finditer(TAIL, tail, re.IGNORECASE):
         if part["time"]:
-            seconds = _number(part["time"])
+            seconds = _number_said(part["time"])
             leave["seconds"] = seconds and seconds * SECONDS[part["unit"][0].lower()]
         if part["speed"]:
-            metres, speed = part["length"][0].lower() == "m", _number(part["speed"])
+            metres, speed = part["length"][0].lower() == "m", _number_said(part["speed"])
             px = 1.0 if not metres else None if scale is None else scale
             leave["speed"] = speed and px and round(speed / px, 2)
     return None if None in leave.values() else leave
 
 
-def _number(text: str) -> float | None:
+def _number_said(text: str) -> float | None:
     """A number in digits or words."""
     if text.strip().lower() in ("a", "an"):
         return 1.0
