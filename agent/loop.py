@@ -200,6 +200,7 @@ async def _settle(
         world=talk.world,
         doubted=doubts_told(talk.messages),
         proposed=plan_of_reply(talk.messages),
+        agreed=turn.approved is not None and turn.approved.call == call,
         observed=talk.keep,
         moving=talk.moving,
     )

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 from ..tools.context import Context
 from ..tools.fleet.arrival import Arrival
+from ..tools.fleet.follow import Follow
 from ..tools.formation.checking.verdict import Verdict
 from ..tools.formation.contract import Contract
 from ..tools.formation.encounters import notes_of
@@ -247,7 +248,7 @@ def _status(
         return ("question" if asked else "needs_approval"), text
     if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
         # Robots have moved, whatever happened after that.
-        return ("deployed" if arrival.arrived else "failed"), _with_arrival(outcome, arrival, text)
+        return ("deployed" if arrival.done else "failed"), _with_arrival(outcome, arrival, text)
     if isinstance(outcome, Stopped):
         ours = outcome.kind in ("limit", "repeat")
         return ("stopped" if ours else "failed"), text
@@ -284,6 +285,10 @@ def _last_words(outcome: Outcome) -> str:
             return f"A person must approve {call.name} of {json.dumps(call.arguments)}."
         asked = f"A person must approve plan {outcome.plan_id} before robots move."
         node = outcome.world.plans.get(outcome.plan_id)
+        if node is not None and (leave := call.arguments.get("follow")):
+            target = " and ".join(node.plan.formation.contract.groups[0].targets)
+            bounds = Follow.model_validate(leave).said(target, outcome.world.picture.size)
+            asked = f"A person must approve plan {outcome.plan_id} and to {bounds}."
         if node is not None and node.plan.partial is not None:
             asked += f" That plan is partial: {node.plan.partial.sentence}"
         return asked

@@ -16,6 +16,7 @@ from ..agent.store.folder import NAME, PICTURES, FolderArtefacts, FolderLog
 from ..tools.builtin.robots import drive_to
 from ..tools.context import Context, Settings
 from ..tools.errors import FleetError, InputError, ToolError
+from ..tools.fleet.follow import Follow
 from ..tools.formation.plan import Plan
 from ..tools.formation.units import length_text
 from ..tools.perception.image import load_picture
@@ -35,8 +36,13 @@ def deploy(
     as_json: o.Json = False,
     film: o.Film = None,
     watch: o.Watch = False,
+    follow: o.FollowFor = None,
+    speed: o.FollowSpeed = None,
 ) -> None:
     """Move robots to a certified plan; naming the file is the approval."""
+    if speed is not None and follow is None:
+        raise InputError("--follow-speed says how fast robots may --follow; say for how long.")
+    leave = None if follow is None else Follow(seconds=follow, speed=speed)
     stored = read_world(plan)
     if stored.plan_id is None or stored.plan_id not in stored.world.plans:
         raise InputError(f"{plan} holds no plan to deploy; give a plan.json written by formup run.")
@@ -55,7 +61,7 @@ def deploy(
         context.services.view = services.view
         with _session(plan, context) as session:
             context = context.at(session.start(context.world))
-            context = context.at(_driven(context, chosen, plan, session, keep))
+            context = context.at(_driven(context, chosen, leave, plan, session, keep))
         films = write_films(plan.parent, film, context, chosen, context.words)
         report = _report(chosen, context.world, stored, films)
         if as_json:
@@ -104,13 +110,19 @@ def _session(plan: Path, context: Context) -> Generator[Session, None, None]:
 
 
 def _driven(
-    context: Context, plan: Plan, path: Path, session: Session, keep: Callable[[World], None]
+    context: Context,
+    plan: Plan,
+    follow: Follow | None,
+    path: Path,
+    session: Session,
+    keep: Callable[[World], None],
 ) -> World:
     """The world after the robots have driven; where they failed on the way, with what was seen."""
     observed: list[World] = []
-    watching = replace(context, observed=observed.append, moving=session.moving)
+    watching = replace(context, observed=observed.append, moving=session.moving, agreed=True)
     try:
-        observed.append(asyncio.run(drive_to(watching, watching.world.plan(plan.id)))[1])
+        node = watching.world.plan(plan.id)
+        observed.append(asyncio.run(drive_to(watching, node, follow))[1])
     except ToolError as error:
         raise InputError(f"{path}: {error}") from None
     except FleetError:
@@ -132,8 +144,9 @@ def _report(plan: Plan, world: World, stored: StoredWorld, films: dict[str, str 
     state = "All arrived" if arrival.arrived else arrival.reason or "Not all arrived"
     furthest = length_text(max(arrival.residual_px), world.metres_per_pixel)
     return Report(
-        status="deployed" if arrival.arrived else "failed",
+        status="deployed" if arrival.done else "failed",
         message=f"{state}; the furthest is {furthest} from its place."
+        + (f" {arrival.follow.told(world.metres_per_pixel)}" if arrival.follow else "")
         + (f" The plan is partial: {plan.partial.sentence}" if plan.partial else ""),
         instruction=stored.instruction or "",
         image=world.picture.model_dump(),

@@ -121,6 +121,16 @@ Film = Annotated[
     ),
 ]
 Watch = Annotated[bool, typer.Option("--watch", help="Show robots in a window while they drive.")]
+FollowFor = Annotated[
+    float | None,
+    typer.Option(
+        "--follow", help="Then follow the thing for so many seconds.", min=0.1, max=86_400
+    ),
+]
+FollowSpeed = Annotated[
+    float | None,
+    typer.Option("--follow-speed", help="As fast as this at most, px per second.", min=0.1),
+]
 LimitList = Annotated[
     list[str] | None,
     typer.Option(

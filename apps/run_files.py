@@ -10,7 +10,7 @@ from typing import Any
 from ..agent.report import suggested
 from ..agent.session import Run
 from ..agent.store.folder import NAME
-from ..tools.builtin.robots import read_track
+from ..tools.builtin.tracks import moved_of, read_track
 from ..tools.context import Context
 from ..tools.draw import FILMS, draw_look, draw_plan, save_film
 from ..tools.errors import InputError
@@ -198,7 +198,8 @@ def animate(path: Path, context: Context, plan: Plan, title: str) -> bool:
     place_of = {robot: place for place, robot in enumerate(track.ids)}
     order = [place_of[robot] for robot in plan.formation.robot_of_place]
     frames = [points[order] for points in track.points]
-    save_film(path, context.picture, context.world, plan, frames, title)
+    moved = moved_of(context.world, arrival, track)
+    save_film(path, context.picture, context.world, plan, frames, title, moved)
     return True
 
 

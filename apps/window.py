@@ -17,10 +17,11 @@ import numpy as np
 import typer
 from PIL import Image
 
-from ..tools.context import Context, Services, Watch
-from ..tools.draw.canvas import ALLOWED, FINDING, IDLE, INK, MUTED, PAPER, ROBOT, WHITE
+from ..tools.context import Context, Services, Shown
+from ..tools.draw.canvas import ALLOWED, FINDING, IDLE, INK, MUTED, PAPER, ROBOT, TARGET, WHITE
 from ..tools.draw.live import BAR, EDGE, HEAD, PANEL, Course, Ground, body, words
 from ..tools.errors import FleetError, InputError
+from ..tools.fleet.follow import Rigid
 from ..tools.fleet.pace import Pace
 from ..tools.fleet.protocol import Fleet, Pose
 from ..tools.formation.plan import Plan
@@ -59,7 +60,7 @@ class Window:
         self._look: Any = None
 
     @contextmanager
-    def follow(self, context: Context, plan: Plan, fleet: Fleet) -> Generator[Watch]:
+    def follow(self, context: Context, plan: Plan, fleet: Fleet) -> Generator[Shown]:
         """Show a drive; see `Services.view`."""
         world, display = context.world, self._pygame.display
         radius = max(plan.formation.contract.robot_radius, fleet.radius)
@@ -93,9 +94,9 @@ class Window:
         self._open = False
         self._pygame.display.quit()
 
-    def _see(self, poses: tuple[Pose, ...]) -> None:
+    def _see(self, poses: tuple[Pose, ...], moved: Rigid | None = None) -> None:
         if self._open:
-            self._course.see(poses)
+            self._course.see(poses, moved)
             self._changed = True
 
     async def _serve(self) -> None:
@@ -186,6 +187,8 @@ class Window:
         screen.blit(layer, (0, 0))
         for link in links:
             draw.aaline(screen, PAPER, *link)
+        for ring in self._ground.seen(course.moved) if course.moved else ():
+            draw.lines(screen, TARGET, True, ring, 3)
 
     def _draw_bodies(self, screen: "Surface") -> None:
         course, canvas, radius = self._course, self._ground.canvas, round(self._ground.body, 1)

@@ -92,7 +92,7 @@ def provider() -> Iterator[str]:
 
 @pytest.mark.parametrize(("page", "code"), blocks("python"))
 def test_python_blocks_run(page: str, code: str, provider: str, tmp_path: Path) -> None:
-    for folder in ("evals", "docs"):
+    for folder in ("evals", "docs", "examples"):
         (tmp_path / folder).symlink_to(ROOT / folder)
     pixels = np.full((140, 200, 3), 60, np.uint8)
     pixels[40:90, 60:120] = (200, 40, 40)
@@ -108,7 +108,7 @@ def test_python_blocks_run(page: str, code: str, provider: str, tmp_path: Path) 
 
 @pytest.mark.parametrize("commands", COMMANDS, ids=lambda commands: "; ".join(commands)[:40])
 def test_commands_run_as_written(commands: list[str], tmp_path: Path) -> None:
-    for folder in ("evals", "docs"):
+    for folder in ("evals", "docs", "examples"):
         (tmp_path / folder).symlink_to(ROOT / folder)
     for command in commands:
         arguments = [sys.executable, "-m", *shlex.split(command)]

@@ -12,6 +12,7 @@ from typing import Literal, Protocol
 
 from .errors import InputError, StorageError, ToolError
 from .fleet.described import fleet_named
+from .fleet.follow import Rigid
 from .fleet.protocol import Fleet, Pose
 from .formation.plan import Plan
 from .formation.units import check_scale
@@ -143,10 +144,20 @@ def _ignore(*what: object) -> None:
 
 
 Watch = Callable[[tuple[Pose, ...]], None]
-View = Callable[["Context", Plan, Fleet], AbstractContextManager[Watch]]
 
 
-def unseen(context: "Context", plan: Plan, fleet: Fleet) -> AbstractContextManager[Watch]:
+class Shown(Protocol):
+    """Is given the poses of robots that drive and, of a thing they follow, how it has moved."""
+
+    def __call__(self, poses: tuple[Pose, ...], moved: Rigid | None = None, /) -> None:
+        """Show them."""
+        ...
+
+
+View = Callable[["Context", Plan, Fleet], AbstractContextManager[Shown]]
+
+
+def unseen(context: "Context", plan: Plan, fleet: Fleet) -> AbstractContextManager[Shown]:
     """Nobody watches the robots."""
     return nullcontext(_ignore)
 
@@ -213,6 +224,7 @@ class Context:
         words: what the person said last; the contract is held against it.
         doubted: doubts that the model was told of in this turn, which its `reading` may answer.
         proposed: id of the plan that an earlier call of the same reply made.
+        agreed: whether a person has said yes to this very call.
         asks: asks the model that decides where things are; None outside of its turns.
         steps: those of the turns that changed the plan, after the one that undo ends at.
         observed: puts a world in place at once, because what it says was observed and holds even
@@ -226,6 +238,7 @@ class Context:
     words: str = ""
     doubted: frozenset[str] = frozenset()
     proposed: str | None = None
+    agreed: bool = False
     asks: VlmDetector | None = None
     steps: tuple[Step, ...] = ()
     observed: Callable[[World], None] = _ignore

@@ -105,6 +105,8 @@ def arrived(data: Mapping[str, Any], scale: float | None) -> str:
     """What was observed after the robots moved."""
     if "why" in data:
         return str(data["why"])
+    if "followed" in data:
+        return str(data["followed"])
     worst = f"{length_text(data['worst_residual_px'], scale)} from its place"
     if data.get("already_there"):
         return f"All stand there already; the furthest is {worst}."

@@ -14,6 +14,7 @@ from .asides import without_asides
 from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty, is_part
 from .drafting import contract_of
 from .drawn_forms import form_in
+from .escorting import without_follow
 from .followup_edits import Effect, listed
 from .followup_last import RELATIVE, corrected
 from .followup_things import impossible
@@ -101,6 +102,8 @@ class Followup:
 
 def read_followup(words: str, standing: Standing | None) -> Followup:
     """What is meant by words that are said when a plan stands, or talk that fits at any time."""
+    if standing is not None:
+        words, _ = without_follow(words, standing.stood_about, standing.metres_per_pixel)
     meant = _read(words, standing)
     if standing is None or meant.kind != "ask":
         return meant

@@ -20,14 +20,17 @@ from .choosing import Found, Step, agrees, calls_in, declines, find, located_rea
 from .conversing import conversed
 from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, which_things, would_do
+from .escorting import without_follow
 from .pointed import chosen_by_answer, narrowed
 from .reading import Reading
 from .references import described
 from .several import about_several, shares
 from .spelling import instructed, spelled
+from .standing import Standing
 
 MAX_LABEL = 100
 USUAL_CORNERS = 4
+NOT_FOLLOWED = 'Nothing is followed yet: say "follow it" when the robots may move.'
 READING = "The rules account for every word; the rest of them says which thing is meant."
 """Answers a doubt, which comes of single words."""
 
@@ -52,6 +55,24 @@ def _next_step(turn: History, before: History) -> Reply:
     first = turn[0]
     assert isinstance(first, User)
     task = read_task(first.text)
+    about = Standing.of(task.standing).stood_about if task.standing else ""
+    words, follow = without_follow(task.instruction, about, task.metres_per_pixel)
+    reply = _step(replace(task, instruction=words), turn, before)
+    if follow is None:
+        return reply
+    driven = any(isinstance(m, Result) and m.name == "deploy" for m in turn)
+    calls = [
+        call.model_copy(update={"arguments": call.arguments | {"follow": follow}})
+        if call.name == "deploy"
+        else call
+        for call in reply.calls
+    ]
+    text = reply.text if calls or driven else f"{reply.text} {NOT_FOLLOWED}"
+    return reply.model_copy(update={"calls": tuple(calls), "text": text})
+
+
+def _step(task: Task, turn: History, before: History) -> Reply:
+    """What to do next for a task, of whose words none have robots follow anything."""
     turn = _without_agreed(turn)
     if isinstance(turn[-1], Result) and _asks_of_outline(turn[:-1]):
         return _of_outline(turn[-1])

@@ -81,6 +81,11 @@ class Standing:
         return list(dict.fromkeys(t for group in self.groups for t in group.get("targets", ())))
 
     @property
+    def stood_about(self) -> str:
+        """Words for what the groups are about."""
+        return " ".join(f"{name} {label}" for name, label in self.things if name in self.targets)
+
+    @property
     def changes(self) -> int:
         """How many changes can be taken back, so that a plan still stands."""
         return max(self.steps - 1, 0)

@@ -15,7 +15,7 @@ from formup.agent.outcomes import Answered, Cancelled, Paused, Stopped
 from formup.agent.session import Run, load_run
 from formup.agent.store.folder import read_events
 from formup.agent.wrappers.doubles import FunctionModel, ScriptedModel
-from formup.tools.builtin.robots import read_track
+from formup.tools.builtin.tracks import read_track
 from formup.tools.context import Settings
 from formup.tools.errors import InputError
 from formup.tools.perception.image import Picture, picture_from_array

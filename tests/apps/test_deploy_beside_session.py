@@ -10,7 +10,7 @@ from formup.agent.session import load_run
 from formup.agent.store.folder import FolderLog, read_events
 from formup.apps.cli import app
 from formup.apps.main import INTERRUPTED
-from formup.tools.errors import StorageError
+from formup.tools.errors import InputError, StorageError
 from formup.tools.fleet.protocol import Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.store import read_world
@@ -95,3 +95,21 @@ def test_an_interrupted_deploy_keeps_where_the_robots_stand(
     assert stored.world.robots == session.world.robots != before
     assert all(pose.seen > 0 for pose in stored.world.robots)
     assert stored.plan_id is not None
+
+
+def test_a_plan_is_followed_with_for_so_long(
+    planned: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fleet = tmp_path / "slow.yaml"
+    fleet.write_text("fleet: simulated\ntargets: {t1: {walk: 3}}\n", encoding="utf-8")
+    drive = ("deploy", planned / "plan.json", "--json", "--fleet", fleet)
+    capsys.readouterr()
+    assert formup(*drive, "--follow", 1, "--follow-speed", 5) == 0
+    report = json.loads(capsys.readouterr().out)
+    follow = report["arrival"]["follow"]
+    assert (follow["ended"], follow["seconds"], follow["certified"]) == ("time", 1.0, 1.0)
+    assert "They followed t1 for 1.0 s" in report["message"]
+    assert formup(*drive, "--follow", 1, "--follow-speed", 1) == 4
+    assert "no more than 1 px/s were allowed" in capsys.readouterr().out
+    with pytest.raises(InputError, match="--follow-speed says how fast"):
+        formup(*drive, "--follow-speed", 5)

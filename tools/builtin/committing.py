@@ -4,11 +4,12 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
+from pydantic import WithJsonSchema
 from pydantic.json_schema import SkipJsonSchema
 
 from ..context import Context, Settings
 from ..errors import ToolError
-from ..fleet.arrival import Arrival
+from ..fleet.follow import Follow
 from ..formation.checking.instruction_doubts import doubts
 from ..formation.contract import MIN_CLEARANCE, Contract, Group, exact_clearance, nominal
 from ..formation.placement.avoidance import off_others
@@ -22,7 +23,7 @@ from ..perception.target_prompt import Point, TargetPrompt
 from ..tool import FilledBy, ToolResult, in_thread, tool
 from ..world import PlanNode, ShownCandidate, Target, World
 from .others import held_off, with_others
-from .robots import drive_to, with_robots
+from .robots import drive_to, with_observed, with_robots
 from .seeing import sighting
 from .targets import (
     closer_views,
@@ -58,8 +59,8 @@ async def propose_formation(
         contract: its robots add up to Robots, or the words' number. unit: of lengths, where
             Metres per pixel is told; places are px. keep_out: further ids no robot may touch.
             reading: only after a doubt, why this is meant.
-        targets: things meant, not measured yet or to correct.
-        positions: (x, y) of all robots in order of the groups, to place them.
+        targets: things not measured yet, or to correct.
+        positions: (x, y) of all robots in order of the groups.
         samples: names of samples (s1, ...) to use.
         tell: to the person, where Deploy is false; ends the turn.
     """
@@ -196,20 +197,24 @@ def _unseen(world: World, held: Contract) -> tuple[str, ...]:
 
 @tool("actuate")
 async def deploy(
-    context: Context, plan_id: str | None = None, tell: str | None = None
+    context: Context,
+    plan_id: str | None = None,
+    tell: str | None = None,
+    follow: Annotated[Follow | None, WithJsonSchema({"type": "object"})] = None,
 ) -> ToolResult:
-    """Move the robots to a certified plan; says where they arrived.
+    """Move the robots to a plan that is certified.
 
     Args:
-        plan_id: left out: of this reply, else as stood before.
-        tell: to the person on arrival; ends the turn.
+        plan_id: left out: of this reply, else what stands.
+        tell: on arrival; ends the turn.
+        follow: {seconds, speed (px/s)}: keep up with what moves.
     """
     plan_id, made = plan_id or _standing_id(context), context.proposed
     node = context.world.plan(plan_id or made)
     _check_may_move(context, node.plan)
     if plan_id is None and (advice := _to_see(context, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
-    arrival, world, moved = await drive_to(context, node)
+    arrival, world, moved = await drive_to(context, node, follow)
     worst = int(np.argmax(arrival.residual_px))
     data = {
         "plan_id": node.plan.id,
@@ -222,7 +227,8 @@ async def deploy(
     if not moved:
         data["already_there"] = True
     data |= {"reason": arrival.reason} if arrival.reason and moved else {}
-    message = _with_observed(tell, arrival, world) if arrival.arrived else None
+    data |= {"followed": arrival.follow.told(world.metres_per_pixel)} if arrival.follow else {}
+    message = with_observed(tell, arrival, world) if arrival.done else None
     data = with_metres(data, world.metres_per_pixel)
     return ToolResult(data, world=world, message=message)
 
@@ -272,7 +278,7 @@ def ask_user(
 
     Args:
         question: one, clear.
-        candidates: ids to choose from (c3, t1).
+        candidates: to choose from (c3, t1).
         contract: that would do, shown to the person; the offline planner's, in no schema.
     """
     found = {c: context.candidate(c) for c in candidates if c.startswith("c")}
@@ -298,8 +304,8 @@ def report_impossible(
     """Say that it cannot be done; ends the turn.
 
     Args:
-        reason: one sentence with the numbers.
-        robots_needed: how many would do, if that is why.
+        reason: a sentence with the numbers.
+        robots_needed: how many would do.
         plan_id: the best plan found.
         contract: that would do, as of ask_user.
     """
@@ -348,17 +354,6 @@ def _slack(plan: Plan, name: str) -> float:
     groups = (g for g in plan.formation.contract.groups if name in g.targets)
     kept = [nominal(g.clearance) for g in groups if g.clearance is not None]
     return max(SLACK_SHARE * min(kept, default=MIN_CLEARANCE), SLACK_PX)
-
-
-def _with_observed(tell: str | None, arrival: Arrival, world: World) -> str | None:
-    """The model's words and, after them, what was observed."""
-    if not tell:
-        return None
-    count, worst = len(arrival.observed), max(arrival.residual_px)
-    robots = "The robot was" if count == 1 else f"All {count} robots were"
-    within = length_text(max(worst, 0.1), world.metres_per_pixel)
-    told = f"{robots} observed within {within} of the plan."
-    return " ".join(filter(None, [tell.strip(), told, arrival.reason]))
 
 
 def _held_to(contract: Contract, settings: Settings) -> Contract:

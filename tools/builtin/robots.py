@@ -1,6 +1,5 @@
 """Robots for plans: which robot takes which place, and the drive there."""
 
-import json
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -9,20 +8,25 @@ import numpy as np
 import shapely
 
 from ..context import Context
-from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
-from ..fleet.arrival import Arrival, Deployment, Track
+from ..errors import ApprovalError, FleetError, InputError, ToolError
+from ..fleet.arrival import Arrival, Deployment
 from ..fleet.deploy import ARRIVED_DEG, MAX_AGE, check_turns, deploy, heading_residuals
 from ..fleet.described import fleet_named
+from ..fleet.escort import check_follow
+from ..fleet.follow import Follow
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
 from ..formation.checking.instruction_doubts import overruled
 from ..formation.contract import Contract
 from ..formation.encounters import notes_of
 from ..formation.plan import Plan
 from ..formation.site import Other
+from ..formation.units import length_text
 from ..motion.routes import obstacles
-from ..tool import in_thread, to_its_end
+from ..tool import in_thread
 from ..world import PlanNode, World
+from .follows import followed, stands_about
 from .motions import Going, going, met_by
+from .tracks import with_track
 
 MOST_NAMED = 12
 """Idle robots that a note names."""
@@ -92,44 +96,74 @@ def _notes(found: Going, poses: tuple[Pose, ...]) -> list[str]:
     return notes
 
 
-async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bool]:
+async def drive_to(
+    context: Context, node: PlanNode, follow: Follow | None = None
+) -> tuple[Arrival, World, bool]:
     """Drive the robots of a plan to their places, and say what was observed.
 
     Where they stand at its end is kept also if it fails or is cancelled.
+
+    Args:
+        follow: leave to follow the thing that the plan is about from then on.
 
     Returns:
         What was observed, the world after it, and whether robots moved: those that are there
         already are not moved.
 
     Raises:
-        ApprovalError: real robots, and the person has not approved this plan.
-        ToolError: more robots than can be driven, or one stands on a place.
+        ApprovalError: real robots, and the person has not approved this plan, or this follow.
+        ToolError: more robots than can be driven, or one stands on a place; the thing moved away,
+            or cannot be followed.
         FleetError: robots failed or were stopped on the way.
     """
-    plan, world = node.plan, context.world
+    plan, world, moved = node.plan, context.world, True
     try:
         fleet = await _team(context, plan.formation.contract, plan.formation.robots)
-        if fleet.real and context.settings.approved != plan.id:
+        if follow is not None:
+            await check_follow(plan, fleet, follow.most(world.picture.size))
+        agreed = context.settings.approved == plan.id and (follow is None or context.agreed)
+        if fleet.real and not agreed:
             raise ApprovalError(plan.id)
-        before = world.arrivals.get(plan.id)
-        if before is not None and _are_there(await fleet.observe(max_age=MAX_AGE), plan, before):
-            again = before.model_copy()
-            return again, world.with_arrival(plan.id, again), False
-        made = await _deployed(context, plan, fleet)
+        before, arrival = world.arrivals.get(plan.id), None
+        there = await stands_about(context, plan, fleet, follow)
+        if before is not None:
+            poses = await fleet.observe(max_age=MAX_AGE)
+            if there or _are_there(poses, plan, before):
+                arrival = before.model_copy(update={"follow": None})
+                world, moved = world.with_arrival(plan.id, arrival), follow is not None
+        if arrival is None:
+            arrival, world = await _arrived(context, plan, fleet)
     except FleetSizeError as error:
         raise ToolError(str(error), "too_many_robots") from None
     except PlaceTakenError as error:
         raise ToolError(str(error)) from None
+    if follow is not None and arrival.arrived:
+        arrival, world = await followed(context.at(world), plan, fleet, arrival, follow)
+    return arrival, world, moved
+
+
+async def _arrived(context: Context, plan: Plan, fleet: Fleet) -> tuple[Arrival, World]:
+    """What was observed after a deployment, and the world then."""
+    made = await _deployed(context, plan, fleet)
     arrival = _in_robot_order(made.arrival, plan)
-    with suppress(StorageError):  # a film is not worth failing for
-        file, put = _track_file(made.track), context.services.artefacts.put
-        stored = await to_its_end(lambda: put(file))
-        arrival = arrival.model_copy(update={"track": stored})
-    world = world.having(robots=made.poses).with_arrival(plan.id, arrival)
+    arrival = await with_track(context, arrival, made.track)
+    world = context.world.having(robots=made.poses).with_arrival(plan.id, arrival)
     if arrival.ended in ("stopped", "failed"):
         context.observed(world)
         raise FleetError(arrival.reason or "")
-    return arrival, world, True
+    return arrival, world
+
+
+def with_observed(tell: str | None, arrival: Arrival, world: World) -> str | None:
+    """The model's words and, after them, what was observed."""
+    if not tell:
+        return None
+    count, worst = len(arrival.observed), max(arrival.residual_px)
+    robots = "The robot was" if count == 1 else f"All {count} robots were"
+    within = length_text(max(worst, 0.1), world.metres_per_pixel)
+    told = f"{robots} observed within {within} of the plan."
+    follow = arrival.follow and arrival.follow.told(world.metres_per_pixel)
+    return " ".join(filter(None, [tell.strip(), told, arrival.reason, follow]))
 
 
 async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
@@ -230,15 +264,3 @@ def _in_robot_order(arrival: Arrival, plan: Plan) -> Arrival:
             ),
         }
     )
-
-
-def _track_file(track: Track) -> bytes:
-    """Robots on their way as JSON, to a tenth of a pixel."""
-    points = np.round(track.points, 1).tolist()
-    return json.dumps({"robots": track.ids, "points": points}, separators=(",", ":")).encode()
-
-
-def read_track(data: bytes) -> Track:
-    """The track of a file that a deployment left."""
-    content = json.loads(data)
-    return Track(tuple(content["robots"]), np.asarray(content["points"], dtype=float))

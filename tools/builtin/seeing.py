@@ -56,10 +56,10 @@ def look(
     plan_id: str | None = None,
     candidates: bool = False,
 ) -> ToolResult:
-    """See the picture again with what was found, or a part of it closer.
+    """See the picture again with what was found, or a part closer.
 
     Args:
-        region: x0, y0, x1, y1 of the part.
+        region: x0, y0, x1, y1.
         plan_id: whose robots to draw.
         candidates: number what stands out: 3 is then c3.
     """

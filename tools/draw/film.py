@@ -6,6 +6,7 @@ import numpy as np
 from PIL import Image
 
 from ..fleet.deploy import ARRIVED_PX, ARRIVED_SHARE
+from ..fleet.follow import Rigid
 from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
 from ..geometry.sampling import nearest
@@ -18,6 +19,7 @@ from .canvas import (
     MUTED,
     PAPER,
     ROBOT,
+    TARGET,
     WHITE,
     Canvas,
 )
@@ -33,7 +35,7 @@ from .captions import (
     left_text,
     make_page,
 )
-from .marks import draw_idle_robots, draw_met, draw_outline, draw_robots, robot_size
+from .marks import draw_idle_robots, draw_met, draw_outline, draw_robots, rings, robot_size
 from .overlay import idle_robots
 
 SIDE = 640
@@ -58,6 +60,7 @@ def draw_deployment(
     *,
     moments: Sequence[int] | None = None,
     side: int = SIDE,
+    moved: Sequence[Rigid] = (),
 ) -> list[Image.Image]:
     """One picture per frame, all of one size.
 
@@ -68,6 +71,7 @@ def draw_deployment(
         title: usually the instruction.
         moments: which of the frames are drawn; all by default.
         side: the greatest that a picture may have, px.
+        moved: how the thing that robots follow had moved in the last frames.
 
     Raises:
         ToolError: the plan names a target that the world does not have.
@@ -82,10 +86,17 @@ def draw_deployment(
     _draw_goals(canvas, plan, radius)
     draw_idle_robots(canvas, idle_robots(world, plan), radius)
     draw_bars(canvas, lines)
-    return [
-        _frame(canvas, frames[max(i - TRAIL, 0) : i + 1], plan, radius, (i, len(frames)))
-        for i in (range(len(frames)) if moments is None else moments)
-    ]
+    where: list[Rigid | None] = [*[None] * (len(frames) - len(moved)), *moved]
+    made: list[Image.Image] = []
+    for i in range(len(frames)) if moments is None else moments:
+        page, rigid = canvas.copy(), where[i]
+        if rigid is not None:
+            outline = world.outline(rigid.sighting.id).polygon
+            page.cased(rings(rigid.moved(outline)), TARGET, 2.6)
+        places = goals if rigid is None else rigid.carried(goals)
+        recent = frames[max(i - TRAIL, 0) : i + 1]
+        made.append(_frame(page, recent, plan, places, radius, (i, len(frames))))
+    return made
 
 
 def _photo_long_side(picture: Picture, side: int) -> int:
@@ -110,14 +121,15 @@ def _numbered(count: int, radius: float) -> bool:
 
 
 def _frame(
-    base: Canvas,
+    canvas: Canvas,
     recent: Sequence[FloatArray],
     plan: Plan,
+    places: FloatArray,
     radius: float,
     step: tuple[int, int],
 ) -> Image.Image:
-    """The base with trails, robots and footer; the last of the recent poses are the present."""
-    canvas, now = base.copy(), recent[-1]
+    """The canvas with trails, robots and footer; the last of the recent poses are the present."""
+    now = recent[-1]
     last = step[0] == step[1] - 1
     if not last and len(recent) > 1 and len(now) <= TRAILED:
         canvas.trails(np.stack(recent), ALLOWED, 0.5 * radius)
@@ -127,7 +139,7 @@ def _frame(
         for robot, centre in zip(robots, canvas.at(now), strict=True):
             canvas.text(centre, robot, 1.25 * radius, WHITE, ROBOT)
     if last:
-        _draw_end(canvas, now, plan.formation.points)
+        _draw_end(canvas, now, places)
     else:
         _draw_progress(canvas, *step)
     return canvas.finish()

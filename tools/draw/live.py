@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from ..fleet.deploy import tolerance
+from ..fleet.follow import Rigid
 from ..fleet.pace import Pace
 from ..fleet.protocol import Pose, points_of
 from ..formation.plan import Plan
@@ -32,7 +33,7 @@ from .canvas import (
     shown_size,
 )
 from .captions import left_text
-from .marks import draw_met, draw_outline
+from .marks import draw_met, draw_outline, rings
 from .text import drawable, font
 from .view import part_of
 
@@ -59,6 +60,7 @@ class Course:
         robots: ids of those that have places, in the order of the fleet.
         links: (n, 2, 2) from each of them to its place.
         residual: (n,) how far it is there.
+        moved: how the thing that they follow has moved; None where they follow none.
         ended: whether nothing is driven any more.
     """
 
@@ -70,8 +72,9 @@ class Course:
         self.trail = deque[FloatArray](maxlen=TRAIL)
         self.least, self.ended = np.inf, False
 
-    def see(self, poses: tuple[Pose, ...]) -> None:
-        """Take in where all robots of the fleet are."""
+    def see(self, poses: tuple[Pose, ...], moved: Rigid | None = None) -> None:
+        """Take in where all robots of the fleet are, and how the thing that they follow moved."""
+        self.moved = moved
         points, now = points_of(poses), max(pose.seen for pose in poses)
         if len(poses) != len(self.poses):
             self.trail.clear()
@@ -84,6 +87,7 @@ class Course:
         rows = [i for i, pose in enumerate(poses) if pose.id in self._places]
         self.robots = tuple(poses[i].id for i in rows)
         goals = np.array([self._places[robot] for robot in self.robots])
+        goals = goals if moved is None else moved.carried(goals)
         self.links = np.stack([points[rows], goals], axis=1)
         self.residual = np.linalg.norm(points[rows] - goals, axis=1)
 
@@ -169,6 +173,11 @@ class Ground:
         title = canvas.shortened(self._title, TITLE_TEXT, size[0] - 2 * EDGE)
         left_text(canvas, EDGE, BAR / 2, title, TITLE_TEXT, PAPER)
         return canvas.finish()
+
+    def seen(self, moved: Rigid) -> list[FloatArray]:
+        """Where the rings of a thing that has moved lie on the page, (k, 2) each."""
+        outline = self._world.outline(moved.sighting.id).polygon
+        return [self.canvas.at(ring) for ring in rings(moved.moved(outline))]
 
     @property
     def body(self) -> float:

@@ -1,6 +1,7 @@
 """Films of deployments as files: a GIF, an MP4, or a strip of moments as PNG, by the name."""
 
 from collections.abc import Sequence
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -9,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from ..errors import InputError
+from ..fleet.follow import Rigid
 from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
 from ..perception.image import Picture
@@ -56,7 +58,13 @@ STYLE: tuple[Colour, ...] = (
 
 
 def save_film(
-    path: Path, picture: Picture, world: World, plan: Plan, frames: Sequence[FloatArray], title: str
+    path: Path,
+    picture: Picture,
+    world: World,
+    plan: Plan,
+    frames: Sequence[FloatArray],
+    title: str,
+    moved: Sequence[Rigid] = (),
 ) -> None:
     """Write a deployment as the film that a name's ending asks for; see `draw_deployment`.
 
@@ -64,12 +72,13 @@ def save_film(
         InputError: another ending, or the file cannot be written.
     """
     kind, made = path.suffix.lower(), (picture, world, plan, frames, title)
+    drawn = partial(draw_deployment, *made, moved=moved)
     if kind == ".mp4":
-        save_mp4(draw_deployment(*made, side=MP4_SIDE), path)
+        save_mp4(drawn(side=MP4_SIDE), path)
     elif kind == ".gif":
-        save_gif(draw_deployment(*made, moments=_evenly(len(frames), GIF_FRAMES)), path)
+        save_gif(drawn(moments=_evenly(len(frames), GIF_FRAMES)), path)
     elif kind == ".png":
-        save_strip(draw_deployment(*made, moments=_evenly(len(frames), STRIP)), path)
+        save_strip(drawn(moments=_evenly(len(frames), STRIP)), path)
     else:
         raise InputError(f"{path} is no film's name; let it end in {', '.join(FILMS)}.")
 

@@ -1,13 +1,15 @@
 """What came of a deployment: requested against observed, and the way there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from ..formation.plan import Point
 from ..formation.value import Value
 from ..geometry.outline import FloatArray
+from .follow import Followed
 from .protocol import Pose
 
 Ended = Literal["arrived", "short", "stopped", "failed"]
@@ -32,6 +34,7 @@ class Arrival(Value):
         corrections: how many times robots were sent again after the first drive.
         separation_px: least distance of two robots that was seen on the way; None for one robot.
         track: hash of the file that holds where they were on their way.
+        follow: how they followed the thing after that; None where they were not to.
     """
 
     arrived: bool
@@ -49,6 +52,12 @@ class Arrival(Value):
     corrections: int
     separation_px: float | None = None
     track: str | None = None
+    follow: Followed | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether all that was wanted was done."""
+        return self.arrived and (self.follow is None or self.follow.ended == "time")
 
 
 @dataclass(frozen=True)
@@ -58,10 +67,13 @@ class Track:
     Attributes:
         ids: of the robots, in the order of their places.
         points: (f, n, 2) px at f moments, evenly thinned; the last is the last observation.
+        moved: (m, 3) how far the thing that was followed had moved at the last m of them, px, and
+            turned, radians.
     """
 
     ids: tuple[str, ...]
     points: FloatArray
+    moved: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
 
 
 @dataclass(frozen=True)

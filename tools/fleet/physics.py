@@ -5,11 +5,9 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from ..formation.value import Value
+from .moving import Above0, Pixels, Seconds, TargetMotion
 
 RobotId = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int else name)]
-Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
-Pixels = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
-Above0 = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
 
 
 class Noise(Value):
@@ -54,6 +52,7 @@ class Physics(Value):
         stuck: robots that do not move.
         lost: robots that are not seen.
         pushes: robots that something moves.
+        targets: how things that robots follow move, by their ids.
     """
 
     drive: Literal["point", "differential"] = "point"
@@ -67,3 +66,4 @@ class Physics(Value):
     stuck: tuple[Spell, ...] = ()
     lost: tuple[Spell, ...] = ()
     pushes: tuple[Push, ...] = ()
+    targets: dict[str, TargetMotion] = Field(default_factory=dict[str, TargetMotion])

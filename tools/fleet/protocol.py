@@ -4,10 +4,10 @@ A package adds one by an entry point of the group `formup.fleets` that names a `
 `conformance` holds the checks that every fleet has to pass. Frame: image pixels, x right, y down.
 """
 
-from collections.abc import AsyncGenerator, Callable, Sequence
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -144,6 +144,48 @@ class Fleet(Protocol):
 
     async def close(self) -> None:
         """Hold all robots and let go of them; more often than once is no harm."""
+        ...
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """Where a thing is seen now: turned about the centre of its outline in the picture, then moved.
+
+    Attributes:
+        id: of the target.
+        dx, dy: how far it has moved, px.
+        turn: radians, clockwise as seen in the picture.
+        seen: when, seconds on the fleet's clock.
+    """
+
+    id: str
+    dx: float
+    dy: float
+    turn: float = 0.0
+    seen: float = 0.0
+
+
+Places = Mapping[str, tuple[float, float, float, float]]
+"""Where each robot is to be now, x and y px, and its velocity there, px per second."""
+
+
+@runtime_checkable
+class Tracker(Protocol):
+    """What a fleet has beside `Fleet` that can keep up with a thing it sees moving."""
+
+    async def sightings(self) -> tuple[Sighting, ...]:
+        """Where things are seen now; none of those that it cannot see."""
+        ...
+
+    def accompany(self, places: Callable[[], Places]) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Keep robots at places that move, and yield the poses of all robots every period.
+
+        Its ends, errors and stops are those of `Fleet.drive`, but that it goes on until closed.
+
+        Args:
+            places: is asked every period; robots are driven at the velocity of their places, and
+                back onto them.
+        """
         ...
 
 

@@ -1,7 +1,8 @@
 """The embedded fleet: robots of the stepping simulator, which arrive because they are seen to."""
 
 import math
-from collections.abc import AsyncGenerator, Sequence
+from collections.abc import AsyncGenerator, Callable, Mapping, Sequence
+from contextlib import aclosing
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from .described import described
+from .moving import MovingTargets
 from .pace import Pace
 from .physics import Physics
 from .protocol import (
@@ -18,8 +20,10 @@ from .protocol import (
     FleetSizeError,
     FleetStoppedError,
     Motion,
+    Places,
     Pose,
     RobotsFailedError,
+    Sighting,
     check_ages,
     points_of,
 )
@@ -75,6 +79,7 @@ class SimulatedFleet:
             seed=seed,
             now=max((pose.seen for pose in poses), default=0.0),
         )
+        self._targets = MovingTargets(physics.targets, seed)
         self._driving = self._closed = False
         self._stops = 0
 
@@ -87,17 +92,46 @@ class SimulatedFleet:
 
     async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
         """Follow the paths in their order of passage; poses at every step."""
-        self._check_drive(motion)
+        self._check_drive(motion.paths)
         if not motion.paths:
             return
-        self._driving, stops = True, self._stops
         self._simulator.begin(motion)
-        try:
-            while True:
-                self._simulator.step()
-                yield self._seen()
+        async with aclosing(self._steps(self._simulator.step)) as steps:
+            async for poses in steps:
+                yield poses
                 if self._simulator.arrived:
                     return
+
+    async def sightings(self) -> tuple[Sighting, ...]:
+        """Where the things are that the fleet's file moves."""
+        self._check_open()
+        now, where = self._simulator.now, self._targets.where()
+        return tuple(Sighting(name, x, y, turn, now) for name, (x, y, turn) in where.items())
+
+    async def accompany(
+        self, places: Callable[[], Places]
+    ) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Keep robots at places that move; poses at every step, in which the things move too."""
+        wanted = places()
+        self._check_drive(wanted)
+        self._simulator.accompany([*wanted])
+
+        def step() -> None:
+            now = places()
+            self._simulator.step(np.array([now[robot] for robot in wanted]))
+            self._targets.step(PERIOD)
+
+        async with aclosing(self._steps(step)) as steps:
+            async for poses in steps:
+                yield poses
+
+    async def _steps(self, step: Callable[[], None]) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Poses after every step, at the pace there is, until it is stopped."""
+        self._driving, stops = True, self._stops
+        try:
+            while True:
+                step()
+                yield self._seen()
                 await self.pace.step(PERIOD)
                 self._check_open()
                 if self._stops != stops:
@@ -129,13 +163,13 @@ class SimulatedFleet:
         if self._closed:
             raise FleetClosedError("The simulated fleet is closed; open it again.")
 
-    def _check_drive(self, motion: Motion) -> None:
+    def _check_drive(self, robots: Mapping[str, object]) -> None:
         self._check_open()
         if self.stopped:
             raise FleetStoppedError("The simulated fleet is stopped; release it to drive.")
         if self._driving:
             raise FleetBusyError("The simulated fleet is driving already; wait, or stop it.")
-        unknown = sorted(set(motion.paths) - set(self._simulator.ids))
+        unknown = sorted(set(robots) - set(self._simulator.ids))
         if unknown:
             raise RobotsFailedError(
                 f"Robot {', '.join(unknown)} is not in the simulated fleet of "

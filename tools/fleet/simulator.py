@@ -142,6 +142,12 @@ class Simulator:
         self._queue = deque([self._told] * round(self.physics.delay / PERIOD))
         self._there = np.zeros(n, dtype=bool)
 
+    def accompany(self, ids: Sequence[str]) -> None:
+        """Keep up with places that move, which `step` is told: these robots; the others stay."""
+        where = {robot: self.points[self.ids.index(robot)] for robot in ids}
+        self.begin(Motion({robot: np.stack([point, point]) for robot, point in where.items()}))
+        self._following = None
+
     def hold(self) -> None:
         """Stand, at once."""
         self._following = None
@@ -152,22 +158,32 @@ class Simulator:
         """Whether all robots that drive were seen at their ends."""
         return bool(self._there.all())
 
-    def step(self) -> None:
-        """Let a step of time pass."""
+    def step(self, places: FloatArray | None = None) -> None:
+        """Let a step of time pass.
+
+        Args:
+            places: where robots that `accompany` are to be now, (n, 2) px, and beside it with what
+                velocity, (n, 2) px per second.
+        """
         self.now += PERIOD
-        if self._following is not None:
-            rows, seen = self._rows, self._seen(self._following)
+        if places is not None:
+            self._tell(self._kept_up(places))
+        elif self._following is not None:
+            seen = self._seen(self._following)
             self._mark(seen)
-            told = self._steered(seen) if self._wheels else self._pulled(seen)
-            unseen = self.seen[rows] < self.now - 1.5 * PERIOD
-            told[unseen] = self._changed(self._told[unseen], np.zeros((unseen.sum(), 2)))
-            self._told = told
-            self._queue.append(told)
-            self._move(rows, self._queue.popleft())
+            self._tell(self._steered(seen) if self._wheels else self._pulled(seen))
         for i, push in self._pushes:
             if self.now - PERIOD < self._begun + push.at <= self.now:
                 self.points[i] += push.by
         self._sense(self._random.random(len(self.ids)) < self.physics.drop_outs)
+
+    def _tell(self, told: FloatArray) -> None:
+        """Send robots what they are told; those that are not seen slow down."""
+        unseen = self.seen[self._rows] < self.now - 1.5 * PERIOD
+        told[unseen] = self._changed(self._told[unseen], np.zeros((unseen.sum(), 2)))
+        self._told = told
+        self._queue.append(told)
+        self._move(self._rows, self._queue.popleft())
 
     def _rooms(self, following: Following) -> FloatArray:
         """Px in which robots that pass a vertex as fast as they may can stop.
@@ -183,11 +199,10 @@ class Simulator:
         return np.maximum(fast**2 / (2 * self._push) - fast * PERIOD / 2, 0.0)
 
     def _seen(self, following: Following) -> _Seen:
-        rows = self._rows
-        points, headings, rates = self.sensed[rows], self.headings[rows], self._told
+        rows, rates = self._rows, self._told
+        points, headings = self._expected()
         queued = np.zeros(len(rows))
-        for told in self._queue:  # what they are told now takes effect after that
-            points, headings = self._carried(points, headings, told)
+        for told in self._queue:
             queued += PERIOD * (abs(told[:, 0]) if self._wheels else _norms(told))
         fresh = self.seen[rows] >= self.now - 1.5 * PERIOD
         near = NEAR + 2 * self.physics.noise.sensing
@@ -204,6 +219,32 @@ class Simulator:
         reach = np.maximum(reach, 2 * self.physics.radius)
         aims = following.at(ahead) + along * reach[:, None]
         return _Seen(points, headings, rates, room, along, off, aims, self._looks)
+
+    def _expected(self) -> tuple[FloatArray, FloatArray]:
+        """Where robots are, and look, when what they are told now takes effect."""
+        points, headings = self.sensed[self._rows], self.headings[self._rows]
+        for told in self._queue:
+            points, headings = self._carried(points, headings, told)
+        return points, headings
+
+    def _kept_up(self, places: FloatArray) -> FloatArray:
+        """What robots are told so that they move as their places do, and come back onto them."""
+        (points, headings), most = self._expected(), self.physics.speed
+        off = points - places[:, :2] - PERIOD * len(self._queue) * places[:, 2:]
+        size = _norms(off)
+        back = _braking(size, self._push, self._smoothing)
+        told = places[:, 2:] - off * _ratio(back, size)[:, None]
+        told *= np.minimum(_ratio(most, _norms(told)), 1.0)[:, None]
+        if not self._wheels:
+            return told
+        fast, radius = _norms(told), self.physics.radius
+        turn = _wrapped(np.arctan2(told[:, 1], told[:, 0]) - headings)
+        back_first = abs(turn) > np.pi / 2
+        turn = _wrapped(turn + np.pi * back_first) * (fast >= self._push * PERIOD / 4)
+        arc = np.asarray(abs(turn) * radius, dtype=float)
+        about = np.minimum(_braking(arc, self._push, self._smoothing), most / 2) * np.sign(turn)
+        fast = np.minimum(fast, most - abs(about)) * np.clip(np.cos(2 * turn), 0.0, 1.0)
+        return np.stack([np.where(back_first, -fast, fast), about / radius], axis=1)
 
     def _mark(self, seen: _Seen) -> None:
         """Note who is at the end; noise does not take robots from it, a push does."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from formup.tools.builtin.others import with_keep_outs, with_others
-from formup.tools.builtin.robots import read_track
+from formup.tools.builtin.tracks import read_track
 from formup.tools.context import Context, Services, Settings
 from formup.tools.errors import InputError, ToolError
 from formup.tools.formation.contract import Contract, Group

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from formup.tools.builtin.robots import read_track
+from formup.tools.builtin.tracks import read_track
 from formup.tools.errors import InputError, ToolError
 from formup.tools.formation.contract import Contract
 from formup.tools.formation.plan import Formation, Plan, make_plan

@@ -6,9 +6,12 @@ import cv2
 import numpy as np
 import pytest
 from formup.tools.draw import save_film
+from formup.tools.draw.canvas import CERTIFIED, TARGET
 from formup.tools.draw.film import draw_deployment
 from formup.tools.draw.recording import LAST_MS, STRIP_GAP, TICK_MS, save_mp4, save_strip
 from formup.tools.errors import InputError, StorageError
+from formup.tools.fleet.follow import Rigid
+from formup.tools.fleet.protocol import Sighting
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import FloatArray, make_outline
@@ -53,6 +56,19 @@ def test_an_mp4_shows_every_moment_and_rests_on_the_last(tmp_path: Path) -> None
         page = np.asarray(image)
         assert np.abs(frame[: page.shape[0], : page.shape[1]] - page.astype(int)).mean() < 6
     assert [p.name for p in tmp_path.iterdir()] == ["film.mp4"]
+
+
+def test_a_thing_that_is_followed_is_drawn_where_it_was_seen() -> None:
+    picture, world, plan, frames = made(4)
+    rigid = Rigid(np.array([150.0, 90.0]), Sighting("t1", 40.0, 60.0))
+    moved = [*frames[:3], rigid.carried(plan.formation.points)]
+    still = draw_deployment(picture, world, plan, moved, "Two")
+    shown = draw_deployment(picture, world, plan, moved, "Two", moved=[rigid])
+    assert shown[:3] == still[:3]
+    arrived = [(np.asarray(page[3]) == CERTIFIED).all(axis=2).any() for page in (shown, still)]
+    assert arrived == [True, False]
+    outlined = [(np.asarray(page[3]) == TARGET).all(axis=2).sum() for page in (shown, still)]
+    assert outlined[0] > 1.5 * outlined[1] > 0
 
 
 def test_an_mp4_of_odd_sides_is_padded(tmp_path: Path) -> None:

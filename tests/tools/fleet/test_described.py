@@ -1,9 +1,11 @@
 """A file describes a simulated fleet, and every mistake in it is one clear sentence."""
 
 import asyncio
+from contextlib import aclosing
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from formup.tools.errors import InputError
 from formup.tools.fleet.described import fleet_named
@@ -30,6 +32,24 @@ def test_the_example_is_the_fleet_it_describes() -> None:
     fleet = opened(EXAMPLE)
     assert (fleet.speed, fleet.radius, fleet.pace.speed) == (120.0, 5.0, None)
     assert len(asyncio.run(fleet.observe())) == 4
+
+
+def test_things_stand_until_they_are_followed_and_move_as_the_file_says() -> None:
+    fleet = opened(EXAMPLE.with_name("moving.yaml"))
+
+    async def followed() -> None:
+        (robot, *_), (still,) = await fleet.observe(), await fleet.sightings()
+        assert (still.id, still.dx, still.dy, still.turn) == ("t1", 0, 0, 0)
+        async with aclosing(fleet.accompany(lambda: {robot.id: (9, 9, 0, 0)})) as steps:
+            seen = still
+            while seen.seen < 1 - 1e-6:
+                poses = await anext(steps)
+                (seen,) = await fleet.sightings()
+                assert {pose.seen for pose in poses} == {seen.seen}
+        assert np.hypot(seen.dx, seen.dy) == pytest.approx(20)
+        assert np.degrees(seen.turn) == pytest.approx(-2)
+
+    asyncio.run(followed())
 
 
 def test_what_a_file_leaves_out_is_as_without_one(tmp_path: Path) -> None:
@@ -60,6 +80,10 @@ def test_what_a_file_leaves_out_is_as_without_one(tmp_path: Path) -> None:
         ("fleet: simulated\ndelay: -1\nslip: 2", "delay: .*got -1; slip|slip: .*; delay"),
         ("fleet: simulated\nstuck: [{after: 1}]", "stuck.0.robot: field required"),
         ("fleet: simulated\npushes: [{robot: 1, at: 1, by: 3}]", "pushes.0.by"),
+        ("fleet: simulated\ntargets: {t1: {speed: 3}}", "targets.t1: .*two points or more and a"),
+        ("fleet: simulated\ntargets: {t1: {path: [[0, 0]], speed: 3}}", "two points or more and a"),
+        ("fleet: simulated\ntargets: {t1: {path: [[0, 0], [9, 9]]}}", "two points or more and a"),
+        ("fleet: simulated\ntargets: {t1: {runs: 3}}", "targets.t1.runs: no such key"),
     ],
 )
 def test_a_mistake_is_found_before_a_fleet_is_opened(tmp_path: Path, text: str, words: str) -> None:

@@ -1,0 +1,83 @@
+"""Words that have robots follow a thing as it moves: "and keep up with it for a minute"."""
+
+import re
+from typing import Any
+
+from ...tools.formation.number_words import numbers_in
+
+LEAD = (
+    r"(?:^|[,;.!]|\band\b|\bthen\b)[\s,]{0,3}(?:(?:and|then|no|yes|ok|okay|now|so|please|just|also|go|"
+    r"after that|afterwards|(?:can|could|would|will) you|(?:have|let|make) (?:them|the robots))"
+    r"\b[\s,]{0,3}){0,6}"
+)
+VERB = (
+    r"(?:follow|escort|accompany|shadow|"
+    r"(?:keep up|keep pace|go along|move along|come along|travel|stay|stick|move|go) with)"
+)
+WHAT = r"(?P<what>it|them|him|her|this|that|t[0-9]+|(?:the|this|that) (?:[\w-]+ ){0,3}?[\w-]+?)"
+COUNTED = r"(?:[0-9]+(?:[.,][0-9]+)? ?|(?:[a-z]+[ -]){1,4}?)"
+MOST = r"(?:no|not) (?:more|faster) than|at most|up to|a maximum of"
+MOVING = r"(?:moves?|goes|go|drives?|travels?|walks?)(?: around| along| on| off)?"
+TAIL = (
+    r"(?:[\s,]{0,3}(?:around|along|please|then|for a (?:while|bit|moment)|"
+    rf"(?:while|as|when|if|whenever|wherever|where) (?:it|they|he|she) {MOVING}|"
+    rf"(?:and )?for (?P<time>{COUNTED})(?P<unit>s|secs?|seconds?|min|minutes?|h|hours?)|"
+    rf"(?:and )?(?:(?:at|with|{MOST}) )+(?P<speed>{COUNTED})(?P<length>px|pixels?|m|met(?:re|er)s?)"
+    r" ?(?:/|per|an?) ?s(?:ec(?:ond)?)?(?: at most)?)(?!\w))"
+)
+END = r"(?=\s?(?:[,;.!?]|$|\band\b))"
+CLAUSE = re.compile(
+    rf"(?:{LEAD}{VERB} {WHAT}(?P<tail>{TAIL}{{0,6}})|"
+    rf"\b(?:while|as) it (?:moves|drives)(?: around| along)?){END}",
+    re.IGNORECASE,
+)
+SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+def without_follow(
+    words: str, things: str, scale: float | None
+) -> tuple[str, dict[str, float] | None]:
+    """The words without those that have the thing followed, and what these give leave to.
+
+    Args:
+        things: words for what robots stand about, where a plan stands; nothing else but that is
+            then "go".
+        scale: metres per pixel, where they are known.
+
+    Returns:
+        The rest, and arguments of `deploy`'s `follow`; None where nothing is to be followed, or
+        another thing than the one that robots stand about.
+    """
+    found = CLAUSE.search(words)
+    if found is None:
+        return words, None
+    rest = f"{words[: found.start()]} {words[found.end() :]}"
+    rest = re.sub(r"^(?:(?:and|then)\b\W*)+", "", rest.strip(" ,;.!?"))
+    meant, leave = (found["what"] or "it").lower().split(), _leave(found["tail"] or "", scale)
+    known = set(re.findall(r"[\w-]+", f"{rest} {things}".lower()))
+    named = (meant[0] != "the" and len(meant) == 1) or meant[-1] in known
+    if leave is None or not named or not (rest or things):
+        return words, None
+    return rest or "go", leave
+
+
+def _leave(tail: str, scale: float | None) -> dict[str, float] | None:
+    """For how long and how fast, as far as that is said; None for what cannot be told in px."""
+    leave: dict[str, Any] = {}
+    for part in re.finditer(TAIL, tail, re.IGNORECASE):
+        if part["time"]:
+            seconds = _number_said(part["time"])
+            leave["seconds"] = seconds and seconds * SECONDS[part["unit"][0].lower()]
+        if part["speed"]:
+            metres, speed = part["length"][0].lower() == "m", _number_said(part["speed"])
+            px = 1.0 if not metres else None if scale is None else scale
+            leave["speed"] = speed and px and round(speed / px, 2)
+    return None if None in leave.values() else leave
+
+
+def _number_said(text: str) -> float | None:
+    """A number in digits or words."""
+    if text.strip().lower() in ("a", "an"):
+        return 1.0
+    found = numbers_in(text)
+    return found[0].least if len(found) == 1 and found[0].least > 0 else None
