@@ -29,13 +29,17 @@ MOST_NAMED = 12
 
 
 async def with_robots(
-    context: Context, node: PlanNode, taking: Sequence[str | None] | None = None
+    context: Context,
+    node: PlanNode,
+    taking: Sequence[str | None] | None = None,
+    share: bool = False,
 ) -> World:
     """The world with a plan as the latest one and, if it is certified, robots for its places.
 
     Args:
         taking: the robot that keeps each place, in the order of the groups, None for one more;
             left out, the least sum of squared ways decides.
+        share: whether they may take each other's places where they find no order otherwise.
 
     Raises:
         ToolError: a real fleet has too few robots.
@@ -59,7 +63,7 @@ async def with_robots(
         return world.with_plan(_noted(world, node, told, None))
     check_turns(plan, fleet)
     poses = await fleet.observe(max_age=MAX_AGE)
-    found: Going = await in_thread(lambda: going(world, plan, fleet, poses, taking))
+    found: Going = await in_thread(lambda: going(world, plan, fleet, poses, taking, share))
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
     node = node.model_copy(update={"plan": plan, "motion": found.verdict})
     told += _notes(found, poses)
