@@ -10,7 +10,7 @@ from formup.agent.session import load_run
 from formup.agent.store.folder import FolderLog, read_events
 from formup.apps.cli import app
 from formup.apps.main import INTERRUPTED
-from formup.tools.errors import StorageError
+from formup.tools.errors import InputError, StorageError
 from formup.tools.fleet.protocol import Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.store import read_world
@@ -95,3 +95,26 @@ def test_an_interrupted_deploy_keeps_where_the_robots_stand(
     assert stored.world.robots == session.world.robots != before
     assert all(pose.seen > 0 for pose in stored.world.robots)
     assert stored.plan_id is not None
+
+
+@pytest.mark.parametrize("ending", ["json", "csv"])
+def test_trajectories_are_written_and_no_robot_is_moved(planned: Path, ending: str) -> None:
+    file, before = planned / f"ways.{ending}", (planned / "plan.json").read_bytes()
+    assert formup("deploy", planned / "plan.json", "--trajectories", file) == 0
+    assert (planned / "plan.json").read_bytes() == before
+    assert not [e for e in read_events(planned) if e.kind == "moving"]
+    text = file.read_text()
+    places = read_world(planned / "plan.json").world.plan().plan.formation.positions
+    if ending == "json":
+        poses = {name: r["poses_px"][-1] for name, r in json.loads(text)["robots"].items()}
+        ends = [poses[str(k)][1:3] for k in range(1, 7)]
+    else:
+        last = {row[0]: row[2:4] for row in (line.split(",") for line in text.splitlines()[1:])}
+        ends = [[float(v) for v in last[str(k)]] for k in range(1, 7)]
+    for end, place in zip(ends, places, strict=True):
+        assert end == pytest.approx(place, abs=0.5)
+
+
+def test_trajectories_of_another_ending_are_refused(planned: Path) -> None:
+    with pytest.raises(InputError, match=r"ending in \.json, \.csv"):
+        formup("deploy", planned / "plan.json", "--trajectories", planned / "ways.txt")

@@ -11,9 +11,19 @@ import shapely
 from ..context import Context
 from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
 from ..fleet.arrival import Arrival, Deployment, Track
-from ..fleet.deploy import ARRIVED_DEG, MAX_AGE, check_turns, deploy, heading_residuals
+from ..fleet.deploy import (
+    ARRIVED_DEG,
+    MAX_AGE,
+    check_turns,
+    deploy,
+    heading_residuals,
+    motion_to,
+)
 from ..fleet.described import fleet_named
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
+from ..fleet.simulated import FULL_SPEED_S, SimulatedFleet
+from ..fleet.simulator import tracking_error
+from ..fleet.trajectories import Trajectories, tracked, wheeled
 from ..formation.checking.instruction_doubts import overruled
 from ..formation.contract import Contract
 from ..formation.encounters import notes_of
@@ -134,6 +144,24 @@ async def drive_to(context: Context, node: PlanNode) -> tuple[Arrival, World, bo
         context.observed(world)
         raise FleetError(arrival.reason or "")
     return arrival, world, True
+
+
+async def trajectories_to(context: Context, plan: Plan) -> Trajectories:
+    """How robots with two wheels would drive to a plan's places from where they are seen.
+
+    Raises:
+        ToolError, FleetError: as of `drive_to`.
+    """
+    fleet = await _team(context, plan.formation.contract, plan.formation.robots)
+    if isinstance(fleet, SimulatedFleet):
+        physics = wheeled(fleet.physics.speed, fleet.physics.acceleration, fleet.radius)
+    else:
+        physics = wheeled(fleet.speed, fleet.speed / FULL_SPEED_S, fleet.radius)
+    error = max(tracking_error(physics), fleet.tracking_error)
+    site, robots = context.world.site(plan.formation.contract), plan.formation.robot_of_place
+    motion, verdict = await motion_to(plan, site, fleet, robots, error)
+    looks = {pose.id: pose.heading for pose in await fleet.observe()}
+    return await in_thread(lambda: tracked(motion, verdict, physics, looks, error))
 
 
 async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
