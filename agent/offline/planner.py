@@ -23,6 +23,7 @@ from .drafting import contract_of, place_of, question_of, things_needed, which_t
 from .pointed import chosen_by_answer, narrowed
 from .reading import Reading
 from .references import described
+from .sequences import in_stages
 from .several import about_several, shares
 from .spelling import instructed, spelled
 
@@ -51,10 +52,14 @@ def _next_step(turn: History, before: History) -> Reply:
     first = turn[0]
     assert isinstance(first, User)
     task = read_task(first.text)
-    turn = _without_agreed(turn)
+    return in_stages(task, _without_agreed(turn), before, _step_of)
+
+
+def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
+    """What to do next for one instruction, which may come later in a sequence of them."""
     if isinstance(turn[-1], Result) and _asks_of_outline(turn[:-1]):
         return _of_outline(turn[-1])
-    spoken = conversed(task, turn, before)
+    spoken = (task, turn) if later else conversed(task, turn, before)
     if isinstance(spoken, Reply):
         return spoken
     task, turn = spoken
@@ -170,7 +175,8 @@ def _told_which(task: Task, history: History) -> tuple[Task, list[str]]:
     left: list[str] = []
     for question, answer in _answered(history):
         reading = read_instruction(_said(task, left), task.metres_per_pixel)
-        asked = question == which_things(task, reading)
+        which = which_things(task, reading)
+        asked = which is not None and question.endswith(which)
         chosen = chosen_by_answer(task, answer, history) if asked else None
         task = chosen or task
         left += [] if chosen else [answer]
