@@ -45,11 +45,11 @@ def in_stages(task: Task, turn: History, before: History, step: Step) -> Reply:
         mine, later = _until_arrived(left)
         reply = step(stage, (first, *mine), before, bool(told))
         if later is None:
-            return _after(told, reply)
+            return _following_on(told, reply)
         told.append(reply.text)
         before, left = (*before, first, *mine), later
         stage = _next_stage(task, words, mine)
-    return _after(told, step(stage, (first, *left), before, bool(told)))
+    return _following_on(told, step(stage, (first, *left), before, bool(told)))
 
 
 def _until_arrived(messages: History) -> tuple[History, History | None]:
@@ -72,7 +72,7 @@ def _next_stage(task: Task, words: str, done: tuple[Message, ...]) -> Task:
     return replace(task, instruction=words, robots=robots, targets=tuple(things), pointed=())
 
 
-def _after(told: list[str], reply: Reply) -> Reply:
+def _following_on(told: list[str], reply: Reply) -> Reply:
     """A reply that ends the turn, or asks, after what was told of the stages before."""
     said = " ".join(told)
     if not told:

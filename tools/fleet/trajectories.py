@@ -109,11 +109,11 @@ class Trajectories:
                 waits = " ".join(f"{self.ids[rows.first[g]]}@{rows.past[g]:.6f}" for g in held)
                 values = [PERIOD * step, *pose, *told, self.along[step, k]]
                 more = [v * scale for v in (*pose[:2], told[0])] if scale else []
-                write([robot, *_rounded(values), waits, *_rounded(more)])
+                write([robot, *_decimals(values), waits, *_decimals(more)])
         return out.getvalue()
 
 
-def _rounded(values: list[float]) -> list[float]:
+def _decimals(values: list[float]) -> list[float]:
     return [round(float(v), DECIMALS) for v in values]
 
 
