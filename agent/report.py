@@ -248,7 +248,8 @@ def _status(
         return ("question" if asked else "needs_approval"), text
     if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
         # Robots have moved, whatever happened after that.
-        return ("deployed" if arrival.done else "failed"), _with_arrival(outcome, arrival, text)
+        done = arrival.done and _given_up(outcome.messages) is None
+        return ("deployed" if done else "failed"), _with_arrival(outcome, arrival, text)
     if isinstance(outcome, Stopped):
         ours = outcome.kind in ("limit", "repeat")
         return ("stopped" if ours else "failed"), text

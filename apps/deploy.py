@@ -1,6 +1,7 @@
 """`formup deploy PLAN.json`: a person's approval of exactly that plan, and the move."""
 
 import asyncio
+import json
 from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ from ..agent.recording import LogRecorder
 from ..agent.report import Report, metric_data, target_data
 from ..agent.session import load_run
 from ..agent.store.folder import NAME, PICTURES, FolderArtefacts, FolderLog
-from ..tools.builtin.robots import drive_to
+from ..tools.builtin.robots import drive_to, trajectories_to
 from ..tools.context import Context, Settings
 from ..tools.errors import FleetError, InputError, ToolError
 from ..tools.fleet.follow import Follow
@@ -38,11 +39,16 @@ def deploy(
     watch: o.Watch = False,
     follow: o.FollowFor = None,
     speed: o.FollowSpeed = None,
+    trajectories: o.TrajectoryFile = None,
 ) -> None:
     """Move robots to a certified plan; naming the file is the approval."""
     if speed is not None and follow is None:
         raise InputError("--follow-speed says how fast robots may --follow; say for how long.")
     leave = None if follow is None else Follow(seconds=follow, speed=speed)
+    if trajectories is not None and (as_json or film or watch or leave):
+        raise InputError(
+            "--trajectories moves no robot, so --json, --film, --watch and --follow do not go with it."
+        )
     stored = read_world(plan)
     if stored.plan_id is None or stored.plan_id not in stored.world.plans:
         raise InputError(f"{plan} holds no plan to deploy; give a plan.json written by formup run.")
@@ -53,6 +59,8 @@ def deploy(
     chosen = stored.world.plans[stored.plan_id].plan
     if chosen.partial is not None:
         say(f"formup: a partial plan: {chosen.partial.sentence}", error=True)
+    if trajectories is not None:
+        raise typer.Exit(_exported(context, chosen, plan, trajectories))
 
     def keep(world: World) -> None:
         write_whole(plan, plan_file(world, chosen.id, stored.instruction or "", picture))
@@ -70,6 +78,21 @@ def deploy(
         else:
             show_report(Console(highlight=False), report, str(plan.parent))
         raise typer.Exit(report.exit_code)
+
+
+def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
+    """Write how robots would get to a plan from where the session beside it left them."""
+    with _session(plan, context) as session:
+        context = context.at(session.start(context.world))
+    try:
+        found = asyncio.run(trajectories_to(context, chosen))
+    except ToolError as error:
+        raise InputError(f"{plan}: {error}") from None
+    scale = context.world.metres_per_pixel
+    text = json.dumps(found.data(scale)) if path.suffix.lower() == ".json" else found.table(scale)
+    write_whole(path, text.encode())
+    say(f"formup: {len(found.ids)} robots' ways in {path}; none was moved.", error=True)
+    return 0
 
 
 @dataclass

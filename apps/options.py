@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .run_files import film_file
+from .run_files import film_file, trajectory_file
 
 Image = Annotated[Path, typer.Argument(help="Picture of the place.", show_default=False)]
 Instruction = Annotated[str, typer.Argument(help="What to do, in your words.")]
@@ -118,6 +118,14 @@ Film = Annotated[
         "--film",
         callback=film_file,
         help="Where a film of the robots goes too: .gif, .mp4, or .png, a strip of moments.",
+    ),
+]
+TrajectoryFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--trajectories",
+        callback=trajectory_file,
+        help="Write how robots get there, .json or .csv, and move none.",
     ),
 ]
 Watch = Annotated[bool, typer.Option("--watch", help="Show robots in a window while they drive.")]

@@ -2,6 +2,7 @@
 
 import io
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
@@ -169,9 +170,18 @@ def film_file(path: Path | None) -> Path | None:
     Raises:
         InputError: no such folder, or another ending than of films.
     """
-    if path is not None and (path.suffix.lower() not in FILMS or not path.parent.is_dir()):
+    return _writable("--film", path, FILMS)
+
+
+def trajectory_file(path: Path | None) -> Path | None:
+    """Where trajectories go, likewise."""
+    return _writable("--trajectories", path, (".json", ".csv"))
+
+
+def _writable(option: str, path: Path | None, endings: Sequence[str]) -> Path | None:
+    if path is not None and (path.suffix.lower() not in endings or not path.parent.is_dir()):
         raise InputError(
-            f"--film {path} cannot be written; name a file ending in {', '.join(FILMS)} in a "
+            f"{option} {path} cannot be written; name a file ending in {', '.join(endings)} in a "
             "folder that is there."
         )
     return path

@@ -25,6 +25,7 @@ Kind = Literal[
     "count",
     "doubt",
     "edit",
+    "no_order",
     "nothing_to_undo",
     "unknown_target",
     "unknown_plan",
@@ -47,8 +48,9 @@ room on that side of a target; low_confidence: no mask that is sure enough (`con
 `threshold`); count: another number of robots than the person gave; unknown_target, unknown_plan:
 no such id; void_plan: the world has changed since; too_many_robots: more than can be driven;
 doubt: a contract that does not seem to be what the words say (`doubts`, each a clause); edit: the
-plan after a change is not certified (`findings`, each a sentence); nothing_to_undo: there is no
-step back, or none that was taken back; missing, busy, gone_on: a session that is not in its store,
+plan after a change is not certified (`findings`, each a sentence); no_order: robots that keep their
+places stand in each other's way; nothing_to_undo: there is no step back, or none taken back;
+missing, busy, gone_on: a session that is not in its store,
 is written by another process, or was written since it was opened; key, repeated: a turn was asked
 for under a key before, with other arguments or the same (`turn`, its number); approval: a yes to
 nothing that waits; not_allowed: whoever asks may not do that; too_large, too_many: more than a

@@ -18,6 +18,7 @@ from .choosing import Step, agrees, calls_in, chosen_candidates, declines, promp
 from .finding import found_thing, known_thing, measured_at
 from .followup_things import UNNAMED, pointing_at
 from .followups import Followup, commands, read_followup
+from .sharing import shared
 from .standing import Standing
 
 DEICTIC = re.compile(
@@ -308,9 +309,12 @@ class _Steps:
     def _failed(self, failed: Result, *, taken_back: bool) -> Reply:
         """Nothing is changed: what was taken back for it is made again."""
         undos = sum(isinstance(m, Result) and m.name == "undo" for m in self.messages)
+        found = shared(failed, self.messages) if failed.cause == "no_order" else ""
+        if isinstance(found, Step):
+            return _calling(found.name, found.arguments)
         if taken_back and undos == 1:
             return _calling("undo", {"steps": -self.followup.undo})
-        said = (failed.facts or {}).get("plain", failed.text)
+        said = found or (failed.facts or {}).get("plain", failed.text)
         if failed.cause == "low_confidence":
             return _calling("ask_user", {"question": said})
         return _calling("report_impossible", {"reason": said})

@@ -1,9 +1,16 @@
 """Words that have robots follow a thing as it moves: "and keep up with it for a minute"."""
 
 import re
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from ...tools.formation.number_words import numbers_in
+from ..first_message import Task
+from ..messages import History, Reply, Result
+from .standing import Standing
+
+NOT_FOLLOWED = 'Nothing is followed yet: say "follow it" when the robots may move.'
 
 LEAD = (
     r"(?:^|[,;.!]|\band\b|\bthen\b)[\s,]{0,3}(?:(?:and|then|no|yes|ok|okay|now|so|please|just|also|go|"
@@ -32,6 +39,30 @@ CLAUSE = re.compile(
     re.IGNORECASE,
 )
 SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+def following(task: Task, turn: History, step: Callable[[Task], Reply]) -> Reply:
+    """The next step for a task, with leave to follow where its words give it.
+
+    Args:
+        task: as said.
+        turn: messages of the turn so far.
+        step: the next step for the task without the words that have a thing followed.
+    """
+    about = Standing.of(task.standing).stood_about if task.standing else ""
+    words, follow = without_follow(task.instruction, about, task.metres_per_pixel)
+    reply = step(replace(task, instruction=words))
+    if follow is None:
+        return reply
+    driven = any(isinstance(m, Result) and m.name == "deploy" for m in turn)
+    calls = [
+        call.model_copy(update={"arguments": call.arguments | {"follow": follow}})
+        if call.name == "deploy"
+        else call
+        for call in reply.calls
+    ]
+    text = reply.text if calls or driven else f"{reply.text} {NOT_FOLLOWED}"
+    return reply.model_copy(update={"calls": tuple(calls), "text": text})
 
 
 def without_follow(

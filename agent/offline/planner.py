@@ -20,17 +20,16 @@ from .choosing import Found, Step, agrees, calls_in, declines, find, located_rea
 from .conversing import conversed
 from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, which_things, would_do
-from .escorting import without_follow
+from .escorting import following
 from .pointed import chosen_by_answer, narrowed
 from .reading import Reading
 from .references import described
+from .sequences import in_stages
 from .several import about_several, shares
 from .spelling import instructed, spelled
-from .standing import Standing
 
 MAX_LABEL = 100
 USUAL_CORNERS = 4
-NOT_FOLLOWED = 'Nothing is followed yet: say "follow it" when the robots may move.'
 READING = "The rules account for every word; the rest of them says which thing is meant."
 """Answers a doubt, which comes of single words."""
 
@@ -54,29 +53,15 @@ def _next_step(turn: History, before: History) -> Reply:
     """What to do next in a turn, which began with a task message, after those before."""
     first = turn[0]
     assert isinstance(first, User)
-    task = read_task(first.text)
-    about = Standing.of(task.standing).stood_about if task.standing else ""
-    words, follow = without_follow(task.instruction, about, task.metres_per_pixel)
-    reply = _step(replace(task, instruction=words), turn, before)
-    if follow is None:
-        return reply
-    driven = any(isinstance(m, Result) and m.name == "deploy" for m in turn)
-    calls = [
-        call.model_copy(update={"arguments": call.arguments | {"follow": follow}})
-        if call.name == "deploy"
-        else call
-        for call in reply.calls
-    ]
-    text = reply.text if calls or driven else f"{reply.text} {NOT_FOLLOWED}"
-    return reply.model_copy(update={"calls": tuple(calls), "text": text})
+    agreed = _without_agreed(turn)
+    return following(read_task(first.text), turn, lambda t: in_stages(t, agreed, before, _step_of))
 
 
-def _step(task: Task, turn: History, before: History) -> Reply:
-    """What to do next for a task, of whose words none have robots follow anything."""
-    turn = _without_agreed(turn)
+def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
+    """What to do next for one instruction, which may come later in a sequence of them."""
     if isinstance(turn[-1], Result) and _asks_of_outline(turn[:-1]):
         return _of_outline(turn[-1])
-    spoken = conversed(task, turn, before)
+    spoken = (task, turn) if later else conversed(task, turn, before)
     if isinstance(spoken, Reply):
         return spoken
     task, turn = spoken
@@ -191,7 +176,8 @@ def _told_which(task: Task, history: History) -> tuple[Task, list[str]]:
     left: list[str] = []
     for question, answer in _answered(history):
         reading = read_instruction(_said(task, left), task.metres_per_pixel)
-        asked = question == which_things(task, reading)
+        which = which_things(task, reading)
+        asked = which is not None and question.endswith(which)
         chosen = chosen_by_answer(task, answer, history) if asked else None
         task = chosen or task
         left += [] if chosen else [answer]

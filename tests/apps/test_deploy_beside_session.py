@@ -113,3 +113,26 @@ def test_a_plan_is_followed_with_for_so_long(
     assert "no more than 1 px/s were allowed" in capsys.readouterr().out
     with pytest.raises(InputError, match="--follow-speed says how fast"):
         formup(*drive, "--follow-speed", 5)
+
+
+@pytest.mark.parametrize("ending", ["json", "csv"])
+def test_trajectories_are_written_and_no_robot_is_moved(planned: Path, ending: str) -> None:
+    file, before = planned / f"ways.{ending}", (planned / "plan.json").read_bytes()
+    assert formup("deploy", planned / "plan.json", "--trajectories", file) == 0
+    assert (planned / "plan.json").read_bytes() == before
+    assert not [e for e in read_events(planned) if e.kind == "moving"]
+    text = file.read_text()
+    places = read_world(planned / "plan.json").world.plan().plan.formation.positions
+    if ending == "json":
+        poses = {name: r["poses_px"][-1] for name, r in json.loads(text)["robots"].items()}
+        ends = [poses[str(k)][1:3] for k in range(1, 7)]
+    else:
+        last = {row[0]: row[2:4] for row in (line.split(",") for line in text.splitlines()[1:])}
+        ends = [[float(v) for v in last[str(k)]] for k in range(1, 7)]
+    for end, place in zip(ends, places, strict=True):
+        assert end == pytest.approx(place, abs=0.5)
+
+
+def test_trajectories_of_another_ending_are_refused(planned: Path) -> None:
+    with pytest.raises(InputError, match=r"ending in \.json, \.csv"):
+        formup("deploy", planned / "plan.json", "--trajectories", planned / "ways.txt")

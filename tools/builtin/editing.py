@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 from pydantic import WithJsonSchema
+from pydantic.json_schema import SkipJsonSchema
 
 from ..context import Context
 from ..errors import ToolError
@@ -44,6 +45,7 @@ async def edit_formation(
     targets: Annotated[tuple[TargetPrompt, ...], WithJsonSchema(SHORT)] = (),
     stay: tuple[int, ...] = (),
     tell: str | None = None,
+    share: SkipJsonSchema[bool] = False,
 ) -> ToolResult:
     """Change the plan that stands; what is not named stays as it is.
 
@@ -53,6 +55,7 @@ async def edit_formation(
         targets: unmeasured things edits name, as of propose_formation.
         stay: robots that do not move.
         tell: as of propose_formation.
+        share: whether robots may take each other's places, which a person agreed to; in no schema.
     """
     if not edits:
         raise ToolError("edit_formation: name at least one edit.")
@@ -73,7 +76,7 @@ async def edit_formation(
         edit=json.dumps([_edit_facts(edit) for edit in edits], separators=(",", ":")),
         unseen=tuple(unseen),
     )
-    world = await with_robots(context.at(world), node, made.robots)
+    world = await with_robots(context.at(world), node, made.robots, share)
     node = world.latest
     data = {"parent": parent.plan.id, **proposal_data(world, node.plan)}
     data |= with_metres(moves(parent.plan, node.plan), world.metres_per_pixel)

@@ -17,6 +17,12 @@ from ..motion.planning import Ground, NoOrderError, Team, assigned, plan_motion
 from ..motion.routes import named_obstacles
 from ..world import World
 
+SHARING = (
+    "Ask whether robots may share the places among themselves; after a yes edit again, with "
+    "share true."
+)
+"""What a model is told to do about places that cannot each be reached by their own robots."""
+
 
 @dataclass(frozen=True)
 class Going:
@@ -44,12 +50,14 @@ def going(
     fleet: Fleet,
     poses: tuple[Pose, ...],
     taking: Sequence[str | None] | None,
+    share: bool = False,
 ) -> Going:
     """How robots get to a plan's places from where they were seen.
 
     Args:
         taking: the robot that keeps each place, None for one more; left out, robots are
             interchangeable.
+        share: whether they may take each other's places where they find no order otherwise.
 
     Raises:
         ToolError: too few robots, or those that keep places stand in each other's way.
@@ -68,12 +76,13 @@ def going(
         idle={robot: place for robot, place in at.items() if robot not in set(robots)},
     )
     try:
-        motion, robots, verdict = plan_motion(team, points, ground, interchangeable=taking is None)
+        free = taking is None or share
+        motion, robots, verdict = plan_motion(team, points, ground, interchangeable=free)
     except NoOrderError as error:
         if taking is None:
             return Going(robots, gap, {}, None, radius)
-        why = f"{error} Asked for anew, robots share the places among themselves."
-        raise ToolError(f"Nothing was changed: {why}", "edit", findings=[why]) from None
+        kind, text = ("edit" if share else "no_order"), f"Nothing was changed: {error}"
+        raise ToolError(text if share else f"{text} {SHARING}", kind, plain=str(error)) from None
     except FleetError:  # no way to a place: a deployment says so
         return Going(robots, gap, {}, None, radius)
     return Going(robots, gap, dict(motion.paths), verdict, radius)

@@ -8,13 +8,23 @@ import numpy as np
 import shapely
 
 from ..context import Context
-from ..errors import ApprovalError, FleetError, InputError, ToolError
-from ..fleet.arrival import Arrival, Deployment
-from ..fleet.deploy import ARRIVED_DEG, MAX_AGE, check_turns, deploy, heading_residuals
+from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
+from ..fleet.arrival import Arrival, Deployment, Track
+from ..fleet.deploy import (
+    ARRIVED_DEG,
+    MAX_AGE,
+    check_turns,
+    deploy,
+    heading_residuals,
+    motion_to,
+)
 from ..fleet.described import fleet_named
 from ..fleet.escort import check_follow
 from ..fleet.follow import Follow
 from ..fleet.protocol import Fleet, FleetRequest, FleetSizeError, PlaceTakenError, Pose
+from ..fleet.simulated import FULL_SPEED_S, SimulatedFleet
+from ..fleet.simulator import tracking_error
+from ..fleet.trajectories import Trajectories, tracked, wheeled
 from ..formation.checking.instruction_doubts import overruled
 from ..formation.contract import Contract
 from ..formation.encounters import notes_of
@@ -33,13 +43,17 @@ MOST_NAMED = 12
 
 
 async def with_robots(
-    context: Context, node: PlanNode, taking: Sequence[str | None] | None = None
+    context: Context,
+    node: PlanNode,
+    taking: Sequence[str | None] | None = None,
+    share: bool = False,
 ) -> World:
     """The world with a plan as the latest one and, if it is certified, robots for its places.
 
     Args:
         taking: the robot that keeps each place, in the order of the groups, None for one more;
             left out, the least sum of squared ways decides.
+        share: whether they may take each other's places where they find no order otherwise.
 
     Raises:
         ToolError: a real fleet has too few robots.
@@ -63,7 +77,7 @@ async def with_robots(
         return world.with_plan(_noted(world, node, told, None))
     check_turns(plan, fleet)
     poses = await fleet.observe(max_age=MAX_AGE)
-    found: Going = await in_thread(lambda: going(world, plan, fleet, poses, taking))
+    found: Going = await in_thread(lambda: going(world, plan, fleet, poses, taking, share))
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
     node = node.model_copy(update={"plan": plan, "motion": found.verdict})
     told += _notes(found, poses)
@@ -164,6 +178,24 @@ def with_observed(tell: str | None, arrival: Arrival, world: World) -> str | Non
     told = f"{robots} observed within {within} of the plan."
     follow = arrival.follow and arrival.follow.told(world.metres_per_pixel)
     return " ".join(filter(None, [tell.strip(), told, arrival.reason, follow]))
+
+
+async def trajectories_to(context: Context, plan: Plan) -> Trajectories:
+    """How robots with two wheels would drive to a plan's places from where they are seen.
+
+    Raises:
+        ToolError, FleetError: as of `drive_to`.
+    """
+    fleet = await _team(context, plan.formation.contract, plan.formation.robots)
+    if isinstance(fleet, SimulatedFleet):
+        physics = wheeled(fleet.physics.speed, fleet.physics.acceleration, fleet.radius)
+    else:
+        physics = wheeled(fleet.speed, fleet.speed / FULL_SPEED_S, fleet.radius)
+    error = max(tracking_error(physics), fleet.tracking_error)
+    site, robots = context.world.site(plan.formation.contract), plan.formation.robot_of_place
+    motion, verdict = await motion_to(plan, site, fleet, robots, error)
+    looks = {pose.id: pose.heading for pose in await fleet.observe()}
+    return await in_thread(lambda: tracked(motion, verdict, physics, looks, error))
 
 
 async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:

@@ -16,6 +16,7 @@ from ..formation.headings import off_heading
 from ..formation.placement.place import Site
 from ..formation.plan import Plan
 from ..geometry.outline import FloatArray
+from ..motion.checking import MotionVerdict
 from ..motion.planning import Ground, Team, plan_motion
 from ..motion.routes import named_obstacles
 from .arrival import Arrival, Deployment, Ended, Track
@@ -88,6 +89,28 @@ async def deploy(
         PlaceTakenError: an idle robot stands on a place.
         FleetError: the fleet cannot be observed, or there is no way to a place.
     """
+    drive = _certified(plan, site, fleet, robots, watch)
+    if id(fleet) in _in_deployment:
+        raise FleetBusyError(
+            f"The fleet {fleet.name} is being deployed already; wait for it to end, or stop it."
+        )
+    _in_deployment.add(id(fleet))
+    try:
+        return await drive.run(starting)
+    finally:
+        _in_deployment.discard(id(fleet))
+
+
+async def motion_to(
+    plan: Plan, site: Site, fleet: Fleet, robots: Sequence[str], error: float
+) -> tuple[Motion, MotionVerdict]:
+    """The motion that a deployment of robots that come off so far, px, would begin with now."""
+    return await _certified(plan, site, fleet, robots, lambda poses: None).planned(error)
+
+
+def _certified(
+    plan: Plan, site: Site, fleet: Fleet, robots: Sequence[str], watch: Watch
+) -> "_Drive":
     contract = with_defaults(plan.formation.contract, site.outlines, site.room)
     formation = plan.formation
     headings = formation.place_headings  # a plan's own word is not enough
@@ -96,17 +119,7 @@ async def deploy(
         why = verdict.findings[0].sentence
         raise ToolError(f"Plan {plan.id} is not certified: {why} Nothing was moved.")
     check_turns(plan, fleet)
-    if id(fleet) in _in_deployment:
-        raise FleetBusyError(
-            f"The fleet {fleet.name} is being deployed already; wait for it to end, or stop it."
-        )
-    _in_deployment.add(id(fleet))
-    try:
-        goals = formation.points, headings
-        drive = _Drive(goals, contract, site, fleet, robots, watch)
-        return await drive.run(starting)
-    finally:
-        _in_deployment.discard(id(fleet))
+    return _Drive((formation.points, headings), contract, site, fleet, robots, watch)
 
 
 def check_turns(plan: Plan, fleet: Fleet) -> None:
@@ -164,7 +177,8 @@ class _Drive:
         self._waiting: dict[str, str] = {}
         self._demanded, self._least = 0.0, math.inf
 
-    async def run(self, starting: Callable[[], Awaitable[None]] | None) -> Deployment:
+    async def planned(self, error: float = 0.0) -> tuple[Motion, MotionVerdict]:
+        """A certified motion from where robots are seen now, for robots that come off so far."""
         if len(set(self._robots)) != len(self._goals):
             raise FleetSizeError(
                 f"{len(set(self._robots))} robots are named; the plan has {len(self._goals)} "
@@ -176,14 +190,17 @@ class _Drive:
             )
         await self._observe()
         self._check_idle()
-        corrections, motion = 0, await self._motion()
+        return await self._motion(error)
+
+    async def run(self, starting: Callable[[], Awaitable[None]] | None) -> Deployment:
+        corrections, (motion, _) = 0, await self.planned()
         if starting is not None:
             await starting()
         try:
             await self._drive(motion)
             while not self._arrived() and not self._fleet.stopped and corrections < CORRECTIONS:
                 corrections += 1
-                await self._drive(await self._motion())
+                await self._drive((await self._motion())[0])
         except (asyncio.CancelledError, FleetError) as error:
             with suppress(FleetError):
                 self._saw(await self._fleet.observe())
@@ -294,7 +311,7 @@ class _Drive:
         away = np.hypot(*(self._goals - (pose.x, pose.y)).T)
         return bool(away.min() < max(2 * self._radius, MIN_SPACING))
 
-    async def _motion(self) -> Motion:
+    async def _motion(self, error: float = 0.0) -> tuple[Motion, MotionVerdict]:
         """A motion that is certified from where the robots were seen.
 
         Raises:
@@ -307,7 +324,7 @@ class _Drive:
             starts=self._points(),
             radius=self._radius,
             speed=fleet.speed,
-            error=fleet.tracking_error,
+            error=max(fleet.tracking_error, error),
             idle={pose.id: (pose.x, pose.y) for pose in self._idle()},
         )
         motion, _, verdict = await asyncio.to_thread(
@@ -318,7 +335,7 @@ class _Drive:
             raise FleetError(f"{verdict.findings[0].sentence} No robot is driven like that.")
         looks = zip(self._robots, self._headings, strict=False)
         headings = {robot: math.radians(angle) for robot, angle in looks if angle is not None}
-        return replace(motion, headings=headings)
+        return replace(motion, headings=headings), verdict
 
     def _residual(self) -> FloatArray:
         return np.linalg.norm(self._points() - self._goals, axis=1)

@@ -69,7 +69,7 @@ class SimulatedFleet:
         physics = physics or Physics(
             speed=speed, acceleration=speed / FULL_SPEED_S, radius=radius, slip=SLIP
         )
-        self.radius, self.speed = physics.radius, physics.speed
+        self.physics, self.radius, self.speed = physics, physics.radius, physics.speed
         self.tracking_error = tracking_error(physics)
         self._simulator = Simulator(
             [pose.id for pose in poses],

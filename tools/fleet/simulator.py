@@ -26,9 +26,10 @@ SETTLED = 0.25
 CALM = 0.1
 """Seconds over which robots make up for being off their path where sensing is noisy."""
 LOOK_AHEAD = 4
-"""Steps ahead on its path that a robot with wheels steers for."""
-ASKEW = 0.3
-"""A robot with wheels that looks so many radians past its way turns before it drives on."""
+"""Steps ahead on its path that a robot with wheels steers for, at least its radius."""
+ASKEW, MOST_ASKEW = 0.04, 0.3
+"""A robot with wheels that looks so many radians past its way turns before it drives on; where
+sensing is noisy more, at most the second."""
 LOOKING = 0.01
 """A robot looks where it is to within so many radians."""
 SPREAD = 5.0
@@ -116,6 +117,8 @@ class Simulator:
         self.velocities, self._rates = np.zeros((n, 2)), np.zeros((n, 2))
         self._grip = 1 - physics.slip * self._random.random(n)
         self._smoothing = _smoothing(physics)
+        unsure = SPREAD * physics.noise.sensing / physics.radius
+        self._askew = min(ASKEW + unsure, MOST_ASKEW)
         # Along the way and across it, or on and about: together within the limit.
         self._push = physics.acceleration * (0.5 if self._wheels else math.sqrt(0.5))
         row = {robot: i for i, robot in enumerate(self.ids)}
@@ -195,6 +198,9 @@ class Simulator:
         turned = np.maximum(2 * np.sin(following.turns / 2), 1e-9)
         fast = np.minimum(change / turned, np.sqrt(change / PERIOD * legs / turned))
         fast = np.minimum(fast, self.physics.speed)
+        if self._wheels:  # what steering ahead cuts off bends one after another stays within KEPT
+            about = _braking(np.array([KEPT / 2]), self._push, PERIOD) / self.physics.radius
+            fast = np.minimum(fast, about * legs / turned)
         fast[fast < self._push * PERIOD] = 0.0
         return np.maximum(fast**2 / (2 * self._push) - fast * PERIOD / 2, 0.0)
 
@@ -216,7 +222,7 @@ class Simulator:
         )
         room = np.maximum(room - np.einsum("ij,ij->i", off, along), 0.0)
         reach = abs(rates[:, 0]) * LOOK_AHEAD * PERIOD
-        reach = np.maximum(reach, 2 * self.physics.radius)
+        reach = np.maximum(reach, self.physics.radius)
         aims = following.at(ahead) + along * reach[:, None]
         return _Seen(points, headings, rates, room, along, off, aims, self._looks)
 
@@ -290,7 +296,7 @@ class Simulator:
         room = np.where(ended, size, seen.room)
         room[settled] = 0.0
         fast = np.minimum(_braking(room, self._push, self._smoothing), most - abs(about))
-        fast *= np.clip(1 - abs(turn) / ASKEW, 0.0, 1.0)
+        fast *= np.clip(1 - abs(turn) / self._askew, 0.0, 1.0)
         fast = np.clip(fast, seen.rates[:, 0] - change, seen.rates[:, 0] + change)
         return np.stack([fast, about / radius], axis=1)
 
@@ -330,9 +336,10 @@ class Simulator:
     ) -> tuple[FloatArray, FloatArray]:
         """Where a step at some rates takes robots, and how they look then."""
         if self._wheels:
-            headings = headings + rates[:, 1] * PERIOD
-            way = np.stack([np.cos(headings), np.sin(headings)], axis=1)
-            return points + rates[:, :1] * PERIOD * way, headings
+            turned = rates[:, 1] * PERIOD
+            middle = headings + turned / 2
+            way = np.stack([np.cos(middle), np.sin(middle)], axis=1)
+            return points + rates[:, :1] * PERIOD * way, headings + turned
         if free is not None:  # points turn by the way
             wanted = ~np.isnan(self._looks) & free
             begun = np.nan_to_num(headings[wanted])

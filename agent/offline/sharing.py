@@ -1,0 +1,24 @@
+"""The question asked where robots that keep who stands where find no order in which to go."""
+
+from ..messages import History, Result
+from .choosing import Step, agrees, calls_in, declines
+
+MAY_SHARE = "Shall the robots share the places among themselves? 1: yes; 2: no."
+
+
+def shared(refused: Result, messages: History) -> Step | str:
+    """The question or, after a yes, the change with places shared; else what there is to say."""
+    why = str((refused.facts or {}).get("plain", refused.text))
+    call = next(c for c in calls_in(messages) if c.id == refused.call_id)
+    if all(edit["kind"] == "swap" for edit in call.arguments["edits"]):
+        return f"Nothing was changed: {why}"  # shared, they would stay as they are
+    later = messages[messages.index(refused) + 1 :]
+    answers = (m.text for m in later if isinstance(m, Result) and m.name == "ask_user")
+    answer = next(answers, None)
+    if answer is None:
+        return Step("ask_user", {"question": f"{why} {MAY_SHARE}"})
+    if agrees(answer) or answer.strip(" .") == "1":
+        return Step("edit_formation", call.arguments | {"share": True})
+    if declines(answer) or answer.strip(" .") == "2":
+        return "Nothing was changed, as you said no."
+    return f'Nothing was changed: "{answer}" does not say whether robots may share the places.'
