@@ -19,7 +19,7 @@ from .rate_limiter import RateLimited, rate_limiter
 from .recordings import REPLAY, recordings
 from .segment_only import SEGMENT_ONLY, SegmentOnly
 from .simulated_model import SIMULATED, SimulatedModel
-from .trials import USUAL, Arm, Trial, canonical
+from .trials import USUAL, USUAL_SEGMENTER, Arm, Trial, canonical
 
 METHODS = ("rules", "agent", "alone", SEGMENT_ONLY, *POLICIES)
 DIRECT = "former-direct"
@@ -42,6 +42,7 @@ class Method:
         descriptor: how shapes are described.
         mode: how things are pointed at.
         planner: a second model of an agent, which plans without the picture.
+        segmenter: what cuts things out; of segment-only the model itself.
         library: where prompts are.
         base_url: of the model's server.
         rate: requests per minute in each process at most; None for no limit.
@@ -53,6 +54,7 @@ class Method:
     descriptor: Descriptor = "edges"
     mode: Mode = "words"
     planner: str | None = None
+    segmenter: str = USUAL_SEGMENTER
     library: PromptLibrary = SHIPPED
     base_url: str | None = None
     rate: float | None = None
@@ -65,9 +67,10 @@ class Method:
             InputError: no such model or prompt.
         """
         recorded = recordings(self.model)
+        cut = None if self.segmenter == USUAL_SEGMENTER else self.segmenter
         if self.name in POLICIES or recorded:
             model = recorded.name if recorded else self.model
-            return Arm(method=self.name, model=model, mode=self.mode)
+            return Arm(method=self.name, model=model, mode=self.mode, segmenter=cut)
         agent = self.agent(0)
         return Arm(
             method=self.name,
@@ -77,6 +80,7 @@ class Method:
             model=agent.model.name,
             descriptor=self.descriptor if self.name in WITH_TOOLS else None,
             mode=self.mode,
+            segmenter=cut,
         )
 
     def agent(self, seed: int, recording: Path | None = None) -> Agent:

@@ -142,7 +142,7 @@ class SuiteWork:
             descriptor=arm.descriptor,
             seed=seed,
             metres_per_pixel=task.metres_per_pixel,
-            segmenter=arm.model if arm.name == SEGMENT_ONLY else "grabcut",
+            segmenter=arm.model if arm.name == SEGMENT_ONLY else arm.segmenter,
         )
         trace = None
         if self.attempts is not None and arm.model not in ("offline", SIMULATED):

@@ -19,6 +19,8 @@ Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Status = Literal["pass", "fail", "model_invalid", "infra_error"]
 USUAL = "edges"
 """The descriptor that goes without saying."""
+USUAL_SEGMENTER = "grabcut"
+"""So for what cuts things out, which needs no weights."""
 UNEQUAL = frozenset({"seconds", "host"})
 """Fields that differ from run to run of the same trial."""
 
@@ -34,6 +36,7 @@ class Arm(BaseModel):
         model: provider:name, or offline.
         descriptor: how shapes are put into words, such as edges; None where none are.
         mode: how things are pointed at; words where they are not.
+        segmenter: what cuts things out; None for the usual one.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -45,14 +48,16 @@ class Arm(BaseModel):
     model: Name
     descriptor: Name | None = None
     mode: Name = "words"
+    segmenter: Name | None = None
 
     @property
     def name(self) -> str:
-        """Method, prompt with the beginning of its hash, model; descriptor and mode if unusual."""
+        """Method, prompt with the beginning of its hash, model; the others if unusual."""
         prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
         shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
         mode = "" if self.mode == "words" else f" {self.mode}"
-        return f"{self.method}{prompt} {self.model}{shapes}{mode}"
+        cut = f" {self.segmenter}" if self.segmenter else ""
+        return f"{self.method}{prompt} {self.model}{shapes}{mode}{cut}"
 
 
 class Trial(BaseModel):

@@ -1,0 +1,158 @@
+"""`formup eval table`: the paper's tables with our rows beside the paper's, and one of our own."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table as Grid
+from rich.text import Text
+
+from ..evals.experiments.journal import ROWS, read_rows
+from ..evals.experiments.methods import Method
+from ..evals.experiments.trials import TrialRow
+from ..evals.report.page import page
+from ..evals.report.run_folder import side
+from ..evals.tables.definition import Entry, entries, table_named
+from ..evals.tables.formats import (
+    FORMATS,
+    as_matrix,
+    count,
+    interval,
+    notes,
+    paper,
+    recall,
+    remarks,
+)
+from ..evals.tables.results import Planned, Result, Tabled, tabled
+from ..evals.tasks.suites import load_suite
+from ..evals.tasks.task import Suite, Task
+from ..prompts import PromptLibrary
+from ..tools.errors import InputError
+from ..tools.store import write_whole
+from . import arguments as inputs
+from . import eval_options as e
+from . import options as o
+from .eval_progress import sweep
+from .eval_run import RUNS, new_folder, prepared, processes, say_stopped, tasks_tried
+from .terminal import say, styled
+
+TERMINAL = "terminal"
+Name = Annotated[str, typer.Argument(metavar="TABLE", help="1, 2, 3 or hard.")]
+Models = Annotated[
+    list[str] | None,
+    typer.Option("--models", help="As in formup run, or replay:FOLDER; repeatable."),
+]
+Methods = Annotated[
+    list[str] | None, typer.Option("--method", help="Only rows of this method; repeatable.")
+]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with the latest run of the table.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Run nothing; say what it would cost.")]
+Form = Annotated[
+    str, typer.Option("--format", help=f"What is printed: {', '.join([TERMINAL, *FORMATS])}.")
+]
+Tries = Annotated[
+    str | None, typer.Option("--trials", help="Tries of every task, in place of the table's own.")
+]
+
+
+def table(
+    name: Name,
+    models: Models = None,
+    method: Methods = None,
+    base_url: o.BaseUrl = None,
+    prompts: o.PromptsFolder = None,
+    task: e.TaskList = None,
+    trials: Tries = None,
+    out: e.RunFolder = None,
+    resume: Resume = False,
+    dry_run: DryRun = False,
+    budget: e.Budget = None,
+    jobs: e.Jobs = "1",
+    form: Form = TERMINAL,
+) -> None:
+    """Run a table of the paper, print it, and write it as Markdown, CSV, JSON, LaTeX and HTML.
+
+    Each cell is k of n trials with an interval and the paper's figure beside it; what was not run
+    says so, and what it would cost. A killed run is gone on with by naming its folder again.
+    """
+    if form not in (TERMINAL, *FORMATS):
+        raise InputError(f"Unknown format {form!r}. There are: {TERMINAL}, {', '.join(FORMATS)}.")
+    wanted, limit = table_named(name), inputs.dollars("--budget", budget)
+    tries = None if trials is None else inputs.whole("--trials", trials, least=1)
+    base = Method("agent", base_url=base_url, library=PromptLibrary(prompts))
+    found = entries(wanted, models or [], base, tries)
+    found = [entry for entry in found if not method or entry.row.method in method]
+    suite, folder = load_suite(wanted.suite), out or _folder(name, resume)
+    tried = _tried(suite, found, task)
+    runs_on = processes(inputs.whole("--jobs", jobs, least=1))
+    filled = [(e.arm, tasks, e.trials) for e, tasks in tried if e.arm is not None]
+    with prepared(suite, filled, "dev", folder) as made:
+        own = iter(made.trials)
+        planned = [Planned(e, next(own) if e.arm else (), len(tasks)) for e, tasks in tried]
+        todo = [trial for plan in planned for trial in plan.trials]
+        done = None
+        if todo and not dry_run:
+            done = sweep(todo, made.work, folder, executor=runs_on, budget_usd=limit)
+    _show(tabled(name, wanted, planned, _rows(folder)), folder, form)
+    if done is not None:
+        say_stopped(done)
+
+
+def _folder(name: str, resume: bool) -> Path:
+    """The latest folder of a table, or a new one.
+
+    Raises:
+        InputError: there is none to go on with.
+    """
+    if not resume:
+        return new_folder(f"table-{name}")
+    found = sorted(RUNS.glob(f"table-{name}-*"))
+    if not found:
+        raise InputError(f"There is no run of table {name} in {RUNS}; leave --resume out.")
+    return found[-1]
+
+
+def _tried(
+    suite: Suite, found: list[Entry], names: list[str] | None
+) -> list[tuple[Entry, list[Task]]]:
+    """The rows with the tasks that each is tried on."""
+    return [(entry, tasks_tried(suite, [entry.arm] if entry.arm else [], names)) for entry in found]
+
+
+def _rows(folder: Path) -> list[TrialRow]:
+    return read_rows(folder) if (folder / ROWS).exists() else []
+
+
+def _show(made: Tabled, folder: Path, form: str) -> None:
+    """Write all forms of a table into its folder, and print one."""
+    for ending, write in FORMATS.values():
+        write_whole(folder / f"table.{ending}", write(made).encode())
+    rows = [row for row in _rows(folder) if row.trial == 0]
+    if rows:
+        html = page([side(folder, rows)], PromptLibrary(), as_matrix(made), notes(made))
+        write_whole(folder / "table.html", html.encode())
+    if form != TERMINAL:
+        say(FORMATS[form][1](made), end="")
+        return
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(_grid(made))
+    for note in notes(made):
+        console.print(styled(note))
+    console.print(styled(f"{folder}: table.md, .csv, .json, .tex, .html"))
+
+
+def _grid(made: Tabled) -> Grid:
+    grid = Grid(title=styled(made.table.title), header_style="cyan", box=None, show_lines=True)
+    for title in ("", *made.table.columns):
+        grid.add_column(title, min_width=None if title else 24, no_wrap=bool(title))
+    for row in made.rows:
+        head = styled((row.head, "bold"), *(f"\n{remark}" for remark in remarks(row)))
+        grid.add_row(head, *(_stacked(result) for result in row.results.values()), end_section=True)
+    return grid
+
+
+def _stacked(result: Result) -> Text:
+    """A cell of four lines: k/n, interval, GCR, the paper's figure."""
+    own = "\n".join(filter(None, (count(result), interval(result), recall(result))))
+    return styled(own, (f"\npaper {paper(result)}" if result.paper else "", "dim"))

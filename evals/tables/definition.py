@@ -1,0 +1,170 @@
+"""A table as data: columns, rows, the paper's figures, and who fills a row; see tables.yaml."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cache
+from pathlib import Path
+
+import yaml
+from pydantic import BaseModel, ConfigDict
+
+from ...tools.context import Descriptor
+from ...tools.errors import InputError
+from ..experiments.methods import Method, check_method
+from ..experiments.pointing import Mode
+from ..experiments.recordings import REPLAY
+from ..experiments.simulated_model import SIMULATED
+from ..experiments.trials import Trial
+from ..statistics.cells import cell_names
+
+_FILE = Path(__file__).with_name("tables.yaml")
+Figure = tuple[float, float | None]
+"""SR and GCR as the paper prints them; Tables II and III have no GCR."""
+
+
+class Row(BaseModel):
+    """A row of a table.
+
+    Attributes:
+        row: its head.
+        method: who decides; nothing where nobody can here, and `missing` says why.
+        models: a word in the names of the models that fill it, "" for those that no other row of
+            the method takes; None where the method needs none, or has its own.
+        model: the method's own, where that is to be chosen.
+        trials: tries of each task; the table's by default.
+        paper: its figures by column.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    row: str
+    method: str = ""
+    missing: str = ""
+    models: str | None = None
+    model: str = ""
+    mode: Mode = "words"
+    descriptor: Descriptor = "edges"
+    segmenter: str = "grabcut"
+    trials: int | None = None
+    paper: dict[str, Figure] = {}
+
+
+class Table(BaseModel):
+    """A table.
+
+    Attributes:
+        columns: title, and the name of a cell or a pattern of tasks' ids.
+        notes: what has to be said beside it.
+        stand_ins: which task of the paper each of ours stands for.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    title: str
+    suite: str
+    trials: int
+    columns: dict[str, str]
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()
+    stand_ins: dict[str, str] = {}
+
+    def within(self, column: str, trial: Trial) -> bool:
+        """Whether a trial counts in a column."""
+        wanted = self.columns[column]
+        return wanted in cell_names(trial) or fnmatchcase(trial.task, wanted)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row with who fills it: None where nobody has been named, or nobody can."""
+
+    row: Row
+    arm: Method | None
+    trials: int
+
+
+class _Tables(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    tokens: dict[str, tuple[int, int]]
+    tables: dict[str, Table]
+
+
+@cache
+def _tables() -> _Tables:
+    return _Tables.model_validate(yaml.safe_load(_FILE.read_text(encoding="utf-8")))
+
+
+def table_named(name: str) -> Table:
+    """The table of a name.
+
+    Raises:
+        InputError: there is none.
+    """
+    tables = _tables().tables
+    if name not in tables:
+        raise InputError(f"Unknown table {name!r}. There are: {', '.join(tables)}.")
+    return tables[name]
+
+
+def usual_tokens(method: str) -> tuple[int, int]:
+    """Tokens in and out of a trial, before any has been counted; none where no model is asked."""
+    return _tables().tokens.get(method, (0, 0))
+
+
+def entries(
+    table: Table, models: Sequence[str], base: Method, trials: int | None = None
+) -> list[Entry]:
+    """The rows of a table with who fills them: a row stands for each of its models.
+
+    Args:
+        table: whose rows.
+        models: as Agent takes them, `simulated`, or replay:FOLDER.
+        base: what all methods share, such as where prompts are.
+        trials: tries of each task, in place of the table's own.
+
+    Raises:
+        InputError: a model that no row takes, or that cannot be used.
+    """
+    found, taken = list[Entry](), set[str]()
+    for row in table.rows:
+        chosen = [m for m in models if _takes(table, row, m)] if row.method else []
+        taken.update(chosen)
+        own = [row.model] if row.method and row.models is None else chosen
+        count = trials or row.trials or table.trials
+        found += [Entry(row, _arm(row, model, base), count) for model in own]
+        if not own:
+            found.append(Entry(row, None, count))
+    lost = sorted(set(models) - taken)
+    if lost:
+        raise InputError(f"No row of this table is for the model {lost[0]!r}; leave it out.")
+    return found
+
+
+def _takes(table: Table, row: Row, model: str) -> bool:
+    """Whether a row is for a model, by its name."""
+    if row.models is None:
+        return False
+    others = [r.models for r in table.rows if r.method == row.method and r.models]
+    named = [word for word in others if word in model.lower()]
+    if model == SIMULATED or model.startswith(REPLAY):
+        named = named or [""]
+        return row.method == "agent" and row.models in named[:1]
+    return row.models in named if named else row.models == ""
+
+
+def _arm(row: Row, model: str, base: Method) -> Method:
+    url = base.base_url if row.models is not None else None
+    return check_method(
+        Method(
+            row.method,
+            model=model,
+            descriptor=row.descriptor,
+            mode=row.mode,
+            segmenter=row.segmenter,
+            library=base.library,
+            base_url=url,
+            rate=base.rate,
+        )
+    )

@@ -1,0 +1,180 @@
+"""What came of a table: each cell as k of n with its interval and the paper's figure beside it.
+
+What was not run says so, and about what it would cost. Nothing in it depends on the time.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from ...agent.providers.prices import UNKNOWN, price_of
+from ..experiments.recordings import REPLAY
+from ..experiments.simulated_model import SIMULATED
+from ..experiments.trials import Trial, TrialRow
+from ..statistics.intervals import Interval, wilson
+from .definition import Entry, Figure, Table, usual_tokens
+
+
+@dataclass(frozen=True)
+class Result:
+    """A cell.
+
+    Attributes:
+        passed, scored: k of n trials.
+        planned: trials there are to be.
+        interval: of the success rate at 95 %, of these tasks; None without trials.
+        gcr: mean; None without trials.
+        paper: its figure; None where it has none.
+    """
+
+    passed: int
+    scored: int
+    planned: int
+    interval: Interval | None
+    gcr: float | None
+    paper: Figure | None
+
+
+@dataclass(frozen=True)
+class ResultRow:
+    """A row.
+
+    Attributes:
+        head: of the row.
+        model: that filled it, or nothing.
+        results: by column.
+        missing: why trials are, and what they would cost; or nothing.
+        left: how many are.
+        left_usd: what they would cost; None where the price is not known.
+        tokens: of a trial in the median, in and out; None where none were counted.
+        cost_usd: of its trials so far.
+        invalid: trials whose output could not be used.
+        lost: trials a provider failed in.
+        once: nothing is left to chance, so that each task is tried once.
+    """
+
+    head: str
+    model: str
+    results: Mapping[str, Result]
+    missing: str
+    left: int
+    left_usd: float | None
+    tokens: tuple[int, int] | None
+    cost_usd: float
+    invalid: int
+    lost: int
+    once: bool
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A row of a table with its trials; none where nobody fills it, but the tasks it would have."""
+
+    entry: Entry
+    trials: Sequence[Trial]
+    tasks: int
+
+
+@dataclass(frozen=True)
+class Tabled:
+    """A table with what came of it."""
+
+    name: str
+    table: Table
+    suite: str
+    rows: Sequence[ResultRow]
+
+    @property
+    def cost_usd(self) -> float:
+        """Of all trials so far."""
+        return sum(row.cost_usd for row in self.rows)
+
+
+def tabled(name: str, table: Table, planned: Sequence[Planned], rows: Sequence[TrialRow]) -> Tabled:
+    """The table of these rows.
+
+    Args:
+        name: of the table.
+        table: its definition.
+        planned: its rows, in order.
+        rows: of the run's folder.
+    """
+    by_key = {row.key: row for row in rows}
+    suites = {trial.suite for plan in planned for trial in plan.trials}
+    return Tabled(
+        name, table, min(suites, default=""), [_row(table, plan, by_key) for plan in planned]
+    )
+
+
+def _row(table: Table, plan: Planned, by_key: Mapping[str, TrialRow]) -> ResultRow:
+    entry, arm = plan.entry, plan.entry.arm
+    rows = [by_key[trial.key] for trial in plan.trials if trial.key in by_key]
+    scored = [row for row in rows if row.scored]
+    results = {
+        column: _result(
+            [row for row in rows if table.within(column, row)],
+            sum(table.within(column, trial) for trial in plan.trials),
+            entry.row.paper.get(column),
+        )
+        for column in table.columns
+    }
+    counted = [(row.input_tokens, row.output_tokens) for row in scored if row.input_tokens]
+    tokens = _medians(counted) if counted else None
+    planned = len(plan.trials) if arm else plan.tasks * entry.trials
+    left = 0 if entry.row.missing else planned - len(scored)
+    each = tokens or usual_tokens(entry.row.method)
+    cost = _cost_usd(arm.model if arm else None, left, each)
+    return ResultRow(
+        head=entry.row.row,
+        model=plan.trials[0].arm.model if plan.trials and entry.row.models is not None else "",
+        results=results,
+        missing=entry.row.missing or (_missing(entry, left, each, cost) if left else ""),
+        left=left,
+        left_usd=cost,
+        tokens=tokens,
+        cost_usd=sum(row.cost_usd for row in rows),
+        invalid=sum(row.status == "model_invalid" for row in scored),
+        lost=len(rows) - len(scored),
+        once=entry.trials == 1,
+    )
+
+
+def _result(rows: Sequence[TrialRow], planned: int, paper: Figure | None) -> Result:
+    scored = [row for row in rows if row.scored]
+    n, passed = len(scored), sum(bool(row.sr) for row in scored)
+    return Result(
+        passed=passed,
+        scored=n,
+        planned=planned,
+        interval=wilson(passed, n) if n else None,
+        gcr=sum(row.gcr or 0.0 for row in scored) / n if n else None,
+        paper=paper,
+    )
+
+
+def _missing(entry: Entry, left: int, each: tuple[int, int], cost: float | None) -> str:
+    """How much is missing, and what it would take."""
+    what = f"not run: {left:,} trial{'s' if left > 1 else ''}"
+    tokens = f"about {left * each[0]:,} tokens in and {left * each[1]:,} out"
+    if entry.arm is None:
+        word = entry.row.models
+        named = f"whose name holds {word}" if word else "of yours"
+        return f"{what} for want of --models {named}; {tokens}"
+    if cost is None:
+        return f"{what}; {tokens}, at a price that is not known"
+    return f"{what}; about {cost:.2f} USD" if cost else what
+
+
+def _cost_usd(model: str | None, trials: int, tokens: tuple[int, int]) -> float | None:
+    """What trials of a model would cost; None where nobody knows its price."""
+    if not any(tokens) or model is not None and (model == SIMULATED or model.startswith(REPLAY)):
+        return 0.0
+    price = price_of(*model.partition(":")[::2]) if model else UNKNOWN
+    if price == UNKNOWN:
+        return None
+    return trials * price.cost(fresh=tokens[0], cached=0, output=tokens[1])
+
+
+def _medians(counted: Sequence[tuple[int, int]]) -> tuple[int, int]:
+    sent, got = zip(*counted, strict=True)
+    return round(median(sent)), round(median(got))
