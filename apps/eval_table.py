@@ -13,6 +13,7 @@ from ..evals.experiments.methods import Method
 from ..evals.experiments.trials import TrialRow
 from ..evals.report.page import page
 from ..evals.report.run_folder import side
+from ..evals.tables.calibration import in_own_frame
 from ..evals.tables.definition import Entry, entries, table_named
 from ..evals.tables.formats import (
     FORMATS,
@@ -84,6 +85,8 @@ def table(
     found = entries(wanted, models or [], base, tries)
     found = [entry for entry in found if not method or entry.row.method in method]
     suite, folder = load_suite(wanted.suite), out or _folder(name, resume)
+    if not dry_run:
+        found = [in_own_frame(entry, folder) for entry in found]
     tried = _tried(suite, found, task)
     runs_on = processes(inputs.whole("--jobs", jobs, least=1))
     filled = [(e.arm, tasks, e.trials) for e, tasks in tried if e.arm is not None]

@@ -37,6 +37,7 @@ class Arm(BaseModel):
         descriptor: how shapes are put into words, such as edges; None where none are.
         mode: how things are pointed at; words where they are not.
         segmenter: what cuts things out; None for the usual one.
+        frame: in which coordinates were written; None for pixels.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -49,6 +50,7 @@ class Arm(BaseModel):
     descriptor: Name | None = None
     mode: Name = "words"
     segmenter: Name | None = None
+    frame: Name | None = None
 
     @property
     def name(self) -> str:
@@ -56,8 +58,8 @@ class Arm(BaseModel):
         prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
         shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
         mode = "" if self.mode == "words" else f" {self.mode}"
-        cut = f" {self.segmenter}" if self.segmenter else ""
-        return f"{self.method}{prompt} {self.model}{shapes}{mode}{cut}"
+        more = "".join(f" {said}" for said in (self.segmenter, self.frame) if said)
+        return f"{self.method}{prompt} {self.model}{shapes}{mode}{more}"
 
 
 class Trial(BaseModel):

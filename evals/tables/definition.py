@@ -120,7 +120,7 @@ def entries(
 
     Args:
         table: whose rows.
-        models: as Agent takes them, `simulated`, or replay:FOLDER.
+        models: as Agent takes them, `simulated`, or replay:FOLDER; A+B where B plans for A.
         base: what all methods share, such as where prompts are.
         trials: tries of each task, in place of the table's own.
 
@@ -147,19 +147,22 @@ def _takes(table: Table, row: Row, model: str) -> bool:
     if row.models is None:
         return False
     others = [r.models for r in table.rows if r.method == row.method and r.models]
-    named = [word for word in others if word in model.lower()]
+    named = [word for word in others if word in model.lower().rpartition("+")[2]]
     if model == SIMULATED or model.startswith(REPLAY):
-        named = named or [""]
-        return row.method == "agent" and row.models in named[:1]
+        return row.method == "agent" and row.models == (REPLAY if REPLAY in named else "")
+    if "+" in model and row.method == "alone":
+        return False
     return row.models in named if named else row.models == ""
 
 
 def _arm(row: Row, model: str, base: Method) -> Method:
     url = base.base_url if row.models is not None else None
+    looker, _, planner = model.partition("+")
     return check_method(
         Method(
             row.method,
-            model=model,
+            model=looker,
+            planner=planner or None,
             descriptor=row.descriptor,
             mode=row.mode,
             segmenter=row.segmenter,
