@@ -127,6 +127,7 @@ def _arms(
 class Prepared:
     """A suite in a run's folder, ready to be tried: the trials of each arm, and what runs them."""
 
+    sha256: str
     trials: Sequence[Sequence[Trial]]
     work: SuiteWork
     levels: dict[str, Chance]
@@ -164,7 +165,7 @@ def prepared(
             attempts=None if held_out else attempts,
         )
         store_suite(folder, suite, split, sha256, pictures, levels)
-        yield Prepared(trials, work, levels)
+        yield Prepared(sha256, trials, work, levels)
 
 
 def tasks_tried(suite: Suite, arms: Sequence[Method], names: list[str] | None) -> list[Task]:

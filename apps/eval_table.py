@@ -1,5 +1,6 @@
 """`formup eval table`: the paper's tables with our rows beside the paper's, and one of our own."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -8,12 +9,11 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text
 
-from ..evals.experiments.journal import ROWS, read_rows
 from ..evals.experiments.methods import Method
-from ..evals.experiments.trials import TrialRow
 from ..evals.report.page import page
 from ..evals.report.run_folder import side
 from ..evals.tables.calibration import in_own_frame
+from ..evals.tables.checks import checked_rows
 from ..evals.tables.definition import Entry, entries, table_named
 from ..evals.tables.formats import (
     FORMATS,
@@ -84,20 +84,27 @@ def table(
     base = Method("agent", base_url=base_url, library=PromptLibrary(prompts))
     found = entries(wanted, models or [], base, tries)
     found = [entry for entry in found if not method or entry.row.method in method]
-    suite, folder = load_suite(wanted.suite), out or _folder(name, resume)
-    if not dry_run:
-        found = [in_own_frame(entry, folder) for entry in found]
-    tried = _tried(suite, found, task)
-    runs_on = processes(inputs.whole("--jobs", jobs, least=1))
-    filled = [(e.arm, tasks, e.trials) for e, tasks in tried if e.arm is not None]
+    suite, tasks = load_suite(wanted.suite), task
+    if dry_run:
+        planned = [Planned(entry, (), len(own)) for entry, own in _tried(suite, found, tasks)]
+        _print(tabled(name, wanted, planned, ()), form)
+        return
+    folder, runs_on = out or _folder(name, resume), processes(inputs.whole("--jobs", jobs, least=1))
+    found = [in_own_frame(entry, folder) for entry in found]
+    tried = _tried(suite, found, tasks)
+    filled = [(e.arm, own, e.trials) for e, own in tried if e.arm is not None]
     with prepared(suite, filled, "dev", folder) as made:
         own = iter(made.trials)
-        planned = [Planned(e, next(own) if e.arm else (), len(tasks)) for e, tasks in tried]
+        planned = [Planned(e, next(own) if e.arm else (), len(ts)) for e, ts in tried]
         todo = [trial for plan in planned for trial in plan.trials]
-        done = None
-        if todo and not dry_run:
-            done = sweep(todo, made.work, folder, executor=runs_on, budget_usd=limit)
-    _show(tabled(name, wanted, planned, _rows(folder)), folder, form)
+        check = partial(checked_rows, folder, made.sha256, todo, methods=_methods(found))
+        check()
+        done = sweep(todo, made.work, folder, executor=runs_on, budget_usd=limit) if todo else None
+    made_of = tabled(name, wanted, planned, check())
+    _write(made_of, folder)
+    _print(made_of, form)
+    if form == TERMINAL:
+        say(f"{folder}: table.md, .csv, .json, .tex, .html")
     if done is not None:
         say_stopped(done)
 
@@ -123,18 +130,21 @@ def _tried(
     return [(entry, tasks_tried(suite, [entry.arm] if entry.arm else [], names)) for entry in found]
 
 
-def _rows(folder: Path) -> list[TrialRow]:
-    return read_rows(folder) if (folder / ROWS).exists() else []
+def _methods(found: list[Entry]) -> set[str]:
+    return {entry.row.method for entry in found}
 
 
-def _show(made: Tabled, folder: Path, form: str) -> None:
-    """Write all forms of a table into its folder, and print one."""
+def _write(made: Tabled, folder: Path) -> None:
+    """Write all forms of a table into its folder; the page shows the first try of each task."""
     for ending, write in FORMATS.values():
         write_whole(folder / f"table.{ending}", write(made).encode())
-    rows = [row for row in _rows(folder) if row.trial == 0]
+    rows = [row for row in made.trials if row.trial == 0]
     if rows:
         html = page([side(folder, rows)], PromptLibrary(), as_matrix(made), notes(made))
         write_whole(folder / "table.html", html.encode())
+
+
+def _print(made: Tabled, form: str) -> None:
     if form != TERMINAL:
         say(FORMATS[form][1](made), end="")
         return
@@ -142,7 +152,6 @@ def _show(made: Tabled, folder: Path, form: str) -> None:
     console.print(_grid(made))
     for note in notes(made):
         console.print(styled(note))
-    console.print(styled(f"{folder}: table.md, .csv, .json, .tex, .html"))
 
 
 def _grid(made: Tabled) -> Grid:

@@ -27,6 +27,7 @@ from .methods import WRITERS, Method
 from .pointing import Pointing, pointing
 from .recordings import file_name, recordings
 from .segment_only import SEGMENT_ONLY
+from .seals import files_hash
 from .simulated_model import SIMULATED
 from .tokens import spent
 from .trials import Status, Trial, TrialRow, Turns, canonical
@@ -82,6 +83,7 @@ class SuiteWork:
             iou=graded.iou,
             e95=graded.e95,
             feedback=graded.feedback[:LONGEST] if self.attempts is not None else "",
+            files=self._kept(trial),
             **cost,
         )
 
@@ -126,8 +128,13 @@ class SuiteWork:
                 still=len(still),
                 kept=sum(grade.kept for grade in still),
             ),
+            files=self._kept(trial),
             **cost,
         )
+
+    def _kept(self, trial: Trial) -> str | None:
+        """The hash of what is kept of a trial that was written down; None where nothing is."""
+        return self.attempts and files_hash(attempt_files(self.attempts, trial))
 
     def _begin(
         self, task: Task, arm: Method, trial: Trial
@@ -153,6 +160,12 @@ class SuiteWork:
 def attempt_name(trial: Trial) -> str:
     """The name of what came of a trial: its positions (.json) and its trace (.jsonl)."""
     return f"{file_name(trial.task)}-{trial.trial}-{trial.key[:12]}"
+
+
+def attempt_files(folder: Path, trial: Trial) -> tuple[Path, Path]:
+    """Where what came of a trial is kept, if it is, and its trace, if there is one."""
+    name = attempt_name(trial)
+    return folder / f"{name}.json", folder / f"{name}.jsonl"
 
 
 def _by_policy(task: Task, name: str, seed: int) -> Attempt:

@@ -21,8 +21,8 @@ USUAL = "edges"
 """The descriptor that goes without saying."""
 USUAL_SEGMENTER = "grabcut"
 """So for what cuts things out, which needs no weights."""
-UNEQUAL = frozenset({"seconds", "host"})
-"""Fields that differ from run to run of the same trial."""
+UNEQUAL = frozenset({"seconds", "host", "files", "after", "seal"})
+"""Fields that differ from run to run of the same trial: times, and hashes of what has times."""
 
 
 class Arm(BaseModel):
@@ -134,6 +134,8 @@ class TrialRow(Trial):
         feedback: what was wrong, in a sentence.
         cached_tokens: input in tokens of full price, with the prompt and the tools in the cache.
         turns: of a dialogue, whose gcr is the share of them that were right; else None.
+        files: hash of what is kept of it in attempts/; None where nothing is.
+        after, seal: see seals.py; nothing until it is written.
     """
 
     status: Status
@@ -153,6 +155,9 @@ class TrialRow(Trial):
     seconds: Amount = 0.0
     host: str = ""
     turns: Turns | None = None
+    files: Sha | None = None
+    after: str = ""
+    seal: str = ""
 
     @classmethod
     def of(cls, trial: Trial, status: Status, **facts: Any) -> Self:

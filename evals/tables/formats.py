@@ -49,7 +49,7 @@ def paper(result: Result) -> str:
 
 def remarks(row: ResultRow) -> list[str]:
     """What is to be said of a row beside its figures."""
-    said = [row.model]
+    said = [row.model, row.part]
     said += [ONCE] if row.once and any(r.scored for r in row.results.values()) else []
     said += [f"{row.tokens[0]:,} + {row.tokens[1]:,} tokens a trial"] if row.tokens else []
     said += [f"{row.invalid} invalid"] if row.invalid else []
@@ -73,7 +73,9 @@ def notes(made: Tabled) -> list[str]:
     stand_ins = [f"{task}: {of}" for task, of in made.table.stand_ins.items()]
     said = [" ".join(note.split()) for note in made.table.notes]
     said += [f"Stand-ins: {'; '.join(stand_ins)}."] if stand_ins else []
-    return [*said, f"Suite {made.table.suite}, {made.suite[:12]}; {made.cost_usd:.4f} USD spent."]
+    suite = f"{made.table.suite}, {made.suite[:12]}" if made.suite else made.table.suite
+    left = f", about {made.left_usd:.2f} USD more for what is not run" if made.left_usd else ""
+    return [*said, f"Suite {suite}; {made.cost_usd:.4f} USD spent{left}."]
 
 
 def records(made: Tabled) -> Iterator[dict[str, Any]]:

@@ -50,6 +50,7 @@ class ResultRow:
         cost_usd: of its trials so far.
         invalid: trials whose output could not be used.
         lost: trials a provider failed in.
+        part: of how many tasks it is, where it is not of all; or nothing.
         once: nothing is left to chance, so that each task is tried once.
     """
 
@@ -63,6 +64,7 @@ class ResultRow:
     cost_usd: float
     invalid: int
     lost: int
+    part: str
     once: bool
 
 
@@ -83,6 +85,12 @@ class Tabled:
     table: Table
     suite: str
     rows: Sequence[ResultRow]
+    trials: Sequence[TrialRow]
+
+    @property
+    def left_usd(self) -> float:
+        """What the trials that are missing would cost, as far as prices are known."""
+        return sum(row.left_usd or 0.0 for row in self.rows)
 
     @property
     def cost_usd(self) -> float:
@@ -100,13 +108,15 @@ def tabled(name: str, table: Table, planned: Sequence[Planned], rows: Sequence[T
         rows: of the run's folder.
     """
     by_key = {row.key: row for row in rows}
-    suites = {trial.suite for plan in planned for trial in plan.trials}
-    return Tabled(
-        name, table, min(suites, default=""), [_row(table, plan, by_key) for plan in planned]
-    )
+    tasks = max((plan.tasks for plan in planned), default=0)
+    own = [by_key[t.key] for plan in planned for t in plan.trials if t.key in by_key]
+    made = [_row(table, plan, by_key, tasks) for plan in planned]
+    return Tabled(name, table, min((row.suite for row in own), default=""), made, own)
 
 
-def _row(table: Table, plan: Planned, by_key: Mapping[str, TrialRow]) -> ResultRow:
+def _row(
+    table: Table, plan: Planned, by_key: Mapping[str, TrialRow], tasks: int
+) -> ResultRow:
     entry, arm = plan.entry, plan.entry.arm
     rows = [by_key[trial.key] for trial in plan.trials if trial.key in by_key]
     scored = [row for row in rows if row.scored]
@@ -120,13 +130,12 @@ def _row(table: Table, plan: Planned, by_key: Mapping[str, TrialRow]) -> ResultR
     }
     counted = [(row.input_tokens, row.output_tokens) for row in scored if row.input_tokens]
     tokens = _medians(counted) if counted else None
-    planned = len(plan.trials) if arm else plan.tasks * entry.trials
-    left = 0 if entry.row.missing else planned - len(scored)
+    left = 0 if entry.row.missing else plan.tasks * entry.trials - len(scored)
     each = tokens or usual_tokens(entry.row.method)
     cost = _cost_usd(arm.model if arm else None, left, each)
     return ResultRow(
         head=entry.row.row,
-        model=plan.trials[0].arm.model if plan.trials and entry.row.models is not None else "",
+        model=_model(plan),
         results=results,
         missing=entry.row.missing or (_missing(entry, left, each, cost) if left else ""),
         left=left,
@@ -135,8 +144,18 @@ def _row(table: Table, plan: Planned, by_key: Mapping[str, TrialRow]) -> ResultR
         cost_usd=sum(row.cost_usd for row in rows),
         invalid=sum(row.status == "model_invalid" for row in scored),
         lost=len(rows) - len(scored),
+        part=f"{plan.tasks} of {tasks} tasks" if plan.tasks < tasks else "",
         once=entry.trials == 1,
     )
+
+
+def _model(plan: Planned) -> str:
+    """The model that was chosen for a row, or is to be."""
+    entry = plan.entry
+    if entry.arm is None or entry.row.models is None:
+        return ""
+    names = (entry.arm.model, entry.arm.planner)
+    return plan.trials[0].arm.model if plan.trials else "+".join(filter(None, names))
 
 
 def _result(rows: Sequence[TrialRow], planned: int, paper: Figure | None) -> Result:
