@@ -81,8 +81,8 @@ def run_suite(
     tried = [(arm, tasks, count) for arm in arms]
     with prepared(loaded, tried, split, folder) as made:
         planned = [trial for own in made.trials for trial in own]
-        how = {"executor": processes(workers), "budget_usd": limit, "shard": shard}
-        done = sweep(planned, made.work, folder, **how)
+        runs_on = processes(workers)
+        done = sweep(planned, made.work, folder, executor=runs_on, budget_usd=limit, shard=shard)
     _print_summary(loaded, folder, planned, made.levels)
     say_stopped(done)
 

@@ -39,10 +39,16 @@ from .eval_run import RUNS, new_folder, prepared, processes, say_stopped, tasks_
 from .terminal import say, styled
 
 TERMINAL = "terminal"
+HEAD, CELL = 28, 12
+"""Characters of the columns on a terminal, which may have to be wider than it is."""
 Name = Annotated[str, typer.Argument(metavar="TABLE", help="1, 2, 3 or hard.")]
 Models = Annotated[
     list[str] | None,
     typer.Option("--models", help="As in formup run, or replay:FOLDER; repeatable."),
+]
+Segmenters = Annotated[
+    list[str] | None,
+    typer.Option("--segmenter", help="A network: NAME or NAME:CHECKPOINT; repeatable."),
 ]
 Methods = Annotated[
     list[str] | None, typer.Option("--method", help="Only rows of this method; repeatable.")
@@ -60,6 +66,7 @@ Tries = Annotated[
 def table(
     name: Name,
     models: Models = None,
+    segmenter: Segmenters = None,
     method: Methods = None,
     base_url: o.BaseUrl = None,
     prompts: o.PromptsFolder = None,
@@ -82,25 +89,26 @@ def table(
     wanted, limit = table_named(name), inputs.dollars("--budget", budget)
     tries = None if trials is None else inputs.whole("--trials", trials, least=1)
     base = Method("agent", base_url=base_url, library=PromptLibrary(prompts))
-    found = entries(wanted, models or [], base, tries)
+    found = entries(wanted, models or [], base, segmenters=segmenter or [], trials=tries)
     found = [entry for entry in found if not method or entry.row.method in method]
-    suite, tasks = load_suite(wanted.suite), task
+    suite, named = load_suite(wanted.suite), task
     if dry_run:
-        planned = [Planned(entry, (), len(own)) for entry, own in _tried(suite, found, tasks)]
-        _print(tabled(name, wanted, planned, ()), form)
+        planned = [Planned(entry, (), len(own)) for entry, own in _tried(suite, found, named)]
+        _print(tabled(name, wanted, planned, (), len(suite.tasks)), form)
         return
     folder, runs_on = out or _folder(name, resume), processes(inputs.whole("--jobs", jobs, least=1))
     found = [in_own_frame(entry, folder) for entry in found]
-    tried = _tried(suite, found, tasks)
+    tried = _tried(suite, found, named)
     filled = [(e.arm, own, e.trials) for e, own in tried if e.arm is not None]
     with prepared(suite, filled, "dev", folder) as made:
         own = iter(made.trials)
         planned = [Planned(e, next(own) if e.arm else (), len(ts)) for e, ts in tried]
         todo = [trial for plan in planned for trial in plan.trials]
-        check = partial(checked_rows, folder, made.sha256, todo, methods=_methods(found))
+        methods = {entry.row.method for entry in found}
+        check = partial(checked_rows, folder, made.sha256, todo, methods=methods)
         check()
         done = sweep(todo, made.work, folder, executor=runs_on, budget_usd=limit) if todo else None
-    made_of = tabled(name, wanted, planned, check())
+    made_of = tabled(name, wanted, planned, check(), len(suite.tasks))
     _write(made_of, folder)
     _print(made_of, form)
     if form == TERMINAL:
@@ -130,10 +138,6 @@ def _tried(
     return [(entry, tasks_tried(suite, [entry.arm] if entry.arm else [], names)) for entry in found]
 
 
-def _methods(found: list[Entry]) -> set[str]:
-    return {entry.row.method for entry in found}
-
-
 def _write(made: Tabled, folder: Path) -> None:
     """Write all forms of a table into its folder; the page shows the first try of each task."""
     for ending, write in FORMATS.values():
@@ -149,6 +153,7 @@ def _print(made: Tabled, form: str) -> None:
         say(FORMATS[form][1](made), end="")
         return
     console = Console(highlight=False, soft_wrap=True)
+    console.width = max(console.width, HEAD + CELL * len(made.table.columns))
     console.print(_grid(made))
     for note in notes(made):
         console.print(styled(note))
@@ -157,7 +162,7 @@ def _print(made: Tabled, form: str) -> None:
 def _grid(made: Tabled) -> Grid:
     grid = Grid(title=styled(made.table.title), header_style="cyan", box=None, show_lines=True)
     for title in ("", *made.table.columns):
-        grid.add_column(title, min_width=None if title else 24, no_wrap=bool(title))
+        grid.add_column(title, min_width=None if title else HEAD - 2, no_wrap=bool(title))
     for row in made.rows:
         head = styled((row.head, "bold"), *(f"\n{remark}" for remark in remarks(row)))
         grid.add_row(head, *(_stacked(result) for result in row.results.values()), end_section=True)

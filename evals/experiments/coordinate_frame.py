@@ -6,7 +6,6 @@ what they see, and fake the paper's zeros.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +70,9 @@ class Frame(BaseModel, frozen=True):
         elif self.long:
             points = points * max(size) / self.long
         return tuple((float(x), float(y)) for x, y in points)
+
+
+PIXELS = Frame()
 
 
 class Calibrated(BaseModel):

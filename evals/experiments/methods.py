@@ -15,7 +15,7 @@ from ...tools.perception.segmenters.registry import segmenter_named
 from ...tools.tool import Tool
 from ..grading.policies import POLICIES
 from ..tasks.task import Task
-from .coordinate_frame import Frame
+from .coordinate_frame import PIXELS, Frame
 from .pointing import Mode, can_point
 from .rate_limiter import RateLimited, rate_limiter
 from .recordings import REPLAY, recordings
@@ -63,7 +63,7 @@ class Method:
     mode: Mode = "words"
     planner: str | None = None
     segmenter: str = USUAL_SEGMENTER
-    frame: Frame = Frame()
+    frame: Frame = PIXELS
     library: PromptLibrary = SHIPPED
     base_url: str | None = None
     rate: float | None = None
@@ -176,8 +176,13 @@ def check_method(arm: Method) -> Method:
     if not arm.model and name not in NO_MODEL:
         example = "langsam, a segmenter that takes text" if name == SEGMENT_ONLY else "openai:NAME"
         raise InputError(f"The method {name} takes a --model, such as {example}.")
-    if name == SEGMENT_ONLY and "text" not in segmenter_named(arm.model).takes:
-        raise InputError(f"The segmenter {arm.model!r} takes no text; clipseg and langsam do.")
+    if name == SEGMENT_ONLY and not (
+        arm.model == USUAL_SEGMENTER or "text" in segmenter_named(arm.model).takes
+    ):
+        raise InputError(
+            f"The segmenter {arm.model!r} takes no text; clipseg and langsam do, and grabcut takes "
+            "what stands out most."
+        )
     return replace(arm, model=arm.model or NO_MODEL[name])
 
 

@@ -60,13 +60,14 @@ def check_seals(rows: Sequence[TrialRow], path: Path) -> None:
         if row.seal != _seal(row):
             raise InputError(f"{what} was edited: it is not what its seal is of.")
         if row.after != last:
-            raise InputError(f"{what} does not follow the line before it: a trial is missing, "
-                             "repeated or moved.")
+            raise InputError(
+                f"{what} does not follow the line before it: a trial is missing, repeated or moved."
+            )
         last = row.seal
     head = path.with_name(HEAD)
     ended = head.read_text("utf-8") if head.exists() else ""
     if ended and ended not in {row.seal for row in rows}:
-        raise InputError(f"{path} has lost the trials it ended with: {HEAD} names one that is gone.")
+        raise InputError(f"{path} has lost the trials it ended with: {HEAD} names another.")
 
 
 def _seal(row: TrialRow) -> str:

@@ -4,7 +4,6 @@ A provider that fails is an infrastructure error and says nothing; output that c
 model's failure, counted apart.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -26,8 +25,8 @@ from .dialogue_work import Held, hold
 from .methods import WRITERS, Method
 from .pointing import Pointing, pointing
 from .recordings import file_name, recordings
-from .segment_only import SEGMENT_ONLY
 from .seals import files_hash
+from .segment_only import SEGMENT_ONLY
 from .simulated_model import SIMULATED
 from .tokens import spent
 from .trials import Status, Trial, TrialRow, Turns, canonical

@@ -1,4 +1,4 @@
-"""What a model wrote where it writes coordinates itself: positions, or that none shall be placed."""
+"""What a model wrote that writes coordinates itself: positions, or that none shall be placed."""
 
 import json
 from typing import Any, Literal

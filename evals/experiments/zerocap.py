@@ -58,7 +58,9 @@ class ZeroCap:
         if last.error is not None:
             return Reply(text=INSUFFICIENT)
         if last.name == "segment":
-            return Reply(calls=(Call(id="shape", name="describe_shape", arguments={"target": "t1"}),))
+            return Reply(
+                calls=(Call(id="shape", name="describe_shape", arguments={"target": "t1"}),)
+            )
         looked = rest[0]
         assert isinstance(looked, Reply)
         pattern = json.dumps(json_object(looked.text).get("pattern"), ensure_ascii=False)

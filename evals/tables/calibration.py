@@ -1,4 +1,4 @@
-"""Models that write coordinates alone, each in the frame it writes them in; or why it is not tabled."""
+"""Models that write coordinates alone, each in the frame it writes them in, or why not tabled."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +26,8 @@ def in_own_frame(entry: Entry, folder: Path) -> Entry:
         return replace(entry, row=entry.row.model_copy(update={"missing": why}), arm=None)
     if made.comparable:
         return replace(entry, arm=replace(arm, frame=made.frame))
-    off = f"marks are off by {100 * made.error:.1f} %, over {100 * MOST:.0f} %, in every frame known"
+    off = (
+        f"marks are off by {100 * made.error:.1f} %, over {100 * MOST:.0f} %, in every frame known"
+    )
     row = entry.row.model_copy(update={"missing": f"{arm.model} is not comparable: {off}"})
     return replace(entry, row=row, arm=None)

@@ -1,4 +1,4 @@
-"""Whether a run's folder may be tabled: nothing edited, dropped or repeated, of these trials alone."""
+"""Whether a run's folder may be tabled: nothing edited, dropped or repeated, no other trials."""
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -66,4 +66,6 @@ def _unplanned(row: TrialRow, arms: Sequence[Arm]) -> str:
             return f"trials of the prompt {arm.prompt} with another text ({hashes})"
         if same and arm.tools != row.arm.tools:
             return f"trials of {arm.name} with other tools than there are now"
-    return f"trials of {row.arm.name}, which are not of this table: name the model with --models too"
+    return (
+        f"trials of {row.arm.name}, which are not of this table: name the model with --models too"
+    )

@@ -14,11 +14,14 @@ from ...tools.errors import InputError
 from ..experiments.methods import Method, check_method
 from ..experiments.pointing import Mode
 from ..experiments.recordings import REPLAY
+from ..experiments.segment_only import SEGMENT_ONLY
 from ..experiments.simulated_model import SIMULATED
-from ..experiments.trials import Trial
+from ..experiments.trials import USUAL_SEGMENTER, Trial
 from ..statistics.cells import cell_names
 
 _FILE = Path(__file__).with_name("tables.yaml")
+TRAINED = 5_000_000
+"""Bytes of weights under which no network was trained to see: a test's, written at random."""
 Figure = tuple[float, float | None]
 """SR and GCR as the paper prints them; Tables II and III have no GCR."""
 
@@ -34,6 +37,7 @@ class Row(BaseModel):
         model: the method's own, where that is to be chosen.
         trials: tries of each task; the table's by default.
         paper: its figures by column.
+        paper_tokens: the tokens it says are needed beyond those of edges, as a share.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -45,9 +49,10 @@ class Row(BaseModel):
     model: str = ""
     mode: Mode = "words"
     descriptor: Descriptor = "edges"
-    segmenter: str = "grabcut"
+    segmenter: str = USUAL_SEGMENTER
     trials: int | None = None
     paper: dict[str, Figure] = {}
+    paper_tokens: float | None = None
 
 
 class Table(BaseModel):
@@ -77,11 +82,27 @@ class Table(BaseModel):
 
 @dataclass(frozen=True)
 class Entry:
-    """A row with who fills it: None where nobody has been named, or nobody can."""
+    """A row with who fills it.
+
+    Attributes:
+        arm: None where nobody can, or has been named.
+        trials: tries of each task.
+        wants: what has to be named for it, such as an option; nothing where there is an arm.
+    """
 
     row: Row
     arm: Method | None
     trials: int
+    wants: str = ""
+
+    @property
+    def untrained(self) -> bool:
+        """Whether its network's weights are too few to have been trained: it says nothing."""
+        arm = self.arm
+        name = "" if arm is None else arm.model if arm.name == SEGMENT_ONLY else arm.segmenter
+        folders = [Path(part) for part in name.partition(":")[2].split(",") if part]
+        files = [file for folder in folders for file in folder.glob("*.safetensors")]
+        return bool(files) and sum(file.stat().st_size for file in files) < TRAINED
 
 
 class _Tables(BaseModel):
@@ -114,7 +135,12 @@ def usual_tokens(method: str) -> tuple[int, int]:
 
 
 def entries(
-    table: Table, models: Sequence[str], base: Method, trials: int | None = None
+    table: Table,
+    models: Sequence[str],
+    base: Method,
+    *,
+    segmenters: Sequence[str] = (),
+    trials: int | None = None,
 ) -> list[Entry]:
     """The rows of a table with who fills them: a row stands for each of its models.
 
@@ -122,23 +148,31 @@ def entries(
         table: whose rows.
         models: as Agent takes them, `simulated`, or replay:FOLDER; A+B where B plans for A.
         base: what all methods share, such as where prompts are.
+        segmenters: NAME or NAME:CHECKPOINT of the networks there are.
         trials: tries of each task, in place of the table's own.
 
     Raises:
-        InputError: a model that no row takes, or that cannot be used.
+        InputError: a model or segmenter that no row takes, or that cannot be used.
     """
     found, taken = list[Entry](), set[str]()
+    cut = {name.partition(":")[0]: name for name in segmenters} | {USUAL_SEGMENTER: USUAL_SEGMENTER}
     for row in table.rows:
-        chosen = [m for m in models if _takes(table, row, m)] if row.method else []
-        taken.update(chosen)
-        own = [row.model] if row.method and row.models is None else chosen
-        count = trials or row.trials or table.trials
-        found += [Entry(row, _arm(row, model, base), count) for model in own]
-        if not own:
-            found.append(Entry(row, None, count))
-    lost = sorted(set(models) - taken)
-    if lost:
-        raise InputError(f"No row of this table is for the model {lost[0]!r}; leave it out.")
+        count, chosen = trials or row.trials or table.trials, [row.model] if row.method else []
+        taken |= {cut[row.segmenter]} if row.segmenter in cut else set()
+        if row.models is not None:
+            chosen = [m for m in models if _takes(table, row, m)]
+            taken.update(chosen)
+        if row.segmenter not in cut:
+            found.append(Entry(row, None, count, f"--segmenter {row.segmenter}"))
+        elif not chosen:
+            kind = f"whose name holds {row.models}" if row.models else "of yours"
+            found.append(Entry(row, None, count, f"--models {kind}"))
+        else:
+            found += [Entry(row, _arm(row, m, base, cut[row.segmenter]), count) for m in chosen]
+    for option, names in (("model", models), ("segmenter", segmenters)):
+        lost = sorted(set(names) - taken)
+        if lost:
+            raise InputError(f"No row of this table is for the {option} {lost[0]!r}; leave it out.")
     return found
 
 
@@ -155,7 +189,9 @@ def _takes(table: Table, row: Row, model: str) -> bool:
     return row.models in named if named else row.models == ""
 
 
-def _arm(row: Row, model: str, base: Method) -> Method:
+def _arm(row: Row, model: str, base: Method, segmenter: str) -> Method:
+    if row.method == SEGMENT_ONLY:
+        return check_method(Method(row.method, model=segmenter))
     url = base.base_url if row.models is not None else None
     looker, _, planner = model.partition("+")
     return check_method(
@@ -165,7 +201,7 @@ def _arm(row: Row, model: str, base: Method) -> Method:
             planner=planner or None,
             descriptor=row.descriptor,
             mode=row.mode,
-            segmenter=row.segmenter,
+            segmenter=segmenter,
             library=base.library,
             base_url=url,
             rate=base.rate,

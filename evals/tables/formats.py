@@ -52,6 +52,8 @@ def remarks(row: ResultRow) -> list[str]:
     said = [row.model, row.part]
     said += [ONCE] if row.once and any(r.scored for r in row.results.values()) else []
     said += [f"{row.tokens[0]:,} + {row.tokens[1]:,} tokens a trial"] if row.tokens else []
+    said += [f"{row.beyond:+.0%} tokens beyond edges"] if row.beyond is not None else []
+    said += [f"paper {row.paper_beyond:+.0%} tokens"] if row.paper_beyond is not None else []
     said += [f"{row.invalid} invalid"] if row.invalid else []
     said += [f"{row.lost} lost to the provider"] if row.lost else []
     return [*filter(None, (*said, row.missing))]
@@ -95,6 +97,9 @@ def records(made: Tabled) -> Iterator[dict[str, Any]]:
                 "gcr": None if r.gcr is None else round(r.gcr, 4),
                 "paper_sr": None if r.paper is None else r.paper[0],
                 "paper_gcr": None if r.paper is None else r.paper[1],
+                "tokens_in": row.tokens and row.tokens[0],
+                "tokens_out": row.tokens and row.tokens[1],
+                "beyond_edges": row.beyond,
                 "invalid": row.invalid,
                 "lost": row.lost,
                 "missing": row.missing,
