@@ -104,8 +104,8 @@ def table(
         own = iter(made.trials)
         planned = [Planned(e, next(own) if e.arm else (), len(ts)) for e, ts in tried]
         todo = [trial for plan in planned for trial in plan.trials]
-        methods = {entry.row.method for entry in found}
-        check = partial(checked_rows, folder, made.sha256, todo, methods=methods)
+        methods, tasks = {e.row.method for e in found}, {t.id for _, ts in tried for t in ts}
+        check = partial(checked_rows, folder, made.sha256, todo, methods=methods, tasks=tasks)
         check()
         done = sweep(todo, made.work, folder, executor=runs_on, budget_usd=limit) if todo else None
     made_of = tabled(name, wanted, planned, check(), len(suite.tasks))

@@ -12,7 +12,12 @@ from ..tasks.stored_suite import ATTEMPTS
 
 
 def checked_rows(
-    folder: Path, suite: str, planned: Sequence[Trial], *, methods: Collection[str]
+    folder: Path,
+    suite: str,
+    planned: Sequence[Trial],
+    *,
+    methods: Collection[str],
+    tasks: Collection[str],
 ) -> list[TrialRow]:
     """The latest row of each trial in a run's folder; none where there is no run yet.
 
@@ -20,7 +25,7 @@ def checked_rows(
         folder: of the run.
         suite: hash of the table's suite.
         planned: all trials of the table.
-        methods: whose rows are tabled; rows of others are let be.
+        methods, tasks: whose rows are tabled; rows of others are let be.
 
     Raises:
         InputError: what is wrong with which row.
@@ -38,7 +43,6 @@ def checked_rows(
     rows = all_rows(folder)
     check_seals(rows, folder / ROWS)
     keys, arms = {t.key for t in planned}, {t.arm.name: t.arm for t in planned}
-    tasks = {t.task for t in planned}
     for row in rows:
         paths = attempt_files(folder / ATTEMPTS, row)
         if row.files is not None and row.files != files_hash(paths):
