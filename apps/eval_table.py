@@ -15,16 +15,7 @@ from ..evals.report.run_folder import side
 from ..evals.tables.calibration import in_own_frame
 from ..evals.tables.checks import checked_rows
 from ..evals.tables.definition import Entry, entries, table_named
-from ..evals.tables.formats import (
-    FORMATS,
-    as_matrix,
-    count,
-    interval,
-    notes,
-    paper,
-    recall,
-    remarks,
-)
+from ..evals.tables.formats import FORMATS, as_matrix, notes, paper, parts
 from ..evals.tables.results import Planned, Result, Tabled, tabled
 from ..evals.tasks.suites import load_suite
 from ..evals.tasks.task import Suite, Task
@@ -89,7 +80,7 @@ def table(
     wanted, limit = table_named(name), inputs.dollars("--budget", budget)
     tries = None if trials is None else inputs.whole("--trials", trials, least=1)
     base = Method("agent", base_url=base_url, library=PromptLibrary(prompts))
-    found = entries(wanted, models or [], base, segmenters=segmenter or [], trials=tries)
+    found = entries(wanted, base, models or [], segmenter or [], tries)
     found = [entry for entry in found if not method or entry.row.method in method]
     suite, named = load_suite(wanted.suite), task
     if dry_run:
@@ -164,12 +155,12 @@ def _grid(made: Tabled) -> Grid:
     for title in ("", *made.table.columns):
         grid.add_column(title, min_width=None if title else HEAD - 2, no_wrap=bool(title))
     for row in made.rows:
-        head = styled((row.head, "bold"), *(f"\n{remark}" for remark in remarks(row)))
+        head = styled((row.head, "bold"), *(f"\n{remark}" for remark in row.remarks))
         grid.add_row(head, *(_stacked(result) for result in row.results.values()), end_section=True)
     return grid
 
 
 def _stacked(result: Result) -> Text:
     """A cell of four lines: k/n, interval, GCR, the paper's figure."""
-    own = "\n".join(filter(None, (count(result), interval(result), recall(result))))
-    return styled(own, (f"\npaper {paper(result)}" if result.paper else "", "dim"))
+    told = f"\npaper {paper(result)}" if result.paper else ""
+    return styled("\n".join(parts(result)), (told, "dim"))

@@ -1,13 +1,12 @@
 """A table as data: columns, rows, the paper's figures, and who fills a row; see tables.yaml."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from fnmatch import fnmatchcase
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 import yaml
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from ...tools.context import Descriptor
 from ...tools.errors import InputError
@@ -26,7 +25,7 @@ Figure = tuple[float, float | None]
 """SR and GCR as the paper prints them; Tables II and III have no GCR."""
 
 
-class Row(BaseModel):
+class Row(BaseModel, frozen=True, extra="forbid"):
     """A row of a table.
 
     Attributes:
@@ -34,19 +33,15 @@ class Row(BaseModel):
         method: who decides; nothing where nobody can here, and `missing` says why.
         models: a word in the names of the models that fill it, "" for those that no other row of
             the method takes; None where the method needs none, or has its own.
-        model: the method's own, where that is to be chosen.
         trials: tries of each task; the table's by default.
         paper: its figures by column.
         paper_tokens: the tokens it says are needed beyond those of edges, as a share.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     row: str
     method: str = ""
     missing: str = ""
     models: str | None = None
-    model: str = ""
     mode: Mode = "words"
     descriptor: Descriptor = "edges"
     segmenter: str = USUAL_SEGMENTER
@@ -55,16 +50,14 @@ class Row(BaseModel):
     paper_tokens: float | None = None
 
 
-class Table(BaseModel):
+class Table(BaseModel, frozen=True, extra="forbid"):
     """A table.
 
     Attributes:
-        columns: title, and the name of a cell or a pattern of tasks' ids.
+        columns: title, and the cell (category, setup or style) that it shows.
         notes: what has to be said beside it.
         stand_ins: which task of the paper each of ours stands for.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     title: str
     suite: str
@@ -76,8 +69,7 @@ class Table(BaseModel):
 
     def within(self, column: str, trial: Trial) -> bool:
         """Whether a trial counts in a column."""
-        wanted = self.columns[column]
-        return wanted in cell_names(trial) or fnmatchcase(trial.task, wanted)
+        return self.columns[column] in cell_names(trial)
 
 
 @dataclass(frozen=True)
@@ -105,9 +97,7 @@ class Entry:
         return bool(files) and sum(file.stat().st_size for file in files) < TRAINED
 
 
-class _Tables(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
+class _Tables(BaseModel, frozen=True, extra="forbid"):
     tokens: dict[str, tuple[int, int]]
     tables: dict[str, Table]
 
@@ -136,18 +126,17 @@ def usual_tokens(method: str) -> tuple[int, int]:
 
 def entries(
     table: Table,
-    models: Sequence[str],
     base: Method,
-    *,
-    segmenters: Sequence[str] = (),
+    models: Sequence[str],
+    segmenters: Sequence[str],
     trials: int | None = None,
 ) -> list[Entry]:
     """The rows of a table with who fills them: a row stands for each of its models.
 
     Args:
         table: whose rows.
-        models: as Agent takes them, `simulated`, or replay:FOLDER; A+B where B plans for A.
         base: what all methods share, such as where prompts are.
+        models: as Agent takes them, `simulated`, or replay:FOLDER; A+B where B plans for A.
         segmenters: NAME or NAME:CHECKPOINT of the networks there are.
         trials: tries of each task, in place of the table's own.
 
@@ -157,18 +146,16 @@ def entries(
     found, taken = list[Entry](), set[str]()
     cut = {name.partition(":")[0]: name for name in segmenters} | {USUAL_SEGMENTER: USUAL_SEGMENTER}
     for row in table.rows:
-        count, chosen = trials or row.trials or table.trials, [row.model] if row.method else []
-        taken |= {cut[row.segmenter]} if row.segmenter in cut else set()
-        if row.models is not None:
-            chosen = [m for m in models if _takes(table, row, m)]
-            taken.update(chosen)
+        chosen = [""] if row.models is None else [m for m in models if _takes(table, row, m)]
+        taken |= {*chosen, cut.get(row.segmenter, "")}
+        wants = ""
         if row.segmenter not in cut:
-            found.append(Entry(row, None, count, f"--segmenter {row.segmenter}"))
+            wants = f"--segmenter {row.segmenter}"
         elif not chosen:
-            kind = f"whose name holds {row.models}" if row.models else "of yours"
-            found.append(Entry(row, None, count, f"--models {kind}"))
-        else:
-            found += [Entry(row, _arm(row, m, base, cut[row.segmenter]), count) for m in chosen]
+            wants = f"--models {f'whose name holds {row.models}' if row.models else 'of yours'}"
+        arms = [None] if row.missing or wants else [_arm(row, m, base, cut) for m in chosen]
+        count = trials or row.trials or table.trials
+        found += [Entry(row, arm, count, wants) for arm in arms]
     for option, names in (("model", models), ("segmenter", segmenters)):
         lost = sorted(set(names) - taken)
         if lost:
@@ -177,33 +164,31 @@ def entries(
 
 
 def _takes(table: Table, row: Row, model: str) -> bool:
-    """Whether a row is for a model, by its name."""
-    if row.models is None:
-        return False
-    others = [r.models for r in table.rows if r.method == row.method and r.models]
-    named = [word for word in others if word in model.lower().rpartition("+")[2]]
+    """Whether a row is for a model, by its name, of two the planner's."""
     if model == SIMULATED or model.startswith(REPLAY):
-        return row.method == "agent" and row.models == (REPLAY if REPLAY in named else "")
+        words = REPLAY if model.startswith(REPLAY) else ""
+        return row.method == "agent" and row.models == words
     if "+" in model and row.method == "alone":
         return False
-    return row.models in named if named else row.models == ""
+    others = [r.models for r in table.rows if r.method == row.method and r.models]
+    own = model.lower().rpartition("+")[2].partition(":")[2]
+    named = [word for word in others if word in own]
+    return row.models in (named or [""])
 
 
-def _arm(row: Row, model: str, base: Method, segmenter: str) -> Method:
+def _arm(row: Row, model: str, base: Method, cut: Mapping[str, str]) -> Method:
     if row.method == SEGMENT_ONLY:
-        return check_method(Method(row.method, model=segmenter))
-    url = base.base_url if row.models is not None else None
+        return check_method(Method(row.method, cut[row.segmenter]))
     looker, _, planner = model.partition("+")
+    base = base if model else Method("")
     return check_method(
-        Method(
-            row.method,
+        replace(
+            base,
+            name=row.method,
             model=looker,
             planner=planner or None,
             descriptor=row.descriptor,
             mode=row.mode,
-            segmenter=segmenter,
-            library=base.library,
-            base_url=url,
-            rate=base.rate,
+            segmenter=cut[row.segmenter],
         )
     )

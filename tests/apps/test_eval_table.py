@@ -171,7 +171,7 @@ def test_models_are_asked_in_the_papers_way_and_in_their_own_frame(
     out = tmp_path / "run"
     assert formup(*run, "--trials", "1", "--out", out) == 0
     found = cells(out)
-    for row in ("GPT-4 Vision alone", "ZeroCAP (GPT-4)"):
+    for row in ("vision model alone (paper: GPT-4 Vision)", "ZeroCAP (paper: GPT-4)"):
         cell = found[row, "total"]
         assert (cell["model"], cell["passed"], cell["scored"]) == ("openai:gpt-seer", "2", "2")
     alone, *_ = [row for row in read_rows(out) if row.arm.method == "alone"]
@@ -215,7 +215,7 @@ def test_marks_are_not_where_any_frame_has_them(
     monkeypatch.setattr("formup.evals.experiments.coordinate_frame.MARKS", drawn)
     run: list[str | Path] = ["eval", "table", "1", "--models", "openai:gpt-x", "--base-url", url]
     assert formup(*run, "--method", "alone", *SOME, "--out", tmp_path / "run") == 0
-    cell = cells(tmp_path / "run")["GPT-4 Vision alone", "total"]
-    assert "openai:gpt-x is not comparable: marks are off by" in cell["missing"]
+    cell = cells(tmp_path / "run")["vision model alone (paper: GPT-4 Vision)", "total"]
+    assert "openai:gpt-x is not comparable: marks are off by" in cell["remarks"]
     assert cell["scored"] == "0"
     assert len(asked) == 1

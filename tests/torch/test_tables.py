@@ -23,5 +23,5 @@ def test_segmentation_alone_is_run_and_its_figures_are_left_out(
     assert tuple(line["row"] for line in lines) == ROWS
     assert [line["scored"] for line in lines] == ["0", "0", "1"]
     for line in lines[:2]:
-        assert "figures of weights too few to be trained are not shown" in line["missing"]
+        assert "figures of weights too few to be trained are not shown" in line["remarks"]
         assert line["paper_sr"] in ("0.51", "0.43")
