@@ -26,8 +26,8 @@ ModelList = Annotated[
     list[str] | None,
     typer.Option(
         "--model",
-        help="Of agent, alone and zerocap, as in formup run, or replay:FOLDER; of segment-only a segmenter; "
-        "repeatable.",
+        help="Of agent, alone and zerocap, as in formup run, or replay:FOLDER; of segment-only a "
+        "segmenter; repeatable.",
     ),
 ]
 PromptList = Annotated[

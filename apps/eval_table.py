@@ -2,7 +2,7 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -10,6 +10,8 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from ..evals.experiments.methods import Method
+from ..evals.experiments.runner import Sweep
+from ..evals.experiments.trials import TrialRow
 from ..evals.report.page import page
 from ..evals.report.run_folder import side
 from ..evals.tables.calibration import in_own_frame
@@ -82,30 +84,38 @@ def table(
     base = Method("agent", base_url=base_url, library=PromptLibrary(prompts))
     found = entries(wanted, base, models or [], segmenter or [], tries)
     found = [entry for entry in found if not method or entry.row.method in method]
-    suite, named = load_suite(wanted.suite), task
+    suite = load_suite(wanted.suite)
     if dry_run:
-        planned = [Planned(entry, (), len(own)) for entry, own in _tried(suite, found, named)]
+        planned = [Planned(entry, (), len(ts)) for entry, ts in _with_tasks(suite, found, task)]
         _print(tabled(name, wanted, planned, (), len(suite.tasks)), form)
         return
-    folder, runs_on = out or _folder(name, resume), processes(inputs.whole("--jobs", jobs, least=1))
-    found = [in_own_frame(entry, folder) for entry in found]
-    tried = _tried(suite, found, named)
+    folder = out or _folder(name, resume)
+    tried = _with_tasks(suite, [in_own_frame(entry, folder) for entry in found], task)
+    how = {"executor": processes(inputs.whole("--jobs", jobs, least=1)), "budget_usd": limit}
+    planned, rows, done = _ran(suite, tried, folder, how)
+    made = tabled(name, wanted, planned, rows, len(suite.tasks))
+    _write(made, folder)
+    _print(made, form)
+    if form == TERMINAL:
+        say(f"{folder}: table.md, .csv, .json, .tex, .html")
+    if done is not None:
+        say_stopped(done)
+
+
+def _ran(
+    suite: Suite, tried: list[tuple[Entry, list[Task]]], folder: Path, how: dict[str, Any]
+) -> tuple[list[Planned], list[TrialRow], Sweep | None]:
+    """Run what a folder does not hold yet; the rows of a table, and those of its trials."""
     filled = [(e.arm, own, e.trials) for e, own in tried if e.arm is not None]
     with prepared(suite, filled, "dev", folder) as made:
         own = iter(made.trials)
         planned = [Planned(e, next(own) if e.arm else (), len(ts)) for e, ts in tried]
         todo = [trial for plan in planned for trial in plan.trials]
-        methods, tasks = {e.row.method for e in found}, {t.id for _, ts in tried for t in ts}
+        methods, tasks = {e.row.method for e, _ in tried}, {t.id for _, ts in tried for t in ts}
         check = partial(checked_rows, folder, made.sha256, todo, methods=methods, tasks=tasks)
         check()
-        done = sweep(todo, made.work, folder, executor=runs_on, budget_usd=limit) if todo else None
-    made_of = tabled(name, wanted, planned, check(), len(suite.tasks))
-    _write(made_of, folder)
-    _print(made_of, form)
-    if form == TERMINAL:
-        say(f"{folder}: table.md, .csv, .json, .tex, .html")
-    if done is not None:
-        say_stopped(done)
+        done = sweep(todo, made.work, folder, **how) if todo else None
+        return planned, check(), done
 
 
 def _folder(name: str, resume: bool) -> Path:
@@ -122,11 +132,13 @@ def _folder(name: str, resume: bool) -> Path:
     return found[-1]
 
 
-def _tried(
+def _with_tasks(
     suite: Suite, found: list[Entry], names: list[str] | None
 ) -> list[tuple[Entry, list[Task]]]:
     """The rows with the tasks that each is tried on."""
-    return [(entry, tasks_tried(suite, [entry.arm] if entry.arm else [], names)) for entry in found]
+    return [
+        (entry, tasks_with_tasks(suite, [entry.arm] if entry.arm else [], names)) for entry in found
+    ]
 
 
 def _write(made: Tabled, folder: Path) -> None:
@@ -135,7 +147,8 @@ def _write(made: Tabled, folder: Path) -> None:
         write_whole(folder / f"table.{ending}", write(made).encode())
     rows = [row for row in made.trials if row.trial == 0]
     if rows:
-        html = page([side(folder, rows)], PromptLibrary(), as_matrix(made), notes(made))
+        shown, title = as_matrix(made), made.table.title
+        html = page([side(folder, rows)], PromptLibrary(), shown, title, notes(made))
         write_whole(folder / "table.html", html.encode())
 
 

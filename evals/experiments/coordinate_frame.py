@@ -117,7 +117,9 @@ def calibrated(agent: Agent, model: str, folder: Path) -> Calibrated:
     path = folder / FILE
     known = _File.model_validate_json(path.read_bytes()) if path.exists() else _File()
     if model not in known.models:
-        run = agent.run(load_picture(_drawn(folder)), ASKED, settings=Settings(robots=len(MARKS)))
+        run = agent.run(
+            load_picture(_picture_of_marks(folder)), ASKED, settings=Settings(robots=len(MARKS))
+        )
         if isinstance(run.outcome, Stopped):
             raise InputError(f"{model} could not be asked for its frame: {run.outcome.reason}")
         written = written_positions(run.report.message) or ()
@@ -140,7 +142,7 @@ def _frames(written: Positions, truth: FloatArray) -> Iterator[Frame]:
         yield Frame(swapped=swapped, long=max(round(max(SIZE) / max(scale, 1e-9)), 1))
 
 
-def _drawn(folder: Path) -> Path:
+def _picture_of_marks(folder: Path) -> Path:
     """The picture of the marks, in a folder."""
     image = Image.new("RGB", SIZE, (225, 225, 225))
     draw = ImageDraw.Draw(image)

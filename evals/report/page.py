@@ -33,6 +33,7 @@ def page(
     sides: Sequence[Side],
     library: PromptLibrary,
     table: Matrix | None = None,
+    title: str = "",
     notes: Sequence[str] = (),
 ) -> str:
     """The whole file.
@@ -41,7 +42,7 @@ def page(
         sides: one run, or A and B of one arm each.
         library: where the prompts of A and B are looked for.
         table: in place of the matrix of the rows.
-        notes: what has to be said beside that.
+        title, notes: of that, and what has to be said beside it.
 
     Raises:
         InputError: A and B cannot be compared.
@@ -65,6 +66,7 @@ def page(
         comparison=comparison,
         prompts=prompt_diff(comparison.a, comparison.b, library) if comparison else [],
         matrix=table or matrix(sides, comparison),
+        title=title or suite.name,
         notes=notes,
         categories=list(dict.fromkeys(task.category for task in suite.tasks)),
         cards=[] if suite.held_out else cards(sides, shown),

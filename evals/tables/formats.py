@@ -17,14 +17,14 @@ def parts(result: Result) -> list[str]:
     if result.interval is None:
         return ["–"]
     of = f" of {result.planned}" if result.scored < result.planned else ""
-    ends = "–".join(_share(end) for end in result.interval)
-    return [f"{result.passed}/{result.scored}{of}", ends, f"GCR {_share(result.gcr)}"]
+    ends = "–".join(_two_digits(end) for end in result.interval)
+    return [f"{result.passed}/{result.scored}{of}", ends, f"GCR {_two_digits(result.gcr)}"]
 
 
 def paper(result: Result) -> str:
     """The paper's figure, or nothing."""
     figure = result.paper or ()
-    return " / ".join(_share(value) for value in figure if value is not None)
+    return " / ".join(_two_digits(value) for value in figure if value is not None)
 
 
 def notes(made: Tabled) -> list[str]:
@@ -54,7 +54,7 @@ def _matrix_cell(result: Result) -> MatrixCell:
     return MatrixCell(upper, lower, (*more, *told), shade)
 
 
-def _share(value: float) -> str:
+def _two_digits(value: float) -> str:
     """With two digits, as the paper writes it."""
     return f"{value:.2f}".removeprefix("0")
 
@@ -105,7 +105,7 @@ def _csv(made: Tabled) -> str:
     return file.getvalue()
 
 
-def _json(made: Tabled) -> str:
+def _as_json(made: Tabled) -> str:
     content = {"title": made.table.title, "suite": made.suite, "notes": notes(made)}
     return json.dumps(content | {"cells": _records(made)}, indent=1) + "\n"
 
@@ -131,7 +131,7 @@ def _tex(cells: Sequence[str]) -> str:
 FORMATS: dict[str, tuple[str, Callable[[Tabled], str]]] = {
     "markdown": ("md", _markdown),
     "csv": ("csv", _csv),
-    "json": ("json", _json),
+    "json": ("json", _as_json),
     "latex": ("tex", _latex),
 }
 """How a table's files end, and what writes them."""
