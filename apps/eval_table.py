@@ -136,9 +136,7 @@ def _with_tasks(
     suite: Suite, found: list[Entry], names: list[str] | None
 ) -> list[tuple[Entry, list[Task]]]:
     """The rows with the tasks that each is tried on."""
-    return [
-        (entry, tasks_with_tasks(suite, [entry.arm] if entry.arm else [], names)) for entry in found
-    ]
+    return [(entry, tasks_tried(suite, [entry.arm] if entry.arm else [], names)) for entry in found]
 
 
 def _write(made: Tabled, folder: Path) -> None:

@@ -25,6 +25,7 @@ write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_fol
 work_of: Callable[..., Any] = import_module("trying").work_of
 
 SUITE = "0" * 64
+Change = Callable[[list[bytes]], list[bytes]]
 TABLED: dict[str, set[str]] = {"methods": {"alone"}, "tasks": {"ring_00", "ring_01", "ring_02"}}
 ALONE = Method("alone", "openai:x")
 
@@ -54,7 +55,7 @@ def changed(trial: Trial, **change: Any) -> Trial:
     return Trial(**{**trial.model_dump(), **change})
 
 
-def rewritten(folder: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
+def rewritten(folder: Path, change: Change) -> None:
     path = folder / "trials.jsonl"
     path.write_bytes(b"".join(change(path.read_bytes().splitlines(keepends=True))))
 
@@ -67,19 +68,19 @@ def test_what_a_runner_left_is_tabled(run: tuple[Path, list[Trial]]) -> None:
     assert checked_rows(folder / "none", SUITE, trials, **TABLED) == []
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda rows: [rows[0].replace(b'"fail"', b'"model_invalid"'), *rows[1:]], "1 .* edited"),
-        (lambda rows: [rows[0], *rows[2:]], r"line 2 .*: a trial is missing"),
-        (lambda rows: [rows[1], rows[0], *rows[2:]], "line 1 .* or moved"),
-        (lambda rows: [*rows, rows[-1]], "is of a trial that is scored already"),
-        (lambda rows: rows[:-1], "has lost the trials it ended with"),
-        (lambda rows: [], "has lost the trials it ended with"),
-    ],
-)
+TAMPERED: list[tuple[Change, str]] = [
+    (lambda rows: [rows[0].replace(b'"fail"', b'"model_invalid"'), *rows[1:]], "1 .* edited"),
+    (lambda rows: [rows[0], *rows[2:]], r"line 2 .*: a trial is missing"),
+    (lambda rows: [rows[1], rows[0], *rows[2:]], "line 1 .* or moved"),
+    (lambda rows: [*rows, rows[-1]], "is of a trial that is scored already"),
+    (lambda rows: rows[:-1], "has lost the trials it ended with"),
+    (lambda rows: [], "has lost the trials it ended with"),
+]
+
+
+@pytest.mark.parametrize(("change", "said"), TAMPERED)
 def test_rows_that_were_tampered_with(
-    run: tuple[Path, list[Trial]], change: Callable[[list[bytes]], list[bytes]], said: str
+    run: tuple[Path, list[Trial]], change: Change, said: str
 ) -> None:
     rewritten(run[0], change)
     refused(run, said)
