@@ -51,8 +51,8 @@ def refused(run: tuple[Path, list[Trial]], said: str, suite: str = SUITE) -> Non
         checked_rows(run[0], suite, run[1], **TABLED)
 
 
-def changed(trial: Trial, **change: Any) -> Trial:
-    return Trial(**{**trial.model_dump(), **change})
+def changed(one: Trial, **change: Any) -> Trial:
+    return Trial.model_validate(one.model_dump() | change)
 
 
 def rewritten(folder: Path, change: Change) -> None:
@@ -119,7 +119,7 @@ def test_a_killed_runner_leaves_what_can_be_tabled(run: tuple[Path, list[Trial]]
     folder, trials = run
     head = (folder / "head").read_text("utf-8")
     rows = read_rows(folder)
-    more = TrialRow(**{**rows[0].model_dump(), "trial": 2, "files": None})
+    more = TrialRow.model_validate(rows[0].model_dump() | {"trial": 2, "files": None})
     with Journal(folder, Manifest.of(trials)) as journal:
         journal.append(more)
     (folder / "head").write_text(head)  # as a runner leaves it that did not get to its end
