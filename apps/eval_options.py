@@ -12,7 +12,7 @@ MethodName = Annotated[
     str,
     typer.Option(
         "--method",
-        help="rules, agent, alone, segment-only, pile, scatter, boundary, circle or line.",
+        help="rules, agent, alone, zerocap, segment-only, pile, scatter, boundary, circle or line.",
     ),
 ]
 ModeName = Annotated[
@@ -26,8 +26,8 @@ ModelList = Annotated[
     list[str] | None,
     typer.Option(
         "--model",
-        help="Of agent and alone, as in formup run, or replay:FOLDER; of segment-only a segmenter; "
-        "repeatable.",
+        help="Of agent, alone and zerocap, as in formup run, or replay:FOLDER; of segment-only a "
+        "segmenter; repeatable.",
     ),
 ]
 PromptList = Annotated[

@@ -1,19 +1,18 @@
 """`formup eval run`: a suite by one or several methods, as counts with the chance level."""
 
 import json
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import asdict, replace
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from ..evals.experiments.executors import executor
+from ..evals.experiments.executors import Executor, executor
 from ..evals.experiments.journal import read_rows
 from ..evals.experiments.methods import Method, check_method, trials_of
 from ..evals.experiments.pointing import JITTERED, mode_named
@@ -78,10 +77,23 @@ def run_suite(
     tries = trials or str(JITTERS if common.mode in JITTERED else 1)
     count, limit = inputs.whole("--trials", tries, least=1), inputs.dollars("--budget", budget)
     loaded = load_suite(suite, split, seeds)
-    tasks, folder = _tasks_tried(loaded, arms, task), out or _new_folder(loaded.name)
-    runs_on = executor("serial" if workers == 1 else "pool", workers)
-    how = {"executor": runs_on, "budget_usd": limit, "shard": shard}
-    done = _run_trials(loaded, tasks, arms, count, split, folder, how)
+    tasks, folder = tasks_tried(loaded, arms, task), out or new_folder(loaded.name)
+    tried = [(arm, tasks, count) for arm in arms]
+    with prepared(loaded, tried, split, folder) as made:
+        planned = [trial for own in made.trials for trial in own]
+        runs_on = processes(workers)
+        done = sweep(planned, made.work, folder, executor=runs_on, budget_usd=limit, shard=shard)
+    _print_summary(loaded, folder, planned, made.levels)
+    say_stopped(done)
+
+
+def processes(count: int) -> Executor:
+    """What runs trials in so many processes."""
+    return executor("serial" if count == 1 else "pool", count)
+
+
+def say_stopped(done: Sweep) -> None:
+    """Say why a sweep stopped before its end, if it did, and end with the exit code of that."""
     if done.stopped is not None:
         say(f"formup: stopped: {done.stopped}", error=True)
         raise typer.Exit(4)
@@ -111,39 +123,52 @@ def _arms(
     ]
 
 
-def _run_trials(
-    suite: Suite,
-    tasks: Sequence[Task],
-    arms: Sequence[Method],
-    count: int,
-    split: str,
-    folder: Path,
-    how: dict[str, Any],
-) -> Sweep:
-    """Run so many trials of each of the tasks by every arm, and show what came of them."""
-    identities, levels = [arm.arm for arm in arms], chances(suite.tasks)
-    attempts, held_out = folder / ATTEMPTS, split == "test"
+@dataclass(frozen=True)
+class Prepared:
+    """A suite in a run's folder, ready to be tried: the trials of each arm, and what runs them."""
+
+    sha256: str
+    trials: Sequence[Sequence[Trial]]
+    work: SuiteWork
+    levels: dict[str, Chance]
+
+
+@contextmanager
+def prepared(
+    suite: Suite, tried: Sequence[tuple[Method, Sequence[Task], int]], split: str, folder: Path
+) -> Generator[Prepared, None, None]:
+    """Draw a suite's pictures and write it down in a folder.
+
+    Args:
+        suite: that is run.
+        tried: by whom, which of its tasks, and how often each.
+        split: of the suite; of the test split nothing is kept but scores.
+        folder: of the run.
+    """
+    levels, held_out, attempts = chances(suite.tasks), split == "test", folder / ATTEMPTS
     with ExitStack() as stack:
         place = stack.enter_context(TemporaryDirectory()) if held_out else folder / PICTURES
         pictures = _render(suite, Path(place))
         sha256 = suite.sha256({name: picture.pixels for name, picture in pictures.items()})
-        planned = trials_of(sha256, tasks, identities, count)
+        arms = [method.arm for method, _, _ in tried]
+        trials = [
+            trials_of(sha256, tasks, [arm], count)
+            for arm, (_, tasks, count) in zip(arms, tried, strict=True)
+        ]
         if held_out:
-            _note_look(folder.parent, suite.name, sha256, planned)
+            _note_look(folder.parent, suite.name, sha256, [t for own in trials for t in own])
         (folder if held_out else attempts).mkdir(parents=True, exist_ok=True)
         work = SuiteWork(
-            tasks={task.id: task for task in tasks},
+            tasks={task.id: task for _, tasks, _ in tried for task in tasks},
             pictures={name: picture.path for name, picture in pictures.items()},
-            arms={trial.arm.name: arm for trial, arm in zip(planned, arms, strict=False)},
+            arms={arm.name: method for arm, (method, _, _) in zip(arms, tried, strict=True)},
             attempts=None if held_out else attempts,
         )
         store_suite(folder, suite, split, sha256, pictures, levels)
-        done = sweep(planned, work, folder, **how)
-    _print_summary(suite, folder, planned, levels)
-    return done
+        yield Prepared(sha256, trials, work, levels)
 
 
-def _tasks_tried(suite: Suite, arms: Sequence[Method], names: list[str] | None) -> list[Task]:
+def tasks_tried(suite: Suite, arms: Sequence[Method], names: list[str] | None) -> list[Task]:
     """The tasks that are tried: those named, or all, as far as every arm takes them.
 
     Raises:
@@ -173,7 +198,8 @@ def _note_look(folder: Path, suite: str, sha256: str, trials: Sequence[Trial]) -
     say(text, error=True)
 
 
-def _new_folder(suite: str) -> Path:
+def new_folder(suite: str) -> Path:
+    """A folder for a run of a suite that begins now."""
     return RUNS / f"{suite}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
 
 

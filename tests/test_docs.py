@@ -46,6 +46,7 @@ SHOWN = {
     "formup resume": "deployed:",
     "formup eval suites": "zerocap15",
     "formup eval run": "chance GCR",
+    "formup eval table": "Table I of the paper",
     "formup prompts": "former",
     "formup chat": "deployed:",
     "formup sessions": "6 turns",

@@ -17,6 +17,7 @@ from ...prompts.files import lock
 from ...tools.errors import InputError
 from ...tools.store import write_whole
 from ...tools.tool import violations
+from .seals import HEAD, check_seals, sealed, sealed_all
 from .trials import Arm, Sha, Trial, TrialRow, canonical
 
 ROWS, MANIFEST, LOCK = "trials.jsonl", "manifest.json", ".lock"
@@ -76,7 +77,7 @@ class Journal:
 
     def __init__(self, folder: Path, manifest: Manifest) -> None:
         self.rows: dict[str, TrialRow] = {}
-        self.cost_usd = 0.0
+        self.cost_usd, self._last = 0.0, ""
         self._folder, self._manifest = folder, manifest
         self._open = ExitStack()
 
@@ -99,17 +100,19 @@ class Journal:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._open.close()
+        with self._open:
+            write_whole(self._folder / HEAD, self._last.encode())
 
     def append(self, row: TrialRow) -> None:
-        """Write a row; when this returns it is on the disk."""
+        """Write a row, sealed; when this returns it is on the disk."""
+        row = sealed(row, self._last)
         self._file.write(row.line)
         self._file.flush()
         os.fsync(self._file.fileno())
         self._take(row)
 
     def _take(self, row: TrialRow) -> None:
-        self.rows[row.key] = row
+        self.rows[row.key], self._last = row, row.seal
         self.cost_usd += row.cost_usd
 
     def _check_manifest(self) -> None:
@@ -187,8 +190,8 @@ def merge(shards: Sequence[Path], into: Path) -> int:
     folder can be gone on with.
 
     Raises:
-        InputError: other suites or versions, results that contradict, `into` has rows, or a folder
-            is named twice.
+        InputError: other suites or versions, results that contradict, rows that were edited or
+            dropped, `into` has rows, or a folder is named twice.
     """
     named = [folder.resolve() for folder in (*shards, into)]
     if len(set(named)) < len(named):
@@ -197,6 +200,7 @@ def merge(shards: Sequence[Path], into: Path) -> int:
         for folder in shards:
             read_manifest(folder)  # before a lock makes a folder that is not there
             stack.enter_context(held(folder))
+            check_seals(all_rows(folder), folder / ROWS)
         manifest = read_manifest(shards[0])
         for folder in shards[1:]:
             manifest = manifest.joined(read_manifest(folder), folder)
@@ -218,7 +222,9 @@ def merge(shards: Sequence[Path], into: Path) -> int:
             raise InputError(f"{into} has trials already; merge into a new folder.")
         merged.sort(key=lambda row: (row.order, row.scored))
         write_whole(into / MANIFEST, manifest.model_dump_json(indent=1).encode())
-        write_whole(into / ROWS, b"".join(row.line for row in merged))
+        rows = sealed_all(merged)
+        write_whole(into / ROWS, b"".join(row.line for row in rows))
+        write_whole(into / HEAD, rows[-1].seal.encode() if rows else b"")
     return len({row.key for row in merged})
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ...agent.agent import Agent
 from ...agent.model import Model
+from ...agent.wrappers.two_stages import prompt_named
 from ...prompts import Prompt, PromptLibrary
 from ...tools.context import Descriptor
 from ...tools.errors import InputError
@@ -14,18 +15,24 @@ from ...tools.perception.segmenters.registry import segmenter_named
 from ...tools.tool import Tool
 from ..grading.policies import POLICIES
 from ..tasks.task import Task
+from .coordinate_frame import PIXELS, Frame
 from .pointing import Mode, can_point
 from .rate_limiter import RateLimited, rate_limiter
 from .recordings import REPLAY, recordings
 from .segment_only import SEGMENT_ONLY, SegmentOnly
 from .simulated_model import SIMULATED, SimulatedModel
-from .trials import USUAL, Arm, Trial, canonical
+from .trials import USUAL, USUAL_SEGMENTER, Arm, Trial, canonical
+from .zerocap import CALLED, OBJECT, PLACES, ZEROCAP, ZeroCap
 
-METHODS = ("rules", "agent", "alone", SEGMENT_ONLY, *POLICIES)
+METHODS = ("rules", "agent", "alone", ZEROCAP, SEGMENT_ONLY, *POLICIES)
 DIRECT = "former-direct"
 """The prompt of a model alone: to write coordinates."""
 NO_MODEL = {"rules": "offline", **dict.fromkeys(POLICIES, "none")}
 WITH_TOOLS = ("rules", "agent")
+"""Methods that the tools place for."""
+WRITERS = ("alone", ZEROCAP)
+"""Methods whose model writes coordinates itself."""
+DESCRIBED = (*WITH_TOOLS, ZEROCAP)
 """Methods that put shapes into words."""
 SHIPPED = PromptLibrary()
 
@@ -42,6 +49,8 @@ class Method:
         descriptor: how shapes are described.
         mode: how things are pointed at.
         planner: a second model of an agent, which plans without the picture.
+        segmenter: what cuts things out; of segment-only the model itself.
+        frame: in which one that writes coordinates alone gives them.
         library: where prompts are.
         base_url: of the model's server.
         rate: requests per minute in each process at most; None for no limit.
@@ -53,6 +62,8 @@ class Method:
     descriptor: Descriptor = "edges"
     mode: Mode = "words"
     planner: str | None = None
+    segmenter: str = USUAL_SEGMENTER
+    frame: Frame = PIXELS
     library: PromptLibrary = SHIPPED
     base_url: str | None = None
     rate: float | None = None
@@ -65,9 +76,10 @@ class Method:
             InputError: no such model or prompt.
         """
         recorded = recordings(self.model)
+        cut = None if self.segmenter == USUAL_SEGMENTER else self.segmenter
         if self.name in POLICIES or recorded:
             model = recorded.name if recorded else self.model
-            return Arm(method=self.name, model=model, mode=self.mode)
+            return Arm(method=self.name, model=model, mode=self.mode, segmenter=cut)
         agent = self.agent(0)
         return Arm(
             method=self.name,
@@ -75,8 +87,10 @@ class Method:
             sha256=_prompts_sha(agent.prompts),
             tools=_tools_sha(agent.offered) if agent.tools else None,
             model=agent.model.name,
-            descriptor=self.descriptor if self.name in WITH_TOOLS else None,
+            descriptor=self.descriptor if self.name in DESCRIBED else None,
             mode=self.mode,
+            segmenter=cut,
+            frame=self.frame.name,
         )
 
     def agent(self, seed: int, recording: Path | None = None) -> Agent:
@@ -94,11 +108,13 @@ class Method:
         name = self.model if recording is None else f"{REPLAY}{recording}"
         model: str | Model = SimulatedModel(seed) if name == SIMULATED else name
         url = self.base_url if isinstance(model, str) and model != "offline" else None
+        if self.name in WRITERS and name in ("offline", SIMULATED):
+            raise InputError(f"{name} writes no coordinates alone; --model takes another.")
         if self.name == "alone":
-            if name in ("offline", SIMULATED):
-                raise InputError(f"{name} writes no coordinates alone; --model takes another.")
             prompt = self.prompt or DIRECT
             agent = Agent(model, base_url=url, prompt=prompt, library=self.library, tools=())
+        elif self.name == ZEROCAP:
+            agent = self._zerocap(model, url)
         else:
             agent = Agent(
                 model,
@@ -109,6 +125,18 @@ class Method:
             )
         if self.rate is not None:
             agent.model = RateLimited(agent.model, rate_limiter(self.model, self.rate))
+        return agent
+
+    def _zerocap(self, model: str | Model, url: str | None) -> Agent:
+        """The paper's pipeline; a recording of it has the tools' calls in it already."""
+        if recordings(self.model):
+            return Agent(model, tools=CALLED)
+        looker = Agent(model, base_url=url).model
+        planner = Agent(self.planner, base_url=url).model if self.planner else looker
+        stages = [prompt_named(self.library, name) for name in (OBJECT, PLACES)]
+        by_text = "text" in segmenter_named(self.segmenter).takes
+        agent = Agent(ZeroCap(looker, planner, *stages, by_text=by_text), tools=CALLED)
+        agent.prompts = tuple(stages)
         return agent
 
     def takes(self, task: Task) -> bool:
@@ -134,10 +162,10 @@ def check_method(arm: Method) -> Method:
     if name not in METHODS:
         raise InputError(f"Unknown method {name!r}. There are: {', '.join(METHODS)}.")
     for option, given, takers in (
-        ("--model", arm.model, ("agent", "alone", SEGMENT_ONLY)),
+        ("--model", arm.model, ("agent", *WRITERS, SEGMENT_ONLY)),
         ("--prompt", arm.prompt, ("agent", "alone")),
-        ("--planner", arm.planner, ("agent",)),
-        ("--descriptor", arm.descriptor != USUAL, WITH_TOOLS),
+        ("--planner", arm.planner, ("agent", ZEROCAP)),
+        ("--descriptor", arm.descriptor != USUAL, DESCRIBED),
         ("--mode", arm.mode != "words", ("rules", "agent", "alone")),
     ):
         if given and name not in takers:
@@ -148,8 +176,13 @@ def check_method(arm: Method) -> Method:
     if not arm.model and name not in NO_MODEL:
         example = "langsam, a segmenter that takes text" if name == SEGMENT_ONLY else "openai:NAME"
         raise InputError(f"The method {name} takes a --model, such as {example}.")
-    if name == SEGMENT_ONLY and "text" not in segmenter_named(arm.model).takes:
-        raise InputError(f"The segmenter {arm.model!r} takes no text; clipseg and langsam do.")
+    if name == SEGMENT_ONLY and not (
+        arm.model == USUAL_SEGMENTER or "text" in segmenter_named(arm.model).takes
+    ):
+        raise InputError(
+            f"The segmenter {arm.model!r} takes no text; clipseg and langsam do, and grabcut takes "
+            "what stands out most."
+        )
     return replace(arm, model=arm.model or NO_MODEL[name])
 
 

@@ -1,7 +1,7 @@
 """Segmentation alone (Table II of the paper): a network is given the words for the thing, whole.
 
-Nobody reads a relation or a rank, or compares anything: the best find is the thing. The rules
-place robots about it as they place them about what a person points at.
+Nobody reads a relation or a rank, or compares anything: the best find is the thing; without a
+network what stands out most is. The rules place robots about it as about what a person points at.
 """
 
 import json
@@ -13,6 +13,7 @@ from ...agent.messages import Call, History, Reply, Result, User, turn_of
 from ...agent.model import Request
 from ...agent.offline.accounting import read_instruction
 from ...agent.offline.planner import OfflinePlanner
+from ...tools.perception.segmenters.registry import segmenter_named
 
 SEGMENT_ONLY = "segment-only"
 LONGEST = 60
@@ -26,6 +27,7 @@ class SegmentOnly:
 
     def __init__(self, segmenter: str) -> None:
         self.name = segmenter
+        self._by_words = "text" in segmenter_named(segmenter).takes
         self._rules = OfflinePlanner()
 
     async def reply(self, request: Request) -> Reply:
@@ -34,9 +36,9 @@ class SegmentOnly:
         assert isinstance(first, User)
         if not rest:
             return _call("locate_object", query={"noun": _phrase(first.text)})
-        found = _best(tuple(rest))
+        found = _best(tuple(rest), self._by_words)
         if found is None:
-            reason = "The network found nothing by the words for the thing."
+            reason = "Nothing was found by the words for the thing."
             return _call("report_impossible", reason=reason)
         pointed = json.dumps([{"id": "t1", "candidate": found}])
         text = "\n".join(
@@ -57,13 +59,15 @@ def _phrase(text: str) -> str:
     return (reading.things[0] if reading.things else said)[:LONGEST]
 
 
-def _best(messages: History) -> str | None:
-    """The candidate that the network is surest of."""
+def _best(messages: History, by_words: bool) -> str | None:
+    """The candidate that the network is surest of, or without one that stands out most."""
     result = next(m for m in messages if isinstance(m, Result) and m.call_id == SEGMENT_ONLY)
     found: list[dict[str, Any]] = []
     if not result.error:
         found = json.loads(result.text)["candidates"]
-    scored: list[tuple[float, str]] = [
-        (n["score"], c["id"]) for c in found for n in c.get("named", ())
-    ]
+    scored: list[tuple[float, str]] = (
+        [(n["score"], c["id"]) for c in found for n in c.get("named", ())]
+        if by_words
+        else [(c["salience"], c["id"]) for c in found]
+    )
     return max(scored)[1] if scored else None

@@ -4,14 +4,11 @@ A provider that fails is an infrastructure error and says nothing; output that c
 model's failure, counted apart.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
+from typing import Any
 
 from ...agent.agent import Agent, Run
 from ...agent.messages import Result
@@ -25,13 +22,15 @@ from ..grading.grades import VERSION, Graded
 from ..grading.policies import POLICIES, positions
 from ..tasks.task import Dialogue, Task
 from .dialogue_work import Held, hold
-from .methods import Method
+from .methods import WRITERS, Method
 from .pointing import Pointing, pointing
 from .recordings import file_name, recordings
+from .seals import files_hash
 from .segment_only import SEGMENT_ONLY
 from .simulated_model import SIMULATED
 from .tokens import spent
 from .trials import Status, Trial, TrialRow, Turns, canonical
+from .written import declined, written_positions
 
 LONGEST = 400
 """Characters of feedback in a row."""
@@ -83,6 +82,7 @@ class SuiteWork:
             iou=graded.iou,
             e95=graded.e95,
             feedback=graded.feedback[:LONGEST] if self.attempts is not None else "",
+            files=self._kept(trial),
             **cost,
         )
 
@@ -127,8 +127,13 @@ class SuiteWork:
                 still=len(still),
                 kept=sum(grade.kept for grade in still),
             ),
+            files=self._kept(trial),
             **cost,
         )
+
+    def _kept(self, trial: Trial) -> str | None:
+        """The hash of what is kept of a trial that was written down; None where nothing is."""
+        return self.attempts and files_hash(attempt_files(self.attempts, trial))
 
     def _begin(
         self, task: Task, arm: Method, trial: Trial
@@ -142,7 +147,7 @@ class SuiteWork:
             descriptor=arm.descriptor,
             seed=seed,
             metres_per_pixel=task.metres_per_pixel,
-            segmenter=arm.model if arm.name == SEGMENT_ONLY else "grabcut",
+            segmenter=arm.model if arm.name == SEGMENT_ONLY else arm.segmenter,
         )
         trace = None
         if self.attempts is not None and arm.model not in ("offline", SIMULATED):
@@ -156,6 +161,12 @@ def attempt_name(trial: Trial) -> str:
     return f"{file_name(trial.task)}-{trial.trial}-{trial.key[:12]}"
 
 
+def attempt_files(folder: Path, trial: Trial) -> tuple[Path, Path]:
+    """Where what came of a trial is kept, if it is, and its trace, if there is one."""
+    name = attempt_name(trial)
+    return folder / f"{name}.json", folder / f"{name}.jsonl"
+
+
 def _by_policy(task: Task, name: str, seed: int) -> Attempt:
     """Where nothing is to be placed, a policy moves robots all the same."""
     placed = positions(name, task.goals, seed).tolist() if task.goals else [(0.0, 0.0)]
@@ -164,52 +175,26 @@ def _by_policy(task: Task, name: str, seed: int) -> Attempt:
 
 def _attempt(run: Run, arm: Method) -> Attempt:
     report = run.report
-    if arm.name == "alone":
-        written = _written_positions(report.message)
-        declined = _declined(report.message) if written is None else None
-        if declined:
-            return Attempt(declined, message=report.message, declined=True)
-        status = "deployed" if written else "failed"
-        return Attempt(status, written, written, message=report.message)
-    given_up = isinstance(run.outcome, Answered) and isinstance(run.outcome.messages[-1], Result)
     targets, contract = run.world.targets, report.contract
+    measured = tuple(t.outline.polygon for t in targets)
+    if arm.name in WRITERS:
+        written, refusal = written_positions(report.message), declined(report.message)
+        if written is None and refusal:
+            return Attempt(refusal, message=report.message, declined=True, measured=measured)
+        placed = written and arm.frame.pixels(written, run.world.picture.size)
+        status = "deployed" if placed else "failed"
+        return Attempt(status, placed, placed, measured, measured, report.message)
+    given_up = isinstance(run.outcome, Answered) and isinstance(run.outcome.messages[-1], Result)
     named = contract.target_ids if contract else ()
     return Attempt(
         status=report.status,
         planned=report.positions,
         observed=report.arrival and report.arrival.observed,
         found=tuple(t.outline.polygon for t in targets if t.id in named),
-        measured=tuple(t.outline.polygon for t in targets),
+        measured=measured,
         message=report.message,
         declined=report.status == "question" or (report.status == "impossible" and given_up),
     )
-
-
-def _written_positions(text: str) -> tuple[tuple[float, float], ...] | None:
-    """The positions that a model alone, without tools, has written as JSON; None if it has not."""
-    try:
-        pairs = np.asarray(_json_object(text)["positions"], dtype=float)
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return None
-    if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.isfinite(pairs).all():
-        return None
-    return tuple((float(x), float(y)) for x, y in pairs)
-
-
-def _declined(text: str) -> Literal["question", "impossible"] | None:
-    """What a model alone has done that writes that no robot shall be placed; else None."""
-    try:
-        written = _json_object(text)
-        if written["positions"] != []:
-            return None
-        return "question" if written.get("question") else "impossible"
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return None
-
-
-def _json_object(text: str) -> Any:
-    """The JSON object in a text."""
-    return json.loads(text[text.find("{") : text.rfind("}") + 1])
 
 
 def _lost(run: Run) -> str | None:
@@ -224,7 +209,7 @@ def _invalid(run: Run, arm: Method, attempt: Attempt) -> bool:
     """Whether there is nothing to judge: no call that could be made, no positions to be read."""
     if attempt.observed is not None or attempt.declined:
         return False
-    if arm.name == "alone":
+    if arm.name in WRITERS:
         return True
     results = [m for m in run.outcome.messages if isinstance(m, Result)]
     return not results or results[-1].error in ("unknown_tool", "arguments")

@@ -19,8 +19,10 @@ Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Status = Literal["pass", "fail", "model_invalid", "infra_error"]
 USUAL = "edges"
 """The descriptor that goes without saying."""
-UNEQUAL = frozenset({"seconds", "host"})
-"""Fields that differ from run to run of the same trial."""
+USUAL_SEGMENTER = "grabcut"
+"""So for what cuts things out, which needs no weights."""
+UNEQUAL = frozenset({"seconds", "host", "files", "after", "seal"})
+"""Fields that differ from run to run of the same trial: times, and hashes of what has times."""
 
 
 class Arm(BaseModel):
@@ -34,6 +36,8 @@ class Arm(BaseModel):
         model: provider:name, or offline.
         descriptor: how shapes are put into words, such as edges; None where none are.
         mode: how things are pointed at; words where they are not.
+        segmenter: what cuts things out; None for the usual one.
+        frame: in which coordinates were written; None for pixels.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -45,14 +49,17 @@ class Arm(BaseModel):
     model: Name
     descriptor: Name | None = None
     mode: Name = "words"
+    segmenter: Name | None = None
+    frame: Name | None = None
 
     @property
     def name(self) -> str:
-        """Method, prompt with the beginning of its hash, model; descriptor and mode if unusual."""
+        """Method, prompt with the beginning of its hash, model; the others if unusual."""
         prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
         shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
         mode = "" if self.mode == "words" else f" {self.mode}"
-        return f"{self.method}{prompt} {self.model}{shapes}{mode}"
+        more = "".join(f" {said}" for said in (self.segmenter, self.frame) if said)
+        return f"{self.method}{prompt} {self.model}{shapes}{mode}{more}"
 
 
 class Trial(BaseModel):
@@ -127,6 +134,8 @@ class TrialRow(Trial):
         feedback: what was wrong, in a sentence.
         cached_tokens: input in tokens of full price, with the prompt and the tools in the cache.
         turns: of a dialogue, whose gcr is the share of them that were right; else None.
+        files: hash of what is kept of it in attempts/; None where nothing is.
+        after, seal: see seals.py; nothing until it is written.
     """
 
     status: Status
@@ -146,6 +155,9 @@ class TrialRow(Trial):
     seconds: Amount = 0.0
     host: str = ""
     turns: Turns | None = None
+    files: Sha | None = None
+    after: str = ""
+    seal: str = ""
 
     @classmethod
     def of(cls, trial: Trial, status: Status, **facts: Any) -> Self:

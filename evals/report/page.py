@@ -18,7 +18,7 @@ from ...prompts import PromptLibrary
 from ...tools.visible import visible
 from ..experiments.compare import compare
 from ..experiments.journal import read_manifest
-from .matrix import interval_points, matrix, signed_points
+from .matrix import Matrix, interval_points, matrix, signed_points
 from .pictures import pictures
 from .prompt_diff import prompt_diff
 from .run_folder import Side
@@ -29,12 +29,20 @@ TRIALS_OPEN = 4
 """Trials of a task that are shown at once; more are opened by hand."""
 
 
-def page(sides: Sequence[Side], library: PromptLibrary) -> str:
+def page(
+    sides: Sequence[Side],
+    library: PromptLibrary,
+    table: Matrix | None = None,
+    title: str = "",
+    notes: Sequence[str] = (),
+) -> str:
     """The whole file.
 
     Args:
         sides: one run, or A and B of one arm each.
         library: where the prompts of A and B are looked for.
+        table: in place of the matrix of the rows.
+        title, notes: of that, and what has to be said beside it.
 
     Raises:
         InputError: A and B cannot be compared.
@@ -57,7 +65,9 @@ def page(sides: Sequence[Side], library: PromptLibrary) -> str:
         facts=f"Split {suite.split}, {version}; {_tasks_and_trials(sides)}.",
         comparison=comparison,
         prompts=prompt_diff(comparison.a, comparison.b, library) if comparison else [],
-        matrix=matrix(sides, comparison),
+        matrix=table or matrix(sides, comparison),
+        title=title or suite.name,
+        notes=notes,
         categories=list(dict.fromkeys(task.category for task in suite.tasks)),
         cards=[] if suite.held_out else cards(sides, shown),
         pictures=shown.values(),

@@ -179,6 +179,7 @@ def _tasks_of_item(
         return
     must, named = bool(item.get("must_pass")), item.get("photos", "all")
     scale = {name: item[name] for name in (SCALE,) if name in item}
+    style = {name: item[name] for name in ("style",) if name in item}
     for make, family, root in _entries(item, path):
         split = _split_of(family, splits, path)
         if wanted not in (None, split):
@@ -186,7 +187,7 @@ def _tasks_of_item(
         entry = make() | scale
         for task in entry["tasks"]:
             if named == "all" or task["id"] in named:
-                yield task_of(entry, task, root, family=family, split=split, must_pass=must)
+                yield task_of(entry, task | style, root, family=family, split=split, must_pass=must)
 
 
 def _dialogues(

@@ -8,6 +8,7 @@ from formup.agent.agent import Agent
 from formup.agent.messages import Call, Reply
 from formup.agent.wrappers.doubles import ScriptedModel
 from formup.evals.experiments.journal import Manifest
+from formup.evals.experiments.seals import sealed_all
 from formup.evals.experiments.suite_work import attempt_name
 from formup.evals.experiments.trials import Arm, Status, Trial, TrialRow
 from formup.evals.statistics.cells import Chance
@@ -52,7 +53,7 @@ def write_run(folder: Path, method: str, *, passing: int, split: str = "dev") ->
     )
     (folder / "suite.json").write_text(suite.model_dump_json(), "utf-8")
     (folder / "manifest.json").write_text(Manifest.of(rows).model_dump_json(), "utf-8")
-    (folder / "trials.jsonl").write_bytes(b"".join(row.line for row in rows))
+    (folder / "trials.jsonl").write_bytes(b"".join(row.line for row in sealed_all(rows)))
     for row in rows:
         _keep(folder, row)
     return folder

@@ -84,6 +84,8 @@ def test_the_report_is_what_promotion_reads() -> None:
         "model": "offline",
         "descriptor": None,
         "mode": "words",
+        "segmenter": None,
+        "frame": None,
     }
     assert report["b"]["prompt"] == "former@v002"
     assert (report["suite"], report["verdict"]) == (SUITE, "pass")

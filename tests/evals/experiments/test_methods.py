@@ -156,7 +156,7 @@ def test_a_descriptor_is_part_of_the_arm() -> None:
         (Method("circle", descriptor="matrix"), "--descriptor goes with the methods rules"),
         (Method("alone", "x:y", descriptor="matrix"), "--descriptor goes with the methods rules"),
         (Method("circle", mode="box"), "--mode goes with the methods rules and agent and alone"),
-        (Method("rules", planner="x:y"), "--planner goes with the method agent"),
+        (Method("rules", planner="x:y"), "--planner goes with the methods agent and zerocap"),
     ):
         with pytest.raises(InputError, match=message):
             check_method(arm)

@@ -81,6 +81,7 @@ def test_what_ships() -> None:
         "dialogues",
         "exact",
         "formation-dev",
+        "formup-hard",
         "frontier",
         "infeasible",
         "injection",

@@ -1,0 +1,194 @@
+"""A table as data: columns, rows, the paper's figures, and who fills a row; see tables.yaml."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import yaml
+from pydantic import BaseModel
+
+from ...tools.context import Descriptor
+from ...tools.errors import InputError
+from ..experiments.methods import Method, check_method
+from ..experiments.pointing import Mode
+from ..experiments.recordings import REPLAY
+from ..experiments.segment_only import SEGMENT_ONLY
+from ..experiments.simulated_model import SIMULATED
+from ..experiments.trials import USUAL_SEGMENTER, Trial
+from ..statistics.cells import cell_names
+
+_FILE = Path(__file__).with_name("tables.yaml")
+TRAINED = 5_000_000
+"""Bytes of weights under which no network was trained to see: a test's, written at random."""
+Figure = tuple[float, float | None]
+"""SR and GCR as the paper prints them; Tables II and III have no GCR."""
+
+
+class Row(BaseModel, frozen=True, extra="forbid"):
+    """A row of a table.
+
+    Attributes:
+        row: its head.
+        method: who decides; nothing where nobody can here, and `missing` says why.
+        models: a word in the names of the models that fill it, "" for those that no other row of
+            the method takes; None where the method needs none, or has its own.
+        trials: tries of each task; the table's by default.
+        paper: its figures by column.
+        paper_tokens: the tokens it says are needed beyond those of edges, as a share.
+    """
+
+    row: str
+    method: str = ""
+    missing: str = ""
+    models: str | None = None
+    mode: Mode = "words"
+    descriptor: Descriptor = "edges"
+    segmenter: str = USUAL_SEGMENTER
+    trials: int | None = None
+    paper: dict[str, Figure] = {}
+    paper_tokens: float | None = None
+
+
+class Table(BaseModel, frozen=True, extra="forbid"):
+    """A table.
+
+    Attributes:
+        columns: title, and the cell (category, setup or style) that it shows.
+        notes: what has to be said beside it.
+        stand_ins: which task of the paper each of ours stands for.
+    """
+
+    title: str
+    suite: str
+    trials: int
+    columns: dict[str, str]
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()
+    stand_ins: dict[str, str] = {}
+
+    def within(self, column: str, trial: Trial) -> bool:
+        """Whether a trial counts in a column."""
+        return self.columns[column] in cell_names(trial)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row with who fills it.
+
+    Attributes:
+        arm: None where nobody can, or has been named.
+        trials: tries of each task.
+        wants: what has to be named for it, such as an option; nothing where there is an arm.
+    """
+
+    row: Row
+    arm: Method | None
+    trials: int
+    wants: str = ""
+
+    @property
+    def untrained(self) -> bool:
+        """Whether its network's weights are too few to have been trained: it says nothing."""
+        arm = self.arm
+        name = "" if arm is None else arm.model if arm.name == SEGMENT_ONLY else arm.segmenter
+        folders = [Path(part) for part in name.partition(":")[2].split(",") if part]
+        files = [file for folder in folders for file in folder.glob("*.safetensors")]
+        return bool(files) and sum(file.stat().st_size for file in files) < TRAINED
+
+
+class _Tables(BaseModel, frozen=True, extra="forbid"):
+    tokens: dict[str, tuple[int, int]]
+    tables: dict[str, Table]
+
+
+@cache
+def _tables() -> _Tables:
+    return _Tables.model_validate(yaml.safe_load(_FILE.read_text(encoding="utf-8")))
+
+
+def table_named(name: str) -> Table:
+    """The table of a name.
+
+    Raises:
+        InputError: there is none.
+    """
+    tables = _tables().tables
+    if name not in tables:
+        raise InputError(f"Unknown table {name!r}. There are: {', '.join(tables)}.")
+    return tables[name]
+
+
+def usual_tokens(method: str) -> tuple[int, int]:
+    """Tokens in and out of a trial, before any has been counted; none where no model is asked."""
+    return _tables().tokens.get(method, (0, 0))
+
+
+def entries(
+    table: Table,
+    base: Method,
+    models: Sequence[str],
+    segmenters: Sequence[str],
+    trials: int | None = None,
+) -> list[Entry]:
+    """The rows of a table with who fills them: a row stands for each of its models.
+
+    Args:
+        table: whose rows.
+        base: what all methods share, such as where prompts are.
+        models: as Agent takes them, `simulated`, or replay:FOLDER; A+B where B plans for A.
+        segmenters: NAME or NAME:CHECKPOINT of the networks there are.
+        trials: tries of each task, in place of the table's own.
+
+    Raises:
+        InputError: a model or segmenter that no row takes, or that cannot be used.
+    """
+    found, taken = list[Entry](), set[str]()
+    cut = {name.partition(":")[0]: name for name in segmenters} | {USUAL_SEGMENTER: USUAL_SEGMENTER}
+    for row in table.rows:
+        chosen = [""] if row.models is None else [m for m in models if _takes(table, row, m)]
+        taken |= {*chosen, cut.get(row.segmenter, "")}
+        wants = ""
+        if row.segmenter not in cut:
+            wants = f"--segmenter {row.segmenter}"
+        elif not chosen:
+            wants = f"--models {f'whose name holds {row.models}' if row.models else 'of yours'}"
+        arms = [None] if row.missing or wants else [_arm(row, m, base, cut) for m in chosen]
+        count = trials or row.trials or table.trials
+        found += [Entry(row, arm, count, wants) for arm in arms]
+    for option, names in (("model", models), ("segmenter", segmenters)):
+        lost = sorted(set(names) - taken)
+        if lost:
+            raise InputError(f"No row of this table is for the {option} {lost[0]!r}; leave it out.")
+    return found
+
+
+def _takes(table: Table, row: Row, model: str) -> bool:
+    """Whether a row is for a model, by its name, of two the planner's."""
+    if model == SIMULATED or model.startswith(REPLAY):
+        words = REPLAY if model.startswith(REPLAY) else ""
+        return row.method == "agent" and row.models == words
+    if "+" in model and row.method == "alone":
+        return False
+    others = [r.models for r in table.rows if r.method == row.method and r.models]
+    own = model.lower().rpartition("+")[2].partition(":")[2]
+    named = [word for word in others if word in own]
+    return row.models in (named or [""])
+
+
+def _arm(row: Row, model: str, base: Method, cut: Mapping[str, str]) -> Method:
+    if row.method == SEGMENT_ONLY:
+        return check_method(Method(row.method, cut[row.segmenter]))
+    looker, _, planner = model.partition("+")
+    base = base if model else Method("")
+    return check_method(
+        replace(
+            base,
+            name=row.method,
+            model=looker,
+            planner=planner or None,
+            descriptor=row.descriptor,
+            mode=row.mode,
+            segmenter=cut[row.segmenter],
+        )
+    )

@@ -1,0 +1,137 @@
+"""A table in the forms it is printed in: Markdown, CSV, JSON, LaTeX, and the report's matrix."""
+
+import csv
+import io
+import json
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from ..report.matrix import STEPS, Matrix, MatrixCell, MatrixRow
+from .results import Result, Tabled
+
+_ESCAPES = {c: f"\\{c}" for c in "&%$#_{}"} | {"–": "--", "~": r"\textasciitilde{}"}
+
+
+def parts(result: Result) -> list[str]:
+    """What came of a cell: k/n, how many there are to be where some are missing; interval; GCR."""
+    if result.interval is None:
+        return ["–"]
+    of = f" of {result.planned}" if result.scored < result.planned else ""
+    ends = "–".join(_two_digits(end) for end in result.interval)
+    return [f"{result.passed}/{result.scored}{of}", ends, f"GCR {_two_digits(result.gcr)}"]
+
+
+def paper(result: Result) -> str:
+    """The paper's figure, or nothing."""
+    figure = result.paper or ()
+    return " / ".join(_two_digits(value) for value in figure if value is not None)
+
+
+def notes(made: Tabled) -> list[str]:
+    """What has to be said beside a table, with the stand-ins."""
+    said = [" ".join(note.split()) for note in made.table.notes]
+    stand_ins = [f"{task}: {of}" for task, of in made.table.stand_ins.items()]
+    said += [f"Stand-ins: {'; '.join(stand_ins)}."] if stand_ins else []
+    suite = " ".join(filter(None, (made.table.suite, made.suite[:12])))
+    left = sum(row.left_usd or 0.0 for row in made.rows)
+    more = f", about {left:.2f} USD more for what is not run" if left else ""
+    return [*said, f"Suite {suite}; {sum(r.cost_usd for r in made.rows):.4f} USD spent{more}."]
+
+
+def as_matrix(made: Tabled) -> Matrix:
+    """The matrix of the report's page."""
+    rows = [
+        MatrixRow(row.head, row.remarks, [_matrix_cell(r) for r in row.results.values()])
+        for row in made.rows
+    ]
+    return Matrix(("who", *made.table.columns), rows)
+
+
+def _matrix_cell(result: Result) -> MatrixCell:
+    upper, lower, *more = [*parts(result), " "][:3]
+    told = [f"paper {paper(result)}"] if result.paper else []
+    shade = f"h{round(STEPS * result.passed / result.scored)}" if result.scored else ""
+    return MatrixCell(upper, lower, (*more, *told), shade)
+
+
+def _two_digits(value: float) -> str:
+    """With two digits, as the paper writes it."""
+    return f"{value:.2f}".removeprefix("0")
+
+
+def _markdown(made: Tabled) -> str:
+    lines = [["", *made.table.columns], ["---"] * (len(made.table.columns) + 1)]
+    for row in made.rows:
+        cells = (
+            [*parts(r), f"*paper {paper(r)}*"] if r.paper else parts(r)
+            for r in row.results.values()
+        )
+        heads = [f"**{row.head}**", *row.remarks]
+        lines.append(["<br>".join(said).replace("|", "/") for said in (heads, *cells)])
+    table = [f"| {' | '.join(cells)} |" for cells in lines]
+    told = [f"- {note}" for note in notes(made)]
+    return "\n".join([f"# {made.table.title}", "", *table, "", *told, ""])
+
+
+def _records(made: Tabled) -> list[dict[str, Any]]:
+    """One record a cell."""
+    return [
+        {
+            "table": made.name,
+            "row": row.head,
+            "model": row.model,
+            "column": column,
+            "passed": r.passed,
+            "scored": r.scored,
+            "planned": r.planned,
+            "low": r.interval and round(r.interval.low, 4),
+            "high": r.interval and round(r.interval.high, 4),
+            "gcr": round(r.gcr, 4) if r.scored else None,
+            "paper_sr": r.paper and r.paper[0],
+            "paper_gcr": r.paper and r.paper[1],
+            "left_usd": row.left_usd,
+            "remarks": "; ".join(row.remarks),
+        }
+        for row in made.rows
+        for column, r in row.results.items()
+    ]
+
+
+def _csv(made: Tabled) -> str:
+    cells, file = _records(made), io.StringIO()
+    writer = csv.DictWriter(file, cells[0].keys() if cells else (), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(cells)
+    return file.getvalue()
+
+
+def _as_json(made: Tabled) -> str:
+    content = {"title": made.table.title, "suite": made.suite, "notes": notes(made)}
+    return json.dumps(content | {"cells": _records(made)}, indent=1) + "\n"
+
+
+def _latex(made: Tabled) -> str:
+    """A tabular of plain LaTeX, the paper's figures in a second line of each row."""
+    lines = [rf"\begin{{tabular}}{{l{'c' * len(made.table.columns)}}}", r"\hline"]
+    lines += [_tex(["", *made.table.columns]), r"\hline"]
+    for row in made.rows:
+        found = row.results.values()
+        head = f"{row.head} ({row.model})" if row.model else row.head
+        lines.append(_tex([head, *(" ".join(parts(r)) for r in found)]))
+        if any(r.paper for r in found):
+            lines.append(_tex(["paper", *(paper(r) for r in found)]))
+    return "\n".join([*lines, r"\hline", r"\end{tabular}", *(f"% {n}" for n in notes(made)), ""])
+
+
+def _tex(cells: Sequence[str]) -> str:
+    escaped = ("".join(_ESCAPES.get(c, c) for c in cell) for cell in cells)
+    return f"{' & '.join(escaped)} \\\\"
+
+
+FORMATS: dict[str, tuple[str, Callable[[Tabled], str]]] = {
+    "markdown": ("md", _markdown),
+    "csv": ("csv", _csv),
+    "json": ("json", _as_json),
+    "latex": ("tex", _latex),
+}
+"""How a table's files end, and what writes them."""

@@ -1,0 +1,179 @@
+"""What came of a table: each cell as k of n with its interval and the paper's figure beside it.
+
+What was not run says so, and about what it would cost. Nothing in it depends on the time.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from ...agent.providers.prices import UNKNOWN, price_of
+from ..experiments.recordings import REPLAY
+from ..experiments.simulated_model import SIMULATED
+from ..experiments.trials import USUAL, Trial, TrialRow
+from ..statistics.intervals import Interval, wilson
+from .definition import Entry, Figure, Table, usual_tokens
+
+UNTRAINED = "run, but figures of weights too few to be trained are not shown"
+
+
+@dataclass(frozen=True)
+class Result:
+    """A cell: `passed` of `scored` trials and their mean GCR, of `planned`; the paper's figure."""
+
+    passed: int
+    scored: int
+    planned: int
+    gcr: float
+    paper: Figure | None
+
+    @property
+    def interval(self) -> Interval | None:
+        """Of the success rate at 95 %, of these tasks; None without trials."""
+        return wilson(self.passed, self.scored) if self.scored else None
+
+
+@dataclass(frozen=True)
+class ResultRow:
+    """A row.
+
+    Attributes:
+        model: that filled it, or nothing.
+        results: by column.
+        remarks: what is to be said beside the figures, such as why trials are missing.
+        left_usd: what these would cost; None where the price is not known.
+    """
+
+    head: str
+    model: str
+    results: Mapping[str, Result]
+    remarks: tuple[str, ...]
+    cost_usd: float
+    left_usd: float | None
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A row with its trials; none where nobody fills it, but the number of tasks it would have."""
+
+    entry: Entry
+    trials: Sequence[Trial]
+    tasks: int
+
+    @property
+    def model(self) -> str:
+        """The model that was chosen for it, or is to be; nothing where it needs none."""
+        arm = self.entry.arm
+        if arm is None or self.entry.row.models is None:
+            return ""
+        named = "+".join(filter(None, (arm.model, arm.planner)))
+        return self.trials[0].arm.model if self.trials else named
+
+
+@dataclass(frozen=True)
+class Tabled:
+    """A table, its suite's hash where there were trials, what came of its rows, the trials."""
+
+    name: str
+    table: Table
+    suite: str
+    rows: Sequence[ResultRow]
+    trials: Sequence[TrialRow]
+
+
+def tabled(
+    name: str, table: Table, planned: Sequence[Planned], rows: Sequence[TrialRow], tasks: int
+) -> Tabled:
+    """The table of these rows.
+
+    Args:
+        name: of the table.
+        table: its definition.
+        planned: its rows, in order.
+        rows: of the run's folder.
+        tasks: how many the suite has.
+    """
+    by_key = {row.key: row for row in rows}
+    own = [[by_key[t.key] for t in plan.trials if t.key in by_key] for plan in planned]
+    edges: dict[tuple[str, str], tuple[int, int]] = {}
+    made = list[ResultRow]()
+    for plan, trials in zip(planned, own, strict=True):
+        who, tokens = (plan.entry.row.method, plan.model), _tokens(trials)
+        if tokens and plan.entry.row.descriptor == USUAL:
+            edges[who] = tokens
+        made.append(_row(table, plan, trials, tasks, edges.get(who)))
+    known = [row for trials in own for row in trials]
+    return Tabled(name, table, known[0].suite if known else "", made, known)
+
+
+def _row(
+    table: Table,
+    plan: Planned,
+    rows: Sequence[TrialRow],
+    tasks: int,
+    edges: tuple[int, int] | None,
+) -> ResultRow:
+    entry, scored = plan.entry, [row for row in rows if row.scored]
+    left = 0 if entry.row.missing else plan.tasks * entry.trials - len(scored)
+    tokens = _tokens(rows)
+    each = tokens or usual_tokens(entry.row.method)
+    cost = _cost_usd(plan, left, each)
+    said = [plan.model, f"{plan.tasks} of {tasks} tasks" if plan.tasks < tasks else ""]
+    said += ["one try"] if entry.trials == 1 and scored else []
+    said += [f"{tokens[0]:,} + {tokens[1]:,} tokens a trial"] if tokens else []
+    if tokens and edges and entry.row.descriptor != USUAL:
+        said.append(f"{tokens[0] / edges[0] - 1:+.0%} tokens beyond edges")
+    beyond = entry.row.paper_tokens
+    said += [] if beyond is None else [f"paper {beyond:+.0%} tokens"]
+    invalid = sum(row.status == "model_invalid" for row in scored)
+    lost = len(rows) - len(scored)
+    said += [f"{n} {what}" for n, what in ((invalid, "invalid"), (lost, "lost")) if n]
+    said += [entry.row.missing, _missing(entry, left, each, cost) if left else ""]
+    said += [UNTRAINED] if entry.untrained and not left else []
+    shown = [] if entry.untrained else scored
+    results = {
+        column: _result(
+            [row for row in shown if table.within(column, row)],
+            sum(table.within(column, trial) for trial in plan.trials),
+            entry.row.paper.get(column),
+        )
+        for column in table.columns
+    }
+    spent = sum(row.cost_usd for row in rows)
+    return ResultRow(entry.row.row, plan.model, results, tuple(filter(None, said)), spent, cost)
+
+
+def _result(scored: Sequence[TrialRow], planned: int, paper: Figure | None) -> Result:
+    gcr = sum(row.gcr or 0.0 for row in scored) / max(len(scored), 1)
+    return Result(sum(bool(row.sr) for row in scored), len(scored), planned, gcr, paper)
+
+
+def _tokens(rows: Sequence[TrialRow]) -> tuple[int, int] | None:
+    """Of a trial in the median, in and out; None where none were counted."""
+    counted = [(row.input_tokens, row.output_tokens) for row in rows if row.input_tokens]
+    if not counted:
+        return None
+    sent, got = zip(*counted, strict=True)
+    return round(median(sent)), round(median(got))
+
+
+def _missing(entry: Entry, left: int, each: tuple[int, int], cost: float | None) -> str:
+    """How much is missing, and what it would take."""
+    what = f"not run: {left:,} trial{'s' if left > 1 else ''}"
+    tokens = f"; about {left * each[0]:,} tokens in and {left * each[1]:,} out" if any(each) else ""
+    if entry.arm is None:
+        return f"{what} for want of {entry.wants}{tokens}"
+    if cost is None:
+        return f"{what}{tokens}, at a price that is not known"
+    return f"{what}; about {cost:.2f} USD" if cost else what
+
+
+def _cost_usd(plan: Planned, trials: int, tokens: tuple[int, int]) -> float | None:
+    """What trials of a model would cost, of two the dearer; None where a price is not known."""
+    arm, model = plan.entry.arm, plan.model
+    if not any(tokens) or model == SIMULATED or model.startswith(REPLAY):
+        return 0.0
+    prices = [price_of(*name.partition(":")[::2]) for name in model.split("+")]
+    if UNKNOWN in prices or (arm is not None and arm.base_url):
+        return None
+    return trials * max(p.cost(fresh=tokens[0], cached=0, output=tokens[1]) for p in prices)
