@@ -47,7 +47,7 @@ def deploy(
     leave = None if follow is None else Follow(seconds=follow, speed=speed)
     if trajectories is not None and (as_json or film or watch or leave):
         raise InputError(
-            "--trajectories moves no robot, so --json, --film, --watch and --follow do not go with it."
+            "--trajectories moves no robot: leave out --json, --film, --watch and --follow."
         )
     stored = read_world(plan)
     if stored.plan_id is None or stored.plan_id not in stored.world.plans:

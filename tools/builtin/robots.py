@@ -8,8 +8,8 @@ import numpy as np
 import shapely
 
 from ..context import Context
-from ..errors import ApprovalError, FleetError, InputError, StorageError, ToolError
-from ..fleet.arrival import Arrival, Deployment, Track
+from ..errors import ApprovalError, FleetError, InputError, ToolError
+from ..fleet.arrival import Arrival, Deployment
 from ..fleet.deploy import (
     ARRIVED_DEG,
     MAX_AGE,

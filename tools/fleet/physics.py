@@ -2,9 +2,11 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field
 
 from ..formation.value import Value
+from ..geometry.outline import FloatArray
 from .moving import Above0, Pixels, Seconds, TargetMotion
 
 RobotId = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int else name)]
@@ -67,3 +69,17 @@ class Physics(Value):
     lost: tuple[Spell, ...] = ()
     pushes: tuple[Push, ...] = ()
     targets: dict[str, TargetMotion] = Field(default_factory=dict[str, TargetMotion])
+
+
+def braking_speed(room: FloatArray, deceleration: float, step: float) -> FloatArray:
+    """The greatest speed, (n,) px/s, from which a robot stops within its room exactly, in steps.
+
+    Args:
+        room: (n,) px.
+        deceleration: px/s2.
+        step: seconds.
+    """
+    change = deceleration * step
+    unit = room / (change * step)
+    whole = np.floor((np.sqrt(1 + 8 * unit) - 1) / 2)
+    return np.asarray(change * (whole / 2 + unit / (whole + 1)))

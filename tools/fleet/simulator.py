@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..geometry.outline import FloatArray
 from ..motion.following import EXACT, NEAR, Following, Indices
 from ..motion.motion import Motion
-from .physics import Physics, Spell
+from .physics import Physics, Spell, braking_speed
 
 PERIOD = 0.05
 """Seconds of simulated time a step takes."""
@@ -199,7 +199,7 @@ class Simulator:
         fast = np.minimum(change / turned, np.sqrt(change / PERIOD * legs / turned))
         fast = np.minimum(fast, self.physics.speed)
         if self._wheels:  # what steering ahead cuts off bends one after another stays within KEPT
-            about = _braking(np.array([KEPT / 2]), self._push, PERIOD) / self.physics.radius
+            about = braking_speed(np.array([KEPT / 2]), self._push, PERIOD) / self.physics.radius
             fast = np.minimum(fast, about * legs / turned)
         fast[fast < self._push * PERIOD] = 0.0
         return np.maximum(fast**2 / (2 * self._push) - fast * PERIOD / 2, 0.0)
@@ -238,7 +238,7 @@ class Simulator:
         (points, headings), most = self._expected(), self.physics.speed
         off = points - places[:, :2] - PERIOD * len(self._queue) * places[:, 2:]
         size = _norms(off)
-        back = _braking(size, self._push, self._smoothing)
+        back = braking_speed(size, self._push, self._smoothing)
         told = places[:, 2:] - off * _ratio(back, size)[:, None]
         told *= np.minimum(_ratio(most, _norms(told)), 1.0)[:, None]
         if not self._wheels:
@@ -248,7 +248,9 @@ class Simulator:
         back_first = abs(turn) > np.pi / 2
         turn = _wrapped(turn + np.pi * back_first) * (fast >= self._push * PERIOD / 4)
         arc = np.asarray(abs(turn) * radius, dtype=float)
-        about = np.minimum(_braking(arc, self._push, self._smoothing), most / 2) * np.sign(turn)
+        about = np.minimum(braking_speed(arc, self._push, self._smoothing), most / 2) * np.sign(
+            turn
+        )
         fast = np.minimum(fast, most - abs(about)) * np.clip(np.cos(2 * turn), 0.0, 1.0)
         return np.stack([np.where(back_first, -fast, fast), about / radius], axis=1)
 
@@ -269,11 +271,11 @@ class Simulator:
         before = np.einsum("ij,ij->i", seen.rates, seen.along)
         across = seen.rates - before[:, None] * seen.along
         size = _norms(seen.off)
-        back = np.minimum(_braking(size, self._push, self._smoothing), most / 2)
+        back = np.minimum(braking_speed(size, self._push, self._smoothing), most / 2)
         wanted = -seen.off * _ratio(back, size)[:, None]
         wanted -= np.einsum("ij,ij->i", wanted, seen.along)[:, None] * seen.along
         across = self._changed(across, wanted)
-        fast = np.minimum(_braking(seen.room, self._push, self._smoothing), most)
+        fast = np.minimum(braking_speed(seen.room, self._push, self._smoothing), most)
         fast = np.clip(fast, before - change, before + change)
         told = fast[:, None] * seen.along + across
         return told * np.minimum(_ratio(most, _norms(told)), 1.0)[:, None]
@@ -289,13 +291,13 @@ class Simulator:
         turn = np.where(settled, _wrapped(looks - seen.headings), turn)
         turn[~settled & (_norms(aim) < NEAR / 4)] = 0.0
         arc = np.asarray(abs(turn) * radius, dtype=float)
-        about = _braking(arc, self._push, self._smoothing) * np.sign(turn)
+        about = braking_speed(arc, self._push, self._smoothing) * np.sign(turn)
         about = np.clip(about, -most / 2, most / 2)
         before = seen.rates[:, 1] * radius
         about = np.clip(about, before - change, before + change)
         room = np.where(ended, size, seen.room)
         room[settled] = 0.0
-        fast = np.minimum(_braking(room, self._push, self._smoothing), most - abs(about))
+        fast = np.minimum(braking_speed(room, self._push, self._smoothing), most - abs(about))
         fast *= np.clip(1 - abs(turn) / self._askew, 0.0, 1.0)
         fast = np.clip(fast, seen.rates[:, 0] - change, seen.rates[:, 0] + change)
         return np.stack([fast, about / radius], axis=1)
@@ -381,14 +383,6 @@ class Simulator:
             lasts = math.inf if spell.lasting is None else spell.lasting
             out[i] |= spell.after <= since < spell.after + lasts
         return out
-
-
-def _braking(room: FloatArray, deceleration: float, step: float) -> FloatArray:
-    """The greatest speed from which a robot stops within `room`, (n,) px, exactly, in steps."""
-    change = deceleration * step
-    unit = room / (change * step)
-    whole = np.floor((np.sqrt(1 + 8 * unit) - 1) / 2)
-    return np.asarray(change * (whole / 2 + unit / (whole + 1)))
 
 
 def _norms(vectors: FloatArray) -> FloatArray:

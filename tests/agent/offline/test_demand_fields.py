@@ -14,8 +14,7 @@ def settled(words: str) -> list[dict[str, Any]]:
     assert reading.robots is not None
     asked = question_of(Task(words, None, (), ("t1",), True, None), reading, reading.robots)
     assert asked is None
-    groups = contract_of(reading, reading.robots, ["t1"], [])["groups"]
-    assert isinstance(groups, list)
+    groups: list[dict[str, Any]] = contract_of(reading, reading.robots, ["t1"], [])["groups"]
     return groups
 
 
