@@ -130,6 +130,9 @@ def count(slots: Slots, said: Said) -> Effects:
         return refuse(f"{n:,} robots are too many; at most {MAX_ROBOTS:,} can be placed.")
     if n == said.count:
         return [{"kind": "talk", "about": "already"}]
+    of_distance = bool(said.last) and said.last[-1]["kind"] in ("distance", "out", "in")
+    if n and n > 2 * said.count and of_distance and "robotword" not in slots:
+        return ask(f"{n} of what?", f"{n} px away from it", f"{n} robots")
     kept = re.match(r"\W*keep\b", said.words, re.IGNORECASE) is None or (n or 0) <= said.count
     return None if n is None or not kept else [{"kind": "count", "robots": n}]
 

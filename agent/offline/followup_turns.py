@@ -14,6 +14,7 @@ from .followup_teams import count
 from .followup_words import chunks_of
 
 BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
+PUT_BACK = re.compile(r"\b(?:put|bring|add|give|take)\b.*\bback\b", re.IGNORECASE)
 STATED, WIDEST = 2.0, 0.11
 """Widest range of a distance that was stated: so many px, or this share of it."""
 CHOSEN = re.compile(r"\bnot\b|\b(?:then|sorry|i mean(?:t)?|rather|instead)\W*$", re.IGNORECASE)
@@ -48,6 +49,9 @@ def returned(slots: Slots, said: Said) -> Effects:
     named = {"around" if r == "circle" else r for r in slots.get("relation", ())}
     numbers = [int(n) for n in (*slots.get("num", ()), *(1 for _ in slots.get("lone", ())))]
     slots.has("undo", "back", "first", "again")
+    gone = sum(e.get("n", len(e.get("ids", ()))) for e in said.last if e["kind"] == "remove")
+    if not named and len(numbers) == 1 and numbers[0] < gone and PUT_BACK.search(said.words):
+        return [{"kind": "add", "n": numbers[0]}]
     for steps, (relations, robots) in enumerate(said.standing.past, 1):
         if named <= {*relations} and numbers in ([], [robots]) and BACK_TO.search(said.words):
             return [{"kind": "undo", "steps": steps}]

@@ -57,6 +57,8 @@ def test_rings_have_the_numbers_that_are_said(words: str, counts: list[int]) -> 
         ("Seven robots below the pencil, 30 to 50 px beneath it", [30, 50]),
         ("8 robots in a row 40 px to the left of the truck", [40, 41]),
         ("ten robots, the big coin, 20 px off", [20, 21]),
+        ("6 robots around the car, 30 px between the robots and the car", [30, 31]),
+        ("6 robots around it, keep 30 px between them and it", [30, 31]),
     ],
 )
 def test_a_distance_in_parts_or_with_a_side(words: str, clearance: list[float]) -> None:
