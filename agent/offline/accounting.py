@@ -286,6 +286,8 @@ class _Reader:
     def _count_alone(self) -> None:
         """A number that stands alone counts the robots where nothing else does."""
         free = [k for k, i in enumerate(self.items) if i.symbol == "<n>" and not self.taken[k]]
+        aside = ("background", "thing")
+        free = [k for k in free if all(i.label not in aside for i in self.items[k : k + 2])]
         if self.reading.robots is None and not self.reading.odd_count and len(free) == 1:
             quantity = self.items[free[0]].quantity
             if quantity is not None and quantity.whole is not None:

@@ -20,7 +20,8 @@ EVIDENCE = tuple(
     for words, meanings in (
         (rf"(?:on|at|by|near|in|per|for|to|each|every|all) (?:\S+ ){{0,3}}{TIPS}", "corners"),
         (r"between (?:<t>|both|the <n>|these <n>)", "between"),
-        (r"(?:around|round|about|encircl\S+|surround\S*|circling|enclosing) (?:it|<t>)",
+        (r"(?:around|round|about|encircl\S+|surround\S*|circling|enclosing) "
+         r"(?:it|<t>|(?:the|this|that|my|our) \S+)",
          "around cage shape along"),
         (r"<t> (?:\S+ ){0,3}(?:around|round) it", "around cage shape along"),
         (r"(?:in|inside|into|within|throughout|upon|aboard) (?:it|<t>)",

@@ -291,7 +291,7 @@ def _corner_count(history: History) -> int | None:
     if not measured or measured[-1].error:
         return USUAL_CORNERS
     target = json.loads(measured[-1].text)["targets"][0]
-    return int(target["corners"]) if target["kind"] == "polygonal" else None
+    return int(target["corners"]) or None
 
 
 def _label(wording: str) -> str:

@@ -85,7 +85,13 @@ def test_what_every_plan_keeps_is_understood(tail: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "tail", ["Leave the others alone.", "Ignore the rest.", "The two grey stones don't matter."]
+    "tail",
+    [
+        "Leave the others alone.",
+        "Ignore the rest.",
+        "Leave all the grey ones alone.",
+        "The two grey stones don't matter.",
+    ],
 )
 def test_things_that_are_left_alone_are_repeated(tail: str) -> None:
     reading = read_instruction(f"Seven robots in a ring round the white stone. {tail}")
@@ -94,7 +100,9 @@ def test_things_that_are_left_alone_are_repeated(tail: str) -> None:
     assert tail.rstrip(".").split()[-1] in quoted
 
 
-@pytest.mark.parametrize("thing", ["drums", "two sheds", "three lorries"])
+@pytest.mark.parametrize(
+    "thing", ["drums", "two sheds", "yellow drums in the middle, not the red ones"]
+)
 def test_one_of_several_is_which_thing(thing: str) -> None:
     assert read_instruction(f"Seven robots round the upper of the {thing}").unread == []
 
@@ -106,3 +114,9 @@ def test_the_top_of_one_thing_is_a_part_of_it() -> None:
 def test_work_on_a_thing_is_no_formation() -> None:
     reading = read_instruction("Six robots should lift the big box and carry it to the others")
     assert reading.unread or reading.stops
+
+
+def test_a_number_of_other_things_counts_no_robots() -> None:
+    words = "One robot at each tip of the red triangle; the two smaller ones are of no interest."
+    reading = read_instruction(words)
+    assert (reading.relation, reading.robots, reading.one_a_corner) == ("corners", None, True)

@@ -1,6 +1,7 @@
 """The offline planner: what it calls, says and asks, and what an answer comes to."""
 
 import asyncio
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -17,8 +18,9 @@ from formup.agent.providers.registry import model_named
 from formup.agent.report import Report
 from formup.tools.context import Context, Settings
 from formup.tools.errors import InputError
-from formup.tools.perception.image import load_picture
+from formup.tools.perception.image import load_picture, picture_from_bytes
 from formup.tools.perception.target_prompt import TargetPrompt
+from PIL import Image, ImageDraw
 
 PHOTOS = Path(__file__).parents[3] / "evals/photos/images"
 COIN = TargetPrompt(box=(175, 30, 314, 160))
@@ -77,6 +79,33 @@ def test_a_count_in_the_words_is_enough() -> None:
     report = run("Ring it with five robots", pointed=[COIN])
     assert report.positions is not None
     assert len(report.positions) == 5
+
+
+@pytest.mark.parametrize(
+    ("corners", "count"),
+    [
+        ([(320, 120), (460, 360), (180, 360)], 3),
+        ([(200, 150), (460, 150), (460, 340), (200, 340)], 4),
+    ],
+)
+def test_one_robot_at_each_corner_counts_the_corners(
+    corners: list[tuple[int, int]], count: int
+) -> None:
+    page = Image.new("RGB", (640, 480), (235, 235, 235))
+    ImageDraw.Draw(page).polygon(corners, fill=(200, 40, 40))
+    file = io.BytesIO()
+    page.save(file, "PNG")
+    report = (
+        Agent()
+        .run(
+            picture_from_bytes(file.getvalue(), "page.png"),
+            "One robot at each corner of it",
+            pointed=[TargetPrompt(box=(170, 110, 470, 370))],
+        )
+        .report
+    )
+    assert report.status == "deployed", report.message
+    assert len(report.positions or ()) == count
 
 
 def test_more_robots_than_can_be_placed_are_asked_about() -> None:
