@@ -67,6 +67,8 @@ def routes_off(
                 continue
             paths.update(zip(robots.tolist(), ways, strict=True))
             lines = np.array([LineString(way) for way in ways], dtype=object)
+            cut = (around is not solid) & _too_near(lines, solid, *pair, radius)
+            walled, robots, lines = np.concatenate([walled, robots[cut]]), robots[~cut], lines[~cut]
             hit = shapely.distance(left[:, None], lines) <= radius
             robots, met = robots[hit.any(axis=0)], hit.any(axis=1)
             around, left = shapely.union_all([around, *left[met]]), left[~met]
@@ -78,6 +80,21 @@ def routes_off(
             robots = route(robots, things, share)
     route(robots, (), 0.0)
     return [paths[i] for i in range(len(starts))]
+
+
+def _too_near(
+    lines: NDArray[np.object_],
+    solid: BaseGeometry,
+    starts: FloatArray,
+    goals: FloatArray,
+    radius: float,
+) -> NDArray[np.bool_]:
+    """Which paths, (n,), come nearer to the obstacles than ends and radius do: off things by them.
+
+    The short way off a thing is straight, whatever lies there.
+    """
+    ends = np.minimum(distances(solid, starts), distances(solid, goals))
+    return np.asarray(shapely.distance(solid, lines) < 0.98 * np.minimum(ends, radius))
 
 
 def _with_room(thing: Other, room: float, ends: FloatArray, radius: float) -> BaseGeometry:

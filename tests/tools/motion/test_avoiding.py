@@ -141,8 +141,23 @@ def test_robots_that_stand_at_a_thing_do_not_drive_over_it(seed: int) -> None:
     things = scattered(rng, 6)
     off = rng.uniform(1.0, 6.0, len(things))
     rims = [t.region.buffer(o).exterior for t, o in zip(things, off, strict=True)]
-    at = shapely.line_interpolate_point(np.repeat(np.array(rims), 2), rng.random(12), True)
+    at = shapely.line_interpolate_point(
+        np.repeat(np.array(rims), 2), rng.random(12), normalized=True
+    )
     starts = shapely.get_coordinates(at)
     for path in around(starts, np.roll(starts, 1, axis=0), things, 3.0):
         over = shapely.union_all([t.region for t in things]).intersection(LineString(path))
         assert over.length == 0
+
+
+@settings(max_examples=60, deadline=None)
+@given(SEEDS)
+def test_leaving_a_thing_never_leads_into_an_obstacle(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    things, target = scattered(rng, 8), shapely.Point(320, 240).buffer(60)
+    rim = Other("rim", "grey rim", target.buffer(9).boundary.buffer(5), 1.0)
+    angles = rng.uniform(0, 2 * np.pi, (2, 6))
+    starts = np.stack([320 + 220 * np.cos(angles[0]), 240 + 200 * np.sin(angles[0])], axis=1)
+    goals = np.stack([320 + 70 * np.cos(angles[1]), 240 + 70 * np.sin(angles[1])], axis=1)
+    for path in around(starts, goals, [*things, rim], 3.0, target):
+        assert target.distance(LineString(path)) > 2.9
