@@ -1,9 +1,10 @@
 """Paths that also keep off the other things in a picture, as far as there is a way around them.
 
-What a robot starts or is to stand on it leaves or enters by the shortest way, and what would wall
-it off is driven over: less certain things before certain ones. Frame: image pixels.
+What a robot starts or ends beside it leaves by the shortest way; what it starts or ends on is not
+in its way, and what would wall it off is driven over: less certain things before certain ones.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -74,11 +75,11 @@ def routes_off(
             around, left = shapely.union_all([around, *left[met]]), left[~met]
         return walled
 
-    robots = np.arange(len(starts))
-    for things in (site.others, [thing for thing in site.others if thing.sure]):
-        for share in ROOM_SHARES:
-            robots = route(robots, things, share)
-    route(robots, (), 0.0)
+    for robots, things in _by_things_stood_on(starts, goals, site.others):
+        for off in (things, [thing for thing in things if thing.sure]):
+            for share in ROOM_SHARES:
+                robots = route(robots, off, share)
+        route(robots, (), 0.0)
     return [paths[i] for i in range(len(starts))]
 
 
@@ -104,3 +105,19 @@ def _with_room(thing: Other, room: float, ends: FloatArray, radius: float) -> Ba
     reach = min(room, NEAR_END * spare)
     slack = DETAIL * reach
     return thing.region.simplify(slack).buffer(reach + slack, quad_segs=2)
+
+
+def _by_things_stood_on(
+    starts: FloatArray, goals: FloatArray, others: Sequence[Other]
+) -> list[tuple[Indices, list[Other]]]:
+    """Robots with the things that each can keep off: none that its centre starts or ends on."""
+    groups: defaultdict[bytes, list[int]] = defaultdict(list)
+    ends = np.concatenate([starts, goals])
+    near = [distances(thing.region, ends).reshape(2, -1).min(axis=0) for thing in others]
+    on: NDArray[np.bool_] = np.reshape(near, (-1, len(starts))) <= 0
+    for robot in range(len(starts)):
+        groups[on[:, robot].tobytes()].append(robot)
+    return [
+        (np.array(same), [t for t, under in zip(others, on[:, same[0]], strict=True) if not under])
+        for same in groups.values()
+    ]

@@ -168,7 +168,8 @@ def _matched(
     nearest = min(min_spacing(team.starts), min_spacing(goals))
     roomy = min(ROOMY * nearest, MOST_ROOM * team.radius)
     found, apart = match(everyone, straight, roomy), roomy
-    for apart in (roomy, *(separation(team.starts, goals, r) for r in (radius, team.radius))):
+    radii = (radius,) if len(standing) else (radius, team.radius)
+    for apart in (roomy, *(separation(team.starts, goals, r) for r in radii)):
         if apart == roomy < 2 * radius * EXACT:
             continue
         found = match(everyone, straight, apart)

@@ -27,8 +27,9 @@ of the shortest."""
 Bend = tuple[int, float]
 BEND: Bend = (3, 0.01)
 CLOSE: Bend = (8, 0.001)
+FEW = 12
 """Segments of a quarter circle around a corner, and by which share paths keep off it further than
-they must; close to it where nothing else leads through."""
+they must; close to it where nothing else leads through, and bodies are few enough to look."""
 ROOM_SHARES = (0.7, 0.3, 0.03)
 """How much of the smallest clearance at starts and goals paths keep: well away where there is
 room, squeezing past where not."""
@@ -228,8 +229,9 @@ class _Ground:
         paths = list(ways)
         for group, keeps in self._groups(starts, goals):
             left = group
-            tries = [(keep, self.frame, BEND) for keep in keeps]
-            for keep, frame, bend in [*tries, (keeps[-1], None, BEND), (keeps[-1], None, CLOSE)]:
+            tries = [(keep, self.frame, BEND) for keep in keeps] + [(keeps[-1], None, BEND)]
+            tries += [(keeps[-1], None, CLOSE)] if len(bodies) <= FEW else []
+            for keep, frame, bend in tries:
                 if len(bodies):
                     graph = _graph_past(self.solid, keep, bodies, frame, bend)
                 else:

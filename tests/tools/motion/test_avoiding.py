@@ -125,15 +125,6 @@ def test_what_one_robot_stands_on_is_still_in_the_way_of_the_others() -> None:
     assert not crossed(past, thing, 2.0)
 
 
-def test_a_robot_beside_or_on_a_thing_leaves_it_and_enters_it_by_the_shortest_way() -> None:
-    thing = box("c1", 280, 200, 360, 280)
-    beside, deep, far = (320, 197.5), (320, 275), (600, 250)
-    starts, goals = ends(beside, deep, (320, 400), (320, 390)), ends((320, 400), far, beside, deep)
-    for path in around(starts, goals, [thing], 2.0):
-        over = thing.region.intersection(LineString(path)).length
-        assert over <= 5.01, path
-
-
 @settings(max_examples=60, deadline=None)
 @given(SEEDS)
 def test_robots_that_stand_at_a_thing_do_not_drive_over_it(seed: int) -> None:
