@@ -27,7 +27,7 @@ EVIDENCE = tuple(
         (r"(?:in|inside|into|within|throughout|upon|aboard) (?:it|<t>)",
          "inside centre shape"),
         (r"(?:on|onto|across|over|all over) (?:it|<t>)", "inside centre shape along"),
-        (r"(?:alongside|beside|next to|along|parallel to|in front of|behind|beneath|below|above) "
+        (r"(?:alongside|next to|along|parallel to|in front of|behind|beneath|below|above) "
          r"(?:it|<t>)", "along shape between"),
     )
 )  # fmt: skip

@@ -20,7 +20,7 @@ from .routes import NOBODY, NoRouteError
 REACHES, SPOKES, SPOTS = (1.2, 2.0, 3.0, 4.5, 7.0, 10.0), 12, 8
 """Robots wait so many times as far from their starts as they stay apart, in so many directions;
 so many of those spots are tried."""
-PARKED, REROUTED, ASIDE = 100, 60, 40
+PARKED, REROUTED, ASIDE = 100, 12, 40
 """Most robots whose starts and goals others are led around, most such ways that are tried, and most
 robots that are asked to step aside."""
 ROUNDS, SWAPS = 12, 200
