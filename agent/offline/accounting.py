@@ -7,15 +7,24 @@ that is repeated to the person, or is left unread: then the planner asks and quo
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from .demand_fields import LENGTHS, Fields
-from .demands import Item, demands_in, items_of, says_inside, says_more, sentences, stops_in
+from .demand_fields import Fields
+from .demands import (
+    Item,
+    demands_in,
+    items_of,
+    says_inside,
+    says_more,
+    says_others,
+    sentences,
+    stops_in,
+)
 from .drawn_forms import form_in
-from .evidence import weighed
+from .evidence import meaning_of, weighed
 from .languages import foreign_language
 from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
 from .reading import Reading
 from .spans import may_open
-from .tagging import Tagging, Token, in_use, tag, tokens, word_classes
+from .tagging import tag, tokens, word_classes
 
 SURE_BACKGROUND, SURE_ALONE, SURE_NUMBER = 0.5, 0.8, 0.8
 """Least probabilities of background, of a single word that is, and of a clause with a number."""
@@ -23,6 +32,8 @@ SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 """Share of a sentence's words that are no command from which on all of it is background."""
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
 """What a reason or purpose begins with."""
+OF_OTHERS = frozenset(("keep_out", "faced", "left_alone", "rings_of"))
+"""Demands in which a phrase for a thing is for another one than the arrangement is about."""
 LONGEST_CALL = 3
 """Words of an exclamation that only calls somebody: "Ball boys!"."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
@@ -64,25 +75,12 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
     known = may_command([w.text for w in words], max(meaning, key=lambda m: meaning[m]))
     tagging = tag(words, known)
     items = [_drawn(item, span) for item in items_of(text, words, tagging)]
-    meaning = _meaning(words, tagging, items)
+    meaning = meaning_of(words, tagging, items)
     meanings = sorted(meaning.items(), key=lambda m: -m[1])
     stops = tuple((kind, " ".join(text[a:b].split())) for kind, a, b in stops_in(items))
     language = foreign_language([w.text for w in words]) or ""
     reading = Reading(meanings, form=form, stops=stops, language=language)
     return _Reader(text, items, reading, metres_per_pixel).read()
-
-
-def _meaning(words: Sequence[Token], tagging: Tagging, items: Sequence[Item]) -> dict[str, float]:
-    """What the command means, where lengths with the words about them say nothing of it."""
-    lengths = [d for d in demands_in(items) if d.sets in (*LENGTHS, "robot_diameter", "apart")]
-    spans = [(items[d.first].start, items[d.last - 1].end) for d in lengths]
-    labels = [
-        "length" if any(a <= word.start < b for a, b in spans) else label
-        for word, label in zip(words, tagging.labels, strict=True)
-    ]
-    bare = in_use().meaning([w.text for w in words], labels)
-    meaning = max(bare, tagging.meaning, key=lambda m: max(m.values()))
-    return weighed(meaning, items)
 
 
 def _drawn(item: Item, span: tuple[int, int]) -> Item:
@@ -119,7 +117,7 @@ class _Reader:
         for demand in self.demands:
             if not self.fields.apply(demand):
                 self.reading.unread.append(self._quote(demand.first, demand.last))
-            elif demand.sets not in ("keep_out", "faced"):  # what it names is the target
+            elif demand.sets not in OF_OTHERS:  # what it names is the target
                 self.fields.mentioned += range(demand.first, demand.last)
             self.taken[demand.first : demand.last] = [True] * (demand.last - demand.first)
         self._count_corners()
@@ -262,6 +260,8 @@ class _Reader:
                 first = phrase.lower().split()[0]
                 if k in self.prevented and self.reading.relation == "cage":
                     self.taken[k] = False
+                elif says_others(phrase):
+                    self.reading.background.append(phrase)
                 elif self._demands(phrase) or (self.reading.things and not may_open(first)):
                     self.reading.unread.append(phrase)
                 else:

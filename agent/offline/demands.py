@@ -158,6 +158,11 @@ def says_more(phrase: str) -> bool:
     return any(pattern.search(phrase.lower()) for pattern in _patterns("in_things"))
 
 
+def says_others(phrase: str) -> bool:
+    """Whether a phrase for a thing says that it is not meant: "the grey ones don't matter"."""
+    return any(pattern.search(phrase.lower()) for pattern in _patterns("others"))
+
+
 def says_inside(phrase: str) -> bool:
     """Whether a phrase for a thing is about its inside: "the inside of the box"."""
     return any(pattern.search(phrase.lower()) for pattern in _patterns("insides"))

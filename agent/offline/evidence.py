@@ -6,11 +6,12 @@
 import re
 from collections.abc import Mapping, Sequence
 
-from .demands import Item
-from .tagging import word_classes
+from .demand_fields import LENGTHS
+from .demands import Item, demands_in
+from .tagging import Tagging, Token, in_use, word_classes
 
 UNLIKELY, LESS_LIKELY = 0.002, 0.3
-"""What is left of the probability of an arrangement that the words rule out, and of several."""
+"""Factors for arrangements that the words rule out, and for those that are none of one thing."""
 LIKELY = 0.1
 """What is added to that of the arrangement that they are usually said of."""
 ANY = frozenset(("several", "ask"))
@@ -32,8 +33,21 @@ EVIDENCE = tuple(
     )
 )  # fmt: skip
 """Words before a thing, and the arrangements that they can be said of, the usual one first."""
-ENCLOSING = ("enclose", "enclosure", "prevent", "surround", "watch")
+ENCLOSING = ("enclose", "enclosure", "prevent", "surround")
 """After verbs of these classes "in" and "on" belong to the verb: "fence in", "close in on"."""
+
+
+def meaning_of(words: Sequence[Token], tagging: Tagging, items: Sequence[Item]) -> dict[str, float]:
+    """What the command means, where lengths with the words about them say nothing of it."""
+    lengths = [d for d in demands_in(items) if d.sets in (*LENGTHS, "robot_diameter", "apart")]
+    spans = [(items[d.first].start, items[d.last - 1].end) for d in lengths]
+    labels = [
+        "length" if any(a <= word.start < b for a, b in spans) else label
+        for word, label in zip(words, tagging.labels, strict=True)
+    ]
+    bare = in_use().meaning([w.text for w in words], labels)
+    meaning = max(bare, tagging.meaning, key=lambda m: max(m.values()))
+    return weighed(meaning, items)
 
 
 def weighed(meaning: Mapping[str, float], items: Sequence[Item]) -> dict[str, float]:

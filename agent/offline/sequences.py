@@ -29,9 +29,7 @@ def stages_of(task: Task) -> tuple[str, ...]:
     if len(parts) < 2 or not task.deploy or task.standing:
         return (task.instruction,)
     readings = [read_instruction(words, task.metres_per_pixel) for words in parts]
-    more = any(
-        reading.robots for reading in readings[1:]
-    )  # the same robots, or others beside them?
+    more = any(reading.robots for reading in readings[1:])  # others, or the same robots?
     unclear = any(r.stops or r.unread or not r.sure or r.relation == "ask" for r in readings)
     return (task.instruction,) if more or unclear else tuple(parts)
 

@@ -5,19 +5,9 @@ import pytest
 from formup.agent.agent import Agent
 from formup.tools.context import Settings
 from formup.tools.fleet.protocol import Motion
-from formup.tools.perception.image import Picture, picture_from_array
+from formup.tools.perception.image import Picture
 
 RED, BLUE = (250, 220), (560, 300)
-
-
-@pytest.fixture(scope="module")
-def picture() -> Picture:
-    """A red disc and a blue one, 45 and 40 px in radius."""
-    pixels = np.full((432, 768, 3), 200, np.uint8)
-    y, x = np.mgrid[:432, :768]
-    for (cx, cy), radius, colour in ((RED, 45, (200, 40, 40)), (BLUE, 40, (40, 60, 210))):
-        pixels[(x - cx) ** 2 + (y - cy) ** 2 < radius**2] = colour
-    return picture_from_array(pixels)
 
 
 def test_a_ring_and_then_a_row_are_two_plans_each_driven_to(
