@@ -53,8 +53,7 @@ def routes_off(
 
     def route(robots: Indices, things: Sequence[Other], share: float) -> Indices:
         """Find paths past things; return the robots that none leads past them."""
-        grown = [_with_room(t, share * (room_of(site) + t.blur), near, radius) for t in things]
-        left = np.array(grown, dtype=object)
+        left = _with_room(things, share, site, near, radius)
         around, walled = solid, robots[:0]
         while len(robots):
             pair = starts[robots], goals[robots]
@@ -98,13 +97,19 @@ def _too_near(
     return np.asarray(shapely.distance(solid, lines) < 0.98 * np.minimum(ends, radius))
 
 
-def _with_room(thing: Other, room: float, ends: FloatArray, radius: float) -> BaseGeometry:
-    """A thing with room around it, px, less where a path ends near that does not end at it."""
-    off = distances(thing.region, ends)
-    spare = float(off[off > BESIDE * radius + 0.1].min(initial=np.inf)) - radius
-    reach = min(room, NEAR_END * spare)
-    slack = DETAIL * reach
-    return thing.region.simplify(slack).buffer(reach + slack, quad_segs=2)
+def _with_room(
+    things: Sequence[Other], share: float, site: Site, ends: FloatArray, radius: float
+) -> NDArray[np.object_]:
+    """Things with a share of their room around them, less where a path ends near, not at, them."""
+
+    def grown(thing: Other) -> BaseGeometry:
+        off = distances(thing.region, ends)
+        spare = float(off[off > BESIDE * radius + 0.1].min(initial=np.inf)) - radius
+        reach = min(share * (room_of(site) + thing.blur), NEAR_END * spare)
+        slack = DETAIL * reach
+        return thing.region.simplify(slack).buffer(reach + slack, quad_segs=2)
+
+    return np.array([grown(thing) for thing in things], dtype=object)
 
 
 def _by_things_stood_on(
