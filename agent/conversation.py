@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, Unpack
 
-from ..tools.context import Services, Settings
+from ..tools.context import Context, Services, Settings
 from ..tools.errors import InputError
 from ..tools.fleet.protocol import Fleet
 from ..tools.perception.image import Picture
@@ -265,6 +265,13 @@ class Session:
         return self._sync(self.aimage(picture))
 
     @property
+    def context(self) -> Context:
+        """What tools would work with now; to look and to try, for only turns decide anything."""
+        if self.run is None:
+            return Context.of(self.picture, self.settings, services=self.services)
+        return replace(self.run.context, world=self.run.world, steps=self.run.steps)
+
+    @property
     def _run(self) -> Run:
         if self.run is None:
             raise InputError(NOTHING_SAID)
@@ -304,8 +311,7 @@ class Session:
         """What follow-ups are read by."""
         if run is None:
             return None
-        context = replace(run.context, world=run.world, steps=run.steps)
-        facts = standing(context)
+        facts = standing(replace(run.context, world=run.world, steps=run.steps))
         size, scale = run.world.picture.size, run.world.metres_per_pixel
         return None if facts is None else Standing.of(facts, size=size, metres_per_pixel=scale)
 

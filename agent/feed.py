@@ -7,12 +7,17 @@ latest alone, so that a slow subscriber holds up nobody, least of all robots.
 import asyncio
 import time
 from collections import deque
-from collections.abc import AsyncGenerator, Mapping, Sequence
+from collections.abc import AsyncGenerator, Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from ..tools.context import Context, Shown
 from ..tools.errors import StorageError
-from ..tools.fleet.protocol import Pose
+from ..tools.fleet.follow import Rigid
+from ..tools.fleet.protocol import Fleet, Pose
+from ..tools.fleet.simulated import SimulatedFleet
+from ..tools.formation.plan import Plan
 from .store.protocol import Event, EventKind, EventLog, StoredSession
 from .turns import Turn
 
@@ -22,6 +27,10 @@ POLL = 1.0
 """Seconds after which a feed looks whether another process has gone on with the session."""
 STAMPED = ("turn", "resume")
 """Events that say who asked for them."""
+
+
+def _shown_by_fleet(poses: tuple[Pose, ...], moved: Rigid | None = None, /) -> None:
+    """Nothing more to do: `Feed.moved` is given the poses."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +57,7 @@ class Feed:
         loop: that subscribers and turns run in; None before any do.
         turn: the turn that is under way in this process, or was last.
         followers: how many subscribe.
+        watching: how many of them watch the robots.
         keys: digest and number of each turn that was asked for, by the key it was asked under.
     """
 
@@ -55,7 +65,7 @@ class Feed:
         self.stored, self.last = stored, 0
         self.turn: Turn | None = None
         self.loop: asyncio.AbstractEventLoop | None = None
-        self.followers, self._ended = 0, False
+        self.followers, self.watching, self._ended = 0, 0, False
         self.keys: dict[str, tuple[str, int]] = {}
         self._kept: deque[Event] = deque(maxlen=MOST_KEPT)
         self._poses = Poses(0, ())
@@ -91,22 +101,34 @@ class Feed:
         self._ended = True
         self._wake()
 
-    async def subscribe(self, after: int = 0) -> AsyncGenerator[Event | Poses]:
+    @contextmanager
+    def view(self, context: Context, plan: Plan, fleet: Fleet) -> Generator[Shown]:
+        """Simulated robots drive in real time while anybody watches; see `Services.view`."""
+        if self.watching and isinstance(fleet, SimulatedFleet):
+            fleet.pace.speed = fleet.pace.speed or 1.0
+        yield _shown_by_fleet
+
+    async def subscribe(
+        self, after: int = 0, *, watching: bool = False
+    ) -> AsyncGenerator[Event | Poses]:
         """What happens, from an event's number on.
 
         Args:
             after: the number of the last event that the subscriber has seen.
+            watching: whether a person watches the robots.
 
         Raises:
             StorageError: the session cannot be read.
         """
         self.followers += 1
+        self.watching += watching
         self.loop = asyncio.get_running_loop()
         try:
             async for what in self._follow(after):
                 yield what
         finally:
             self.followers -= 1
+            self.watching -= watching
 
     async def _follow(self, after: int) -> AsyncGenerator[Event | Poses]:
         seen = 0

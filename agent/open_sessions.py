@@ -77,7 +77,7 @@ class OpenSessions:
         stored = self._store.open(session)
         events, old = stored.events(), self.sessions.get(session)
         feed = self.feeds.setdefault(session, Feed(stored, ()))
-        services = Services(claim=self._owner.claim, watch=feed.moved)
+        services = Services(claim=self._owner.claim, watch=feed.moved, view=feed.view)
         services.stopped |= self._stopped.get(session, set())
         if old is not None and old.services is not None:
             services.stopped |= old.services.stopped

@@ -299,13 +299,10 @@ class Service:
         return False
 
     def fork(self, session: str, turn: int | None = None) -> str:
-        """A conversation of its own that begins as another did.
+        """The id of a new conversation that begins as another did, which stays as it is.
 
         Args:
             turn: after how many turns of it; all by default.
-
-        Returns:
-            Its id. The other one stays as it is.
         """
         made = fork(self.store, self.store.open(session), turn)
         self.reopen(made.id)
@@ -315,10 +312,12 @@ class Service:
         """What happened in a conversation, from a number on."""
         return self.store.open(session).events(after)
 
-    async def follow(self, session: str, after: int = 0) -> AsyncGenerator[Event | Poses]:
+    async def follow(
+        self, session: str, after: int = 0, *, watching: bool = False
+    ) -> AsyncGenerator[Event | Poses]:
         """What happens in a conversation, as it happens; see `Feed.subscribe`."""
         await self.fresh(session)
-        async for told in self._feeds[session].subscribe(after):
+        async for told in self._feeds[session].subscribe(after, watching=watching):
             yield told
 
     async def delete(self, session: str) -> None:

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from ...agent.approvals import Waiting
 from ...agent.report import Report
 from ...agent.session import Run
+from ...tools.formation.editing.edit_kinds import Edit
 from ...tools.perception.target_prompt import TargetPrompt
 
 Key = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[\x21-\x7e]+$")]
@@ -32,6 +33,19 @@ class Edits(Form):
     """Edits as the tool `edit_formation` takes them, done in order."""
 
     edits: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=20)]
+
+
+class Preview(Form):
+    """Edits to try on a plan, the one that stands by default."""
+
+    edits: Annotated[tuple[Edit, ...], Field(min_length=1, max_length=20)]
+    plan_id: Annotated[str | None, Field(max_length=100)] = None
+
+
+class Pointing(Form):
+    """What a person points at."""
+
+    prompt: TargetPrompt
 
 
 class Undo(Form):
@@ -110,6 +124,24 @@ class TurnState(BaseModel):
             by=by,
             report=report,
         )
+
+
+class Outlined(BaseModel):
+    """An outline as it would be measured.
+
+    Attributes:
+        rings: around it and around its holes, closed, px.
+        confidence: alpha; `sound` where it reaches `threshold`.
+        doubtful: whether somebody should look at it before robots are sent there.
+    """
+
+    id: str
+    label: str
+    rings: list[list[list[float]]]
+    confidence: float
+    threshold: float
+    sound: bool
+    doubtful: bool
 
 
 class SessionFacts(BaseModel):

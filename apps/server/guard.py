@@ -14,7 +14,7 @@ from ...tools.errors import FormupError, InputError
 from .hub import Hub, error_response, told
 from .tokens import Person
 
-OPEN = ("/health/", "/v1/pictures/")
+OPEN = ("/health/", "/v1/pictures/", "/page/")
 """Paths that want no token: what they show is no secret, or has one of its own in its address."""
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -57,7 +57,7 @@ class Guard:
             self._check_place(scope["method"], headers)
             async with self._known(scope["path"], headers) as person:
                 scope.setdefault("state", {})["person"] = person
-                counts = nullcontext() if scope["path"].startswith(OPEN) else self._counted(person)
+                counts = nullcontext() if _is_open(scope["path"]) else self._counted(person)
                 with counts:
                     await self._app(scope, self._bounded(receive, headers, refused), watched)
             if refused and not begun:
@@ -120,7 +120,7 @@ class Guard:
             )
 
     def _person(self, path: str, headers: Headers) -> Person:
-        if path.startswith(OPEN) or not self._hub.tokens.needed:
+        if _is_open(path) or not self._hub.tokens.needed:
             return Person()
         kind, _, token = headers.get("authorization", "").partition(" ")
         person = self._hub.tokens.person(token.strip()) if kind.lower() == "bearer" else None
@@ -187,6 +187,10 @@ class _RefusedError(Exception):
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
         self.status = status
+
+
+def _is_open(path: str) -> bool:
+    return path == "/" or path.startswith(OPEN)
 
 
 def _parsed_address(text: str) -> SplitResult:

@@ -51,14 +51,17 @@ async def place_of(
 
 @router.get("/events", response_class=EventSourceResponse)
 async def events(
-    session: str, hub: AHub, place: Annotated[Place, Depends(place_of)]
+    session: str,
+    hub: AHub,
+    place: Annotated[Place, Depends(place_of)],
+    watching: Annotated[bool, Query(description="simulated robots drive in real time")] = False,
 ) -> AsyncIterable[ServerSentEvent]:
     """Everything from an event on, and where the robots are while they drive."""
     run = _run_before(hub.service.events(session), place.number) if place.number > 0 else 0
     hub.streams += 1
     hub.metrics.streams.inc()
     try:
-        async for told in hub.service.follow(session, max(place.number, 0)):
+        async for told in hub.service.follow(session, max(place.number, 0), watching=watching):
             if isinstance(told, Poses):
                 yield _event(poses_data(told), None)
             else:

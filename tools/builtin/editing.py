@@ -5,6 +5,7 @@ Whatever an edit does not name stays as it is, and every robot keeps its number.
 
 import json
 from collections.abc import Sequence
+from itertools import count
 from typing import Annotated, Any
 
 import numpy as np
@@ -101,6 +102,21 @@ def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]
             findings=findings,
         )
     return made
+
+
+def previewed(world: World, edits: Sequence[Edit], plan_id: str | None = None) -> Plan:
+    """What edits would make of a plan, certified or with findings; nothing is changed.
+
+    Raises:
+        ToolError: there is no such plan, or an edit makes no sense.
+    """
+    plan = world.plan(plan_id).plan
+    made = edited(plan, edits, world.whole_site, world.version_of)
+    fleet = plan.formation.robots
+    free = (str(n) for n in count(1) if str(n) not in fleet)
+    taking = [next(free) if name is None else name for name in made.robots]
+    more = [name for name in taking if name not in fleet]
+    return made.plan.for_robots(taking, (*fleet, *more))
 
 
 def _edit_facts(edit: Edit) -> dict[str, Any]:

@@ -73,18 +73,26 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
             picture of it.
     """
     for given in prompts:
-        prompt = _correcting(context.world, given)
-        if prompt.text is not None:
-            context, prompt = _found_by_text(context, prompt, prompt.text)
-        target = _measured(context, prompt)
-        threshold = _threshold(context, prompt.how)
+        context, target, threshold = measured(context, given)
         if target.confidence < threshold and not _believed(context.world, target):
             context.observed(context.world.having(doubted=target))
             shown = closer_view(context, target)
-            raise _insufficient(target.confidence, threshold, prompt.how).showing(shown)
+            raise _insufficient(target.confidence, threshold, target.prompt).showing(shown)
         context = context.at(context.world.with_target(target))
         context.observed(context.world)
     return context.world
+
+
+def measured(context: Context, given: TargetPrompt) -> tuple[Context, Target, float]:
+    """What a prompt points at, however doubtful, and the least confidence it is used at.
+
+    Raises:
+        ToolError: the prompt does not fit the picture, or nothing is to be seen there.
+    """
+    prompt = _correcting(context.world, given)
+    if prompt.text is not None:
+        context, prompt = _found_by_text(context, prompt, prompt.text)
+    return context, _measured(context, prompt), _threshold(context, prompt.how)
 
 
 def _believed(world: World, target: Target) -> bool:

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, MultiLineString, Point
+from shapely.geometry import LineString, MultiLineString
 from shapely.geometry.base import BaseGeometry
 
-from ..errors import ToolError
+from ..formation.checking.allowed import allowed_area, curve_of
 from ..formation.checking.verdict import Part, parts_of
-from ..formation.contract import CENTRE_SHARE, MAX_LENGTH, OUTSIDE, Contract
-from ..formation.placement.place import Site, reference_curve
-from ..formation.placement.ring_parts import sides_of
+from ..formation.contract import OUTSIDE, Contract
+from ..formation.placement.place import Site
 from ..geometry.curves import Curve
 from ..geometry.outline import FloatArray, Outline, distances
 from ..geometry.sampling import corner_points, nearest
@@ -61,7 +60,7 @@ def draw_areas(canvas: Canvas, contract: Contract, site: Site, points: FloatArra
     """Tint where robots may stand and where none may, then draw every target's outline."""
     picture = shapely.box(-0.5, -0.5, site.width - 0.5, site.height - 0.5)
     for part in parts_of(contract, points, site):
-        area = _allowed_area(part)
+        area = allowed_area(part)
         if area is not None:
             shown = area.intersection(picture)
             canvas.tint(shown, ALLOWED, 0.26)
@@ -233,43 +232,11 @@ def directions(contract: Contract, site: Site, points: FloatArray) -> list[Float
     return ways
 
 
-def _allowed_area(part: Part) -> BaseGeometry | None:
-    """Where the centres of a group's robots may be, image pixels, as far as it is an area."""
-    group, radius = part.group, part.radius
-    if group.relation == "centre":
-        outline = part.outline
-        return Point(outline.centre).buffer(CENTRE_SHARE * outline.size)
-    if group.relation == "inside":
-        return part.outline.polygon.buffer(-(part.clearance[0] + radius))
-    if group.relation not in ("around", "cage", "along") or part.clearance[1] >= MAX_LENGTH:
-        return None
-    least, greatest = (limit + radius for limit in part.clearance)
-    solid = part.outline.filled
-    # What lies far outside the picture is never seen, and costs time to make.
-    reach = min(greatest, part.site.width + part.site.height)
-    ring = solid.buffer(reach).difference(solid.buffer(least))
-    if group.sides is not None:
-        return ring.intersection(sides_of(group, part.site))
-    curve = _curve_of(part) if group.relation == "along" else None
-    if curve is None:
-        return ring
-    return ring.intersection(curve.geometry().buffer(reach, cap_style="flat"))
-
-
-def _curve_of(part: Part) -> Curve | None:
-    """The curve that the group stands on; None where the picture leaves nothing of it."""
-    try:
-        curve = reference_curve(part.group, part.site, part.radius)
-    except ToolError:
-        return None
-    return curve if curve.lines else None
-
-
 def _guides(part: Part) -> list[FloatArray]:
     """Polylines to dash, image pixels: straight across a cage's gaps, else the reference curve."""
     if part.group.relation == "inside" or _is_free(part):
         return []
-    curve = _curve_of(part)
+    curve = curve_of(part)
     if curve is None:
         return []
     if part.group.relation != "cage":
@@ -287,7 +254,7 @@ def _widest_opening(part: Part) -> Opening | None:
     """A cage's straight between robots' edges, another ring's along the curve."""
     if part.group.relation not in ("around", "cage") or len(part.points) < 2:
         return None
-    curve = _curve_of(part)
+    curve = curve_of(part)
     if curve is None:
         return None
     stations = _feet_on_curve(part.points, curve)

@@ -180,10 +180,10 @@ def draft_of(plan: Plan, site: Site) -> Draft:
         Part(group, points[mine], mine, site, radius)
         for group, mine in zip(contract.groups, places, strict=True)
     ]
-    return Draft(contract, (), _numbers(plan), site).with_parts(parts)
+    return Draft(contract, (), numbers_of(plan), site).with_parts(parts)
 
 
-def _numbers(plan: Plan) -> dict[int, int]:
+def numbers_of(plan: Plan) -> dict[int, int]:
     """What each robot is called by: its id where that is a number, else its rank in the fleet."""
     names = plan.formation.robot_of_place
     if all(name.isdecimal() for name in names):

@@ -205,7 +205,13 @@ class Merge(_Edit):
 
 
 class Place(_Edit):
-    """One robot to a point, by so much, or beside a thing; nobody else moves."""
+    """One robot to a point, by so much, or beside a thing; nobody else moves.
+
+    Attributes:
+        stays: in its group, whose demands still hold for it; `near` takes it to the nearest place
+            that the group's clearance allows. Left out, it stands by itself. For hands that drag
+            a robot: models are not offered it.
+    """
 
     ONE_OF = ("to", "by", "target")
     kind: Literal["place"] = "place"
@@ -213,6 +219,7 @@ class Place(_Edit):
     to: Pair | None = None
     by: Pair | None = None
     target: str | None = None
+    stays: Literal["there", "near"] | None = None
 
 
 class Heading(_GroupEdit):

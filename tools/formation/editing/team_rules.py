@@ -13,7 +13,9 @@ from ...errors import ToolError
 from ...geometry.cages.cage_places import fewest_cage
 from ...geometry.interior import ground
 from ...geometry.outline import FloatArray
+from ..checking.allowed import allowed_area
 from ..checking.surroundings import robots_to_close
+from ..checking.verdict import Part as Placed
 from ..contract import (
     MAX_ROBOTS,
     MIN_SPACING,
@@ -190,7 +192,8 @@ def _placed(draft: Draft, edit: Place) -> Draft:
     """One robot elsewhere; its group has a hole where it stood, and says so."""
     (index,) = draft.indices((edit.robot,))
     before = len(draft.parts)
-    draft = alone(draft, (int(index),))
+    if edit.stays is None:
+        draft = alone(draft, (int(index),))
     k = next(k for k, part in enumerate(draft.parts) if index in part.was)
     part = draft.parts[k]
     i = int(np.flatnonzero(part.was == index)[0])
@@ -200,6 +203,8 @@ def _placed(draft: Draft, edit: Place) -> Draft:
         points[i] = _beside(part, points[i], edit.target)
     else:
         points[i] = edit.to if edit.to is not None else points[i] + np.asarray(edit.by)
+    if edit.stays == "near":
+        points[i] = _allowed_near(part, points[i])
     targets = (edit.target,) if edit.target is not None else part.group.targets
     moved = part.to(points, targets=targets)
     draft = draft.with_parts(moved if p is part else p for p in draft.parts)
@@ -207,6 +212,14 @@ def _placed(draft: Draft, edit: Place) -> Draft:
         note = f"Robot {edit.robot} stands by itself; nobody else moves, so its old place is empty."
         draft = replace(draft, notes=(*draft.notes, note))
     return draft
+
+
+def _allowed_near(part: Part, point: FloatArray) -> FloatArray:
+    """The nearest point that the group's clearance allows; itself where that is no area."""
+    area = allowed_area(Placed(part.group, part.points, 0, part.radius, part.site))
+    if area is None or area.is_empty:
+        return point
+    return shapely.get_coordinates(shapely.shortest_line(area, shapely.Point(point)))[0]
 
 
 def _beside(part: Part, point: FloatArray, name: str) -> FloatArray:

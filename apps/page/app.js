@@ -1,0 +1,86 @@
+// What the page knows, in one place; parts of it are told when that changes.
+import { Problem, call, fetched, newKey } from "./api.js";
+import { announce, byId } from "./dom.js";
+
+export const app = {
+  session: null, // its id
+  state: null, // as GET /sessions/ID has it
+  scene: null, // as GET /sessions/ID/scene has it
+  looking: null, // the id of an earlier plan that is looked at
+  picture: null, // the address of the picture
+  things: [], // what stands out in it
+  pointed: [], // {prompt, outline}: what the next words point at
+  turns: new Map(), // plan id -> how many turns led to it
+  busy: false,
+  moving: false,
+  poses: [],
+  said: "", // words that a failed request gives back
+};
+
+const listeners = new Map();
+export const on = (name, listener) => listeners.set(name, [...(listeners.get(name) ?? []), listener]);
+export const tell = (name, value) => listeners.get(name)?.forEach((listener) => listener(value));
+
+export const at = (path = "") => `/sessions/${app.session}${path}`;
+
+// Errors stand where they arise, and are said.
+export const fail = (place, problem) => {
+  if (!(problem instanceof Problem)) throw problem;
+  byId(place).textContent = problem.message;
+  byId(place).hidden = false;
+};
+
+export const clear = (place) => (byId(place).hidden = true);
+
+let refreshed = 0;
+export const refresh = async () => {
+  const mine = ++refreshed, session = app.session;
+  const query = { plan: app.looking };
+  const [state, scene] = await Promise.all([call("GET", at()), call("GET", at("/scene"), { query })]);
+  if (mine !== refreshed || session !== app.session) return;
+  const changed = app.scene?.picture.sha256 !== scene.picture.sha256;
+  Object.assign(app, { state, scene });
+  if (changed) await loadPicture();
+  tell("scene");
+};
+
+const loadPicture = async () => {
+  if (app.picture) URL.revokeObjectURL(app.picture);
+  app.picture = URL.createObjectURL(await fetched(at("/picture")));
+  app.things = [];
+  const session = app.session;
+  call("GET", at("/things")).then((things) => {
+    if (session === app.session) app.things = things;
+    tell("things");
+  }, () => {});
+  tell("picture");
+};
+
+// A turn, whatever asks for it: the page waits for its end, which the events tell as well.
+export const turn = async (place, path, json, { method = "POST", key, ...more } = {}) => {
+  clear(place);
+  app.busy = true;
+  tell("busy");
+  try {
+    const state = await call(method, at(path), { json, key: key ?? newKey(), ...more });
+    app.looking = null;
+    await refresh();
+    return state;
+  } catch (problem) {
+    fail(place, problem);
+    return null;
+  } finally {
+    app.busy = false;
+    tell("busy");
+  }
+};
+
+export const stop = async () => {
+  try {
+    const state = await call("POST", at("/stop"));
+    announce(state.message);
+    await refresh();
+  } catch (problem) {
+    fail("problem", problem);
+  }
+};

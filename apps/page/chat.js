@@ -1,0 +1,109 @@
+// What was said, step by step, from the session's events; and where the next words are written.
+import { app, on, tell, turn } from "./app.js";
+import { announce, byId, h } from "./dom.js";
+import { asked } from "./pointing.js";
+
+const log = byId("log"), words = byId("words");
+const STEPS = {
+  locate_object: "Looking for things", segment: "Measuring an outline", describe_shape: "Describing a shape",
+  propose_formation: "Placing and certifying", edit_formation: "Changing the plan", undo: "Going back",
+  deploy: "Moving the robots", measure: "Measuring", ask_user: "Asking", look: "Looking",
+};
+let current = null; // the turn that is being told
+
+const bottom = () => (log.scrollTop = log.scrollHeight);
+
+const said = (who, text, kind = "") => h(
+  "p", { className: `said ${kind}` }, h("span", { className: "who" }, who), text,
+);
+
+const begun = ({ runId, input }) => {
+  const steps = h("ol"), details = h("details", { hidden: true }, h("summary", {}, "Steps"), steps);
+  const item = h("li", { id: `turn-${runId}` }, said("You", input.words ?? ""), details);
+  current = { item, steps, details, texts: new Map(), words: input.words };
+  log.append(item);
+  bottom();
+};
+
+const step = (text, title) => {
+  current.details.hidden = false;
+  current.steps.append(h("li", { title: title ?? "" }, text));
+  current.details.querySelector("summary").textContent = `Steps (${current.steps.children.length})`;
+};
+
+const ended = (status, message) => {
+  const kind = { question: "question", impossible: "bad", failed: "bad", stopped: "bad", needs_approval: "question" };
+  current.item.append(said("formup", message, kind[status] ?? "good"));
+  current.item.dataset.status = status;
+  bottom();
+};
+
+// Each kind of event: what it adds to the log, and what it says of the session.
+const TOLD = {
+  RUN_STARTED: begun,
+  TOOL_CALL_START: ({ toolCallName }) => step(STEPS[toolCallName] ?? toolCallName),
+  TOOL_CALL_ARGS: ({ delta }) => (current.steps.lastChild.title = delta.slice(0, 2000)),
+  RUN_FINISHED: ({ result }) => ended(result.status, result.message),
+  RUN_ERROR: ({ code, message }) => ended(code, message),
+};
+
+export const reset = () => {
+  log.replaceChildren();
+  current = null;
+  app.turns = new Map();
+};
+
+let count = 0;
+export const told = (event, live) => {
+  if (event.type === "RUN_STARTED") count = log.children.length + 1;
+  if (event.name === "world") {
+    for (const id of Object.keys(event.value.changes?.plans?.items ?? {})) {
+      if (!app.turns.has(id)) app.turns.set(id, count);
+    }
+  }
+  if (current || event.type === "RUN_STARTED") TOLD[event.type]?.(event);
+  if (live && event.type === "RUN_FINISHED") announce(event.result.message);
+  if (live && event.type === "RUN_ERROR") announce(event.message);
+};
+
+export const say = async (text) => {
+  const pointed = app.pointed.map((one) => one.prompt);
+  const doubted = app.pointed.find((one) => !one.outline.sound);
+  if (doubted) {
+    const problem = `${doubted.prompt.id} is not outlined surely enough: draw around it, correct it, or forget it.`;
+    byId("problem").textContent = problem;
+    byId("problem").hidden = false;
+    return;
+  }
+  const done = await turn("problem", "/messages", { words: text, pointed });
+  if (!done) return void (words.value ||= text);
+  app.pointed = [];
+  tell("pointed");
+};
+
+byId("composer").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const text = words.value.trim();
+  if (!text || (app.busy && !app.moving)) return;
+  words.value = "";
+  say(text);
+});
+
+words.addEventListener("keydown", (event) => {
+  if (event.key !== "Enter" || event.shiftKey || event.isComposing) return;
+  event.preventDefault();
+  byId("composer").requestSubmit();
+});
+
+on("answer", say);
+on("busy", () => {
+  byId("send").disabled = app.busy && !app.moving;
+  byId("talk").toggleAttribute("aria-busy", app.busy);
+});
+on("scene", () => {
+  const choices = asked();
+  byId("options").replaceChildren(...choices.map((choice, i) => h(
+    "button", { type: "button", onclick: () => say(choice.id) }, `${i + 1}: ${choice.label ?? choice.id}`,
+  )));
+  words.placeholder = app.scene.plan ? "A bit further out; robot 3 to the left; go" : "Surround the largest coin with 8 robots";
+});

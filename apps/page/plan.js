@@ -1,0 +1,165 @@
+// The plan that stands: its certificate in words, sliders that it follows, earlier plans, approval.
+import { call, newKey } from "./api.js";
+import { app, at, clear, fail, on, refresh, tell, turn } from "./app.js";
+import { begin, commit } from "./dragging.js";
+import { announce, byId, h, s } from "./dom.js";
+import { MOST_DRAGGED } from "./picture.js";
+
+const certificate = byId("certificate"), sliders = byId("sliders"), strip = byId("strip");
+const MOST_GROUPS = 4;
+
+const lines = (texts, kind) => texts.map((text) => h("p", { className: kind }, text));
+
+const seconds = (value) => (value < 90 ? `${value.toFixed(0)} s` : `${(value / 60).toFixed(1)} min`);
+
+const way = ({ motion }) => motion && motion.makespan_s > 0
+  ? `The longest way is ${motion.longest_px.toFixed(0)} px, ${seconds(motion.makespan_s)}.` : "";
+
+const told = (found) => {
+  const { plan } = app.scene, shown = found ?? plan;
+  const badge = shown.partial ? ["partial", "partial"] : shown.certified ? ["certified", "certified"] : ["wrong", "not certified"];
+  const worst = plan.worst && !found ? [`nearest is robot ${plan.worst.robot}, ${plan.worst.text}`] : [];
+  certificate.replaceChildren(
+    h("p", {}, h("strong", { className: `badge ${badge[0]}` }, badge[1]), " ",
+      `${shown.robots.length} robots`, ...[...(found ? [] : plan.measures), ...worst].map((text) => `; ${text}`)),
+    ...(shown.partial ? lines([shown.partial], "partial") : []),
+    ...lines(shown.findings, "bad"),
+    ...(found ? [] : lines([...plan.notes, way(plan)].filter(Boolean), "soft")),
+    ...(found ? [] : arrived(plan)),
+  );
+};
+
+const arrived = ({ arrival }) => {
+  if (!arrival) return [];
+  const worst = Math.max(0, ...arrival.residual_px);
+  return lines([arrival.arrived
+    ? `All robots were seen at their places; the furthest is ${worst.toFixed(1)} px off.`
+    : `Not all have arrived: ${arrival.reason ?? arrival.ended}.`], arrival.arrived ? "good" : "bad");
+};
+
+// A slider tries as it moves and changes the plan once it is let go of.
+const slider = (name, { value, least, most, step, edit }) => {
+  const output = h("output", {}, String(value));
+  return h("label", {}, `${name} `, h("input", {
+    type: "range", min: least, max: most, step, value, ariaLabel: name,
+    oninput: ({ target }) => {
+      output.value = target.value;
+      begin([edit(+target.value)], (found) => tell("tried", found));
+    },
+    onchange: ({ target }) => commit([edit(+target.value)]),
+  }), " ", output);
+};
+
+const slidersOf = (group, number) => {
+  const { width, height } = app.scene.picture, among = app.scene.plan.groups.length > 1;
+  const name = among ? ` of group ${number}` : "", more = among ? { group: number } : {};
+  const found = [];
+  if (group.clearance && group.clearance[1] < 1e4) {
+    const [low, high] = group.clearance, value = Math.round(((low + high) / 2) * 10) / 10;
+    found.push(slider(`Distance${name}, px`, {
+      value, least: 0, most: Math.round(Math.max(width, height) / 5), step: 0.5,
+      edit: (px) => ({ kind: "distance", px, ...more }),
+    }));
+  }
+  if (group.relation !== "at") {
+    found.push(slider(`Robots${name}`, {
+      value: group.robots, least: 1, most: Math.max(24, 2 * group.robots), step: 1,
+      edit: (robots) => ({ kind: "count", robots, ...more }),
+    }));
+  }
+  return found;
+};
+
+const thumbnail = (plan) => {
+  const { width, height } = app.scene.picture, r = Math.max(width, height) / 45;
+  return s("svg", { viewBox: `0 0 ${width} ${height}`, "aria-hidden": true },
+    s("image", { href: app.picture, width, height }),
+    ...plan.points.slice(0, MOST_DRAGGED).map(([cx, cy]) => s("circle", { cx, cy, r })));
+};
+
+const drawStrip = () => strip.replaceChildren(...app.scene.plans.map((plan) => {
+  const here = plan.id === (app.looking ?? app.scene.current);
+  return h("li", {}, h("button", {
+    type: "button", className: here ? "here" : "", title: plan.words, ariaCurrent: here ? "true" : "false",
+    ariaLabel: `Plan ${plan.id}: ${plan.words}${plan.certified ? "" : ", not certified"}`,
+    onclick: () => lookAt(plan.id),
+  }, thumbnail(plan)));
+}));
+
+const lookAt = (id) => {
+  app.looking = id === app.scene.current ? null : id;
+  refresh().catch((problem) => fail("plan-problem", problem));
+};
+
+const backed = () => turn("plan-problem", "/undo", { to: app.looking });
+
+const forked = async () => {
+  try {
+    const made = await call("POST", at("/forks"), { json: { turn: app.turns.get(app.looking) ?? null } });
+    tell("open", made);
+  } catch (problem) {
+    fail("plan-problem", problem);
+  }
+};
+
+on("tried", (found) => app.scene?.plan && told(found));
+on("scene", () => {
+  const { plan } = app.scene;
+  clear("plan-problem");
+  byId("plan").hidden = !plan;
+  strip.hidden = app.scene.plans.length < 2;
+  if (!plan) return;
+  told(null);
+  drawStrip();
+  if (app.looking) {
+    sliders.replaceChildren(h("p", { className: "row" }, "This is an earlier plan. ",
+      h("button", { type: "button", onclick: backed }, "Go back to it"),
+      h("button", { type: "button", onclick: forked }, "Go on from it in a session of its own"),
+      h("button", { type: "button", onclick: () => lookAt(app.scene.current) }, "Close")));
+  } else {
+    sliders.replaceChildren(...(plan.void ? [] : plan.groups.slice(0, MOST_GROUPS).flatMap((g, i) => slidersOf(g, i + 1))));
+  }
+  usable();
+});
+
+const usable = () => {
+  const ready = app.scene?.plan && !app.busy && !app.looking;
+  byId("go").disabled = !ready || app.scene.plan.void || !app.scene.plan.certified;
+  byId("go").textContent = app.state?.waits ? "Approve …" : "Move the robots …";
+  for (const name of ["undo", "redo"]) byId(name).disabled = app.busy;
+  for (const input of sliders.querySelectorAll("input")) input.disabled = app.busy;
+};
+on("busy", usable);
+
+byId("undo").onclick = () => turn("plan-problem", "/undo", { steps: 1 });
+byId("redo").onclick = () => turn("plan-problem", "/undo", { steps: -1 });
+
+// The approval names what is to be moved, how far, and what is not certain.
+const dialog = byId("approval");
+export const approve = () => {
+  const { plan } = app.scene, { waits } = app.state, count = plan.robots.length;
+  const unsure = [...plan.notes, ...(plan.partial ? [plan.partial] : [])];
+  const doubted = app.scene.targets.filter((found) => found.confidence < 0.7);
+  unsure.push(...doubted.map((found) => `The outline of ${found.id} is known with confidence ${found.confidence} only.`));
+  byId("approval-text").replaceChildren(
+    h("p", {}, `Plan ${waits?.plan_id ?? plan.id}: ${count} ${count === 1 ? "robot" : "robots"}. ${way(plan)}`),
+    ...(waits ? lines([waits.message], "") : []),
+    ...(unsure.length ? [h("p", {}, "Not certain:"), h("ul", {}, ...unsure.map((text) => h("li", {}, text)))] : []),
+  );
+  byId("approve").textContent = `Move ${count} ${count === 1 ? "robot" : "robots"}`;
+  dialog.returnValue = "no";
+  dialog.showModal();
+};
+byId("go").onclick = approve;
+dialog.addEventListener("close", async () => {
+  if (dialog.returnValue !== "yes") return;
+  const { plan } = app.scene, { waits } = app.state;
+  clear("plan-problem");
+  try {
+    if (waits) await call("POST", at("/approvals"), { json: { plan_id: waits.plan_id, nonce: waits.nonce } });
+    else await call("POST", at("/deployments"), { json: { plan_id: plan.id }, key: newKey() });
+    announce("The robots move.");
+  } catch (problem) {
+    fail("plan-problem", problem);
+  }
+});

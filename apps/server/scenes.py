@@ -1,0 +1,104 @@
+"""What a page looks at: the picture, things in it, plans as numbers, what would come of an edit.
+
+Nothing here changes a session; what is tried becomes true by a turn alone.
+"""
+
+import asyncio
+import io
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+from PIL import Image
+
+from ...agent.conversation import Session
+from ...tools.builtin.editing import previewed
+from ...tools.builtin.targets import doubtful, measured
+from ...tools.draw.scene import candidate_data, robot_data, scene_data, thing_data, verdict_data
+from ...tools.errors import InputError, ToolError
+from ...tools.perception.image import Picture
+from .forms import Outlined, Pointing, Preview
+from .hub import AHub, APerson, Hub, check_owner, check_seen, need
+from .sessions import ERRORS
+from .tokens import Person
+
+router = APIRouter(prefix="/api/sessions/{session}", tags=["page"], responses=ERRORS)
+LONGEST = 2048
+"""Long side, px, of a picture that a page is given; coordinates are those of the whole one."""
+
+
+def plainly(error: ToolError) -> InputError:
+    """What a tool cannot do, said to a person."""
+    return InputError(str(error.facts.get("plain", error)), error.kind)
+
+
+async def _session(hub: Hub, name: str, person: Person) -> Session:
+    return await hub.service.fresh(check_owner(name, person))
+
+
+@router.get("/picture", response_class=Response, responses={200: {"content": {"image/jpeg": {}}}})
+async def picture(session: str, hub: AHub, person: APerson) -> Response:
+    """The picture as it stands in the session, upright, as JPEG, at most 2,048 px long."""
+    held = await hub.service.fresh(await check_seen(hub, session, person))
+    shown = held.context.picture
+    data = await asyncio.to_thread(_jpeg, shown)
+    return Response(data, media_type="image/jpeg", headers={"ETag": f'"{shown.sha256}"'})
+
+
+def _jpeg(picture: Picture) -> bytes:
+    file, image = io.BytesIO(), Image.fromarray(picture.pixels)
+    image.thumbnail((LONGEST, LONGEST))
+    image.save(file, "JPEG", quality=88)
+    return file.getvalue()
+
+
+@router.get("/scene")
+async def scene(
+    session: str,
+    hub: AHub,
+    person: APerson,
+    plan: Annotated[str | None, Query(max_length=100)] = None,
+) -> dict[str, Any]:
+    """Outlines, robots and a plan with its certificate, px; the plan that stands by default."""
+    held = await hub.service.fresh(await check_seen(hub, session, person))
+    world = held.context.world
+    if plan is not None and plan not in world.plans:
+        raise InputError(f"There is no plan {plan!r} in this session.", "missing")
+    return await asyncio.to_thread(scene_data, world, plan)
+
+
+@router.get("/things")
+async def things(session: str, hub: AHub, person: APerson) -> list[dict[str, Any]]:
+    """The things that stand out in the picture; looked for once, which the first turn needs too."""
+    context = (await _session(hub, session, person)).context
+    return candidate_data(await asyncio.to_thread(context.candidates))
+
+
+@router.post("/outline")
+async def outline(session: str, pointing: Pointing, hub: AHub, person: APerson) -> Outlined:
+    """The outline of what is pointed at, and how sure it is; nothing is decided by it."""
+    need(person, "plan")
+    context = (await _session(hub, session, person)).context
+    try:
+        found = await asyncio.to_thread(measured, context, pointing.prompt)
+    except ToolError as error:
+        raise plainly(error) from None
+    _, target, threshold = found
+    return Outlined(
+        **thing_data(target.id, target.label, target.outline),
+        confidence=target.confidence,
+        threshold=threshold,
+        sound=target.confidence >= threshold,
+        doubtful=doubtful(target),
+    )
+
+
+@router.post("/preview")
+async def preview(session: str, wanted: Preview, hub: AHub, person: APerson) -> dict[str, Any]:
+    """What edits would make of a plan: places, and what its certificate would say."""
+    need(person, "plan")
+    world = (await _session(hub, session, person)).context.world
+    try:
+        plan = await asyncio.to_thread(previewed, world, wanted.edits, wanted.plan_id)
+    except ToolError as error:
+        raise plainly(error) from None
+    return verdict_data(plan) | {"robots": robot_data(plan)}

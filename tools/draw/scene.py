@@ -1,0 +1,184 @@
+"""A world as plain numbers for a page to draw: outlines, areas, robots and their verdicts.
+
+Frame: image pixels, x right, y down. Outlines are simplified to what a screen shows.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..fleet.protocol import Pose
+from ..formation.checking.allowed import allowed_area
+from ..formation.checking.verdict import parts_of
+from ..formation.editing.draft import numbers_of
+from ..formation.encounters import notes_of
+from ..formation.plan import Plan
+from ..formation.units import length_text
+from ..geometry.outline import Outline
+from ..perception.referring.attributes import Candidate
+from ..world import PlanNode, World
+from .marks import rings
+
+DETAIL = 0.5
+"""How far a line on the page may be from what it stands for, px."""
+MOST_PLANS = 40
+"""Plans that are listed, the newest."""
+TELLING = ("min_clearance_px", "min_spacing_px", "widest_opening_px", "worst_gap_px")
+"""Measures that a certificate in words has."""
+Rings = list[list[list[float]]]
+
+
+def scene_data(world: World, plan_id: str | None = None) -> dict[str, Any]:
+    """All that a page draws of a world.
+
+    Args:
+        plan_id: which plan; the one that stands by default, else the one proposed last.
+    """
+    name = plan_id or world.current or next(reversed(world.plans), None)
+    node = world.plans.get(name or "")
+    met = {} if node is None else world.met(node.plan.id)
+    hard = [(k.id, k.reason, k.outline) for k in world.keep_out if k.hard]
+    reasons = {k.id: k.reason for k in world.keep_out} | {t.id: t.label for t in world.targets}
+    return {
+        "picture": world.picture.model_dump(),
+        "metres_per_pixel": world.metres_per_pixel,
+        "targets": [
+            thing_data(t.id, t.label, t.outline) | {"confidence": t.confidence, "note": t.note}
+            for t in world.with_doubted().targets
+        ],
+        "keep_out": [thing_data(*thing) for thing in hard],
+        "met": [thing_data(name, reasons[name], outline) for name, outline in met.items()],
+        "robots": [pose_data(pose) for pose in world.robots],
+        "current": world.current,
+        "plan": None if node is None else _plan_data(world, node),
+        "plans": [_brief(world, n) for n in list(world.plans.values())[-MOST_PLANS:]],
+    }
+
+
+def thing_data(name: str, label: str, outline: Outline) -> dict[str, Any]:
+    """An outline with what it is called."""
+    return {"id": name, "label": label, "rings": ring_data(outline.polygon)}
+
+
+def candidate_data(candidates: Iterable[Candidate]) -> list[dict[str, Any]]:
+    """Things found in the picture, with how sure it is that they are things."""
+    return [
+        thing_data(c.id, c.label, c.outline) | {"salience": round(c.salience, 3)}
+        for c in candidates
+    ]
+
+
+def pose_data(pose: Pose) -> dict[str, Any]:
+    """Where a robot was seen, px and radians clockwise from the x axis."""
+    return {"id": pose.id, "x": round(pose.x, 2), "y": round(pose.y, 2), "heading": pose.heading}
+
+
+def ring_data(area: BaseGeometry) -> Rings:
+    """The boundary lines of an area, closed, rounded to hundredths of a pixel."""
+    return [line.round(2).tolist() for line in rings(area.simplify(DETAIL)) if len(line)]
+
+
+def robot_data(plan: Plan, before: Plan | None = None) -> list[dict[str, Any]]:
+    """Each robot's place in a plan, which way it looks, and whether something is wrong with it.
+
+    Args:
+        before: the plan it was made from: `from` is the place there, where that was another.
+    """
+    formation = plan.formation
+    wrong = {str(f.robot) for f in plan.verdict.findings if f.robot is not None}
+    wrong |= {str(k) for f in plan.verdict.findings for k in f.others}
+    old = _places(before) if before else dict[str, tuple[float, float]]()
+    rows: list[dict[str, Any]] = []
+    groups = [k for k, group in enumerate(formation.contract.groups) for _ in range(group.robots)]
+    headings, numbers = formation.place_headings, {i: n for n, i in numbers_of(plan).items()}
+    for i, name in enumerate(formation.robot_of_place):
+        x, y = formation.points[i].tolist()
+        row = {"id": name, "x": x, "y": y, "group": groups[i] + 1, "wrong": name in wrong}
+        row["number"] = numbers[i]
+        row["heading"] = headings[i] if i < len(headings) else None
+        if name in old and math.dist(old[name], (x, y)) > DETAIL:
+            row["from"] = old[name]
+        rows.append(row)
+    return rows
+
+
+def verdict_data(plan: Plan) -> dict[str, Any]:
+    """Whether a plan is certified, and what its certificate says, in sentences."""
+    verdict = plan.verdict
+    return {
+        "certified": verdict.certified,
+        "partial": None if plan.partial is None else plan.partial.sentence,
+        "findings": [finding.sentence for finding in verdict.findings],
+        "notes": list(verdict.notes),
+    }
+
+
+def _places(plan: Plan) -> Mapping[str, tuple[float, float]]:
+    formation = plan.formation
+    return {
+        name: (float(x), float(y))
+        for name, (x, y) in zip(formation.robot_of_place, formation.points, strict=True)
+    }
+
+
+def _brief(world: World, node: PlanNode) -> dict[str, Any]:
+    """A plan as a thumbnail shows it."""
+    plan = node.plan
+    return {
+        "id": plan.id,
+        "parent": node.parent,
+        "words": node.words,
+        "certified": plan.verdict.certified,
+        "void": world.is_void(plan),
+        "points": plan.formation.points.round(1).tolist(),
+    }
+
+
+def _plan_data(world: World, node: PlanNode) -> dict[str, Any]:
+    plan, scale = node.plan, world.metres_per_pixel
+    before = world.plans.get(node.parent or "")
+    data: dict[str, Any] = {"id": plan.id, "parent": node.parent, "words": node.words}
+    data |= {"void": world.is_void(plan), "radius": plan.formation.contract.robot_radius}
+    data |= verdict_data(plan) | {"robots": robot_data(plan, before and before.plan)}
+    data["notes"] += notes_of(node.encounters)
+    if data["void"]:
+        return data | {"areas": [], "groups": [], "measures": [], "worst": None}
+    contract, site = plan.formation.contract, world.site(plan.formation.contract)
+    parts = parts_of(contract, plan.formation.points, site)
+    picture = shapely.box(-0.5, -0.5, site.width - 0.5, site.height - 0.5)
+    areas = [area.intersection(picture) for p in parts if (area := allowed_area(p)) is not None]
+    arrival = world.arrivals.get(plan.id)
+    return data | {
+        "areas": [ring_data(area) for area in areas],
+        "groups": [g.model_dump(mode="json", exclude_none=True) for g in contract.groups],
+        "measures": [
+            f"{name.removesuffix('_px').replace('_', ' ')} {length_text(float(value), scale)}"
+            for name, value in plan.verdict.measures.items()
+            if name in TELLING and isinstance(value, int | float)
+        ],
+        "worst": _worst(plan, world),
+        "motion": node.motion and node.motion.model_dump(mode="json"),
+        "arrival": arrival and arrival.model_dump(mode="json"),
+    }
+
+
+def _worst(plan: Plan, world: World) -> dict[str, Any] | None:
+    """The robot nearest to what it stands around, and how far its edge is from it."""
+    contract, formation = plan.formation.contract, plan.formation
+    nearest: tuple[float, str] | None = None
+    first = 0
+    for group in contract.groups:
+        members = range(first, first + group.robots)
+        first += group.robots
+        if group.enters or not group.targets or group.relation == "between":
+            continue
+        solid = world.outline(group.targets[0]).filled
+        for i in members:
+            off = solid.distance(shapely.Point(formation.points[i])) - contract.robot_radius
+            nearest = min(nearest or (math.inf, ""), (off, formation.robot_of_place[i]))
+    if nearest is None:
+        return None
+    return {"robot": nearest[1], "text": length_text(nearest[0], world.metres_per_pixel)}
