@@ -9,6 +9,17 @@ const STEPS = {
   propose_formation: "Placing and certifying", edit_formation: "Changing the plan", undo: "Going back",
   deploy: "Moving the robots", measure: "Measuring", ask_user: "Asking", look: "Looking",
 };
+// What a person did without words, as the log has it, and how it reads.
+const COMMANDS = [
+  [/^\/undo first$/, "Back to the first plan"], [/^\/undo (p-.*)$/, "Back to an earlier plan"], [/^\/undo/, "Undo"],
+  [/^\/redo/, "Redo"], [/^\/go/, "Move the robots"], [/^\/edit/, "Change"], [/^\/image (.*)$/, "Another picture: $1"],
+  [/^\/stop/, "Stop"],
+];
+const EDITS = {
+  place: ({ robot, stays }) => `Robot ${robot} moved${stays ? "" : ", by itself"}`,
+  distance: ({ px }) => `Distance ${px} px`,
+  count: ({ robots }) => `${robots} robots`,
+};
 let current = null; // the turn that is being told
 
 const bottom = () => (log.scrollTop = log.scrollHeight);
@@ -17,10 +28,29 @@ const said = (who, text, kind = "") => h(
   "p", { className: `said ${kind}` }, h("span", { className: "who" }, who), text,
 );
 
+const readable = (text) => {
+  const known = COMMANDS.find(([pattern]) => pattern.test(text));
+  return known ? text.replace(known[0], known[1]) : text;
+};
+
+// Arguments of a call; those of a person's own edits say what was done.
+const called = (text) => {
+  current.steps.lastChild.title = text.slice(0, 2000);
+  if (!current.words?.startsWith("/edit")) return;
+  const { edits = [] } = JSON.parse(text);
+  const done = edits.map((edit) => EDITS[edit.kind]?.(edit) ?? edit.kind).join(", ");
+  reword(done);
+};
+
+const reword = (text) => {
+  current.words ??= text;
+  current.item.querySelector(".said").lastChild.textContent = text;
+};
+
 const begun = ({ runId, input }) => {
   const steps = h("ol"), details = h("details", { hidden: true }, h("summary", {}, "Steps"), steps);
-  const item = h("li", { id: `turn-${runId}` }, said("You", input.words ?? ""), details);
-  current = { item, steps, details, texts: new Map(), words: input.words };
+  const item = h("li", { id: `turn-${runId}` }, said("You", readable(input.words ?? "…")), details);
+  current = { item, steps, details, words: input.words };
   log.append(item);
   bottom();
 };
@@ -42,7 +72,10 @@ const ended = (status, message) => {
 const TOLD = {
   RUN_STARTED: begun,
   TOOL_CALL_START: ({ toolCallName }) => step(STEPS[toolCallName] ?? toolCallName),
-  TOOL_CALL_ARGS: ({ delta }) => (current.steps.lastChild.title = delta.slice(0, 2000)),
+  TOOL_CALL_ARGS: ({ delta }) => called(delta),
+  // A turn that goes on after a question or an approval begins with the answer.
+  TOOL_CALL_RESULT: ({ content }) => current.words ?? reword(content),
+  CUSTOM: ({ name }) => name === "approval" && reword("Yes"),
   RUN_FINISHED: ({ result }) => ended(result.status, result.message),
   RUN_ERROR: ({ code, message }) => ended(code, message),
 };
@@ -102,8 +135,8 @@ on("busy", () => {
 });
 on("scene", () => {
   const choices = asked();
-  byId("options").replaceChildren(...choices.map((choice, i) => h(
-    "button", { type: "button", onclick: () => say(choice.id) }, `${i + 1}: ${choice.label ?? choice.id}`,
+  byId("options").replaceChildren(...choices.map((choice) => h(
+    "button", { type: "button", onclick: () => say(choice.id) }, `${choice.id}: ${choice.label ?? ""}`,
   )));
   words.placeholder = app.scene.plan ? "A bit further out; robot 3 to the left; go" : "Surround the largest coin with 8 robots";
 });

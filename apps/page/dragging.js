@@ -43,13 +43,13 @@ export const drop = () => {
   draw();
 };
 
-export const commit = async (wanted, place = "plan-problem") => {
+export const commit = latest(async (wanted) => {
   trial = null;
-  const state = await turn(place, "/edits", { edits: wanted });
+  const state = await turn("plan-problem", "/edits", { edits: wanted });
   tell("tried", null);
   if (!state) draw();
   else announce(state.message);
-};
+});
 
 const free = ([edit]) => [{ kind: edit.kind, robot: edit.robot, to: edit.to }];
 

@@ -7,6 +7,7 @@ import { MOST_DRAGGED } from "./picture.js";
 
 const certificate = byId("certificate"), sliders = byId("sliders"), strip = byId("strip");
 const MOST_GROUPS = 4;
+const REST = 350; // ms after the last step of a slider
 
 const lines = (texts, kind) => texts.map((text) => h("p", { className: kind }, text));
 
@@ -38,6 +39,7 @@ const arrived = ({ arrival }) => {
 };
 
 // A slider tries as it moves and changes the plan once it is let go of.
+let resting = 0;
 const slider = (name, { value, least, most, step, edit }) => {
   const output = h("output", {}, String(value));
   return h("label", {}, `${name} `, h("input", {
@@ -46,7 +48,10 @@ const slider = (name, { value, least, most, step, edit }) => {
       output.value = target.value;
       begin([edit(+target.value)], (found) => tell("tried", found));
     },
-    onchange: ({ target }) => commit([edit(+target.value)]),
+    onchange: ({ target }) => {
+      clearTimeout(resting);
+      resting = setTimeout(() => commit([edit(+target.value)]), REST);
+    },
   }), " ", output);
 };
 
@@ -54,10 +59,9 @@ const slidersOf = (group, number) => {
   const { width, height } = app.scene.picture, among = app.scene.plan.groups.length > 1;
   const name = among ? ` of group ${number}` : "", more = among ? { group: number } : {};
   const found = [];
-  if (group.clearance && group.clearance[1] < 1e4) {
-    const [low, high] = group.clearance, value = Math.round(((low + high) / 2) * 10) / 10;
+  if (group.nearest_px !== undefined && !group.radius) {
     found.push(slider(`Distance${name}, px`, {
-      value, least: 0, most: Math.round(Math.max(width, height) / 5), step: 0.5,
+      value: group.nearest_px, least: 0, most: Math.round(Math.max(width, height) / 5), step: 0.5,
       edit: (px) => ({ kind: "distance", px, ...more }),
     }));
   }
@@ -117,7 +121,9 @@ on("scene", () => {
       h("button", { type: "button", onclick: forked }, "Go on from it in a session of its own"),
       h("button", { type: "button", onclick: () => lookAt(app.scene.current) }, "Close")));
   } else {
+    const focused = sliders.contains(document.activeElement) && document.activeElement.ariaLabel;
     sliders.replaceChildren(...(plan.void ? [] : plan.groups.slice(0, MOST_GROUPS).flatMap((g, i) => slidersOf(g, i + 1))));
+    if (focused) sliders.querySelector(`[aria-label="${focused}"]`)?.focus();
   }
   usable();
 });
@@ -127,7 +133,6 @@ const usable = () => {
   byId("go").disabled = !ready || app.scene.plan.void || !app.scene.plan.certified;
   byId("go").textContent = app.state?.waits ? "Approve …" : "Move the robots …";
   for (const name of ["undo", "redo"]) byId(name).disabled = app.busy;
-  for (const input of sliders.querySelectorAll("input")) input.disabled = app.busy;
 };
 on("busy", usable);
 

@@ -186,17 +186,17 @@ const asked = () => {
   return last.candidates ?? [];
 };
 
-const option = (choice, index) => {
+const option = (choice) => {
   const found = [...(app.scene?.targets ?? []), ...app.things].find((one) => one.id === choice.id);
   const [x0, y0, x1, y1] = choice.box;
   const answer = () => tell("answer", choice.id);
   return s("g", {
-    class: "option", tabindex: 0, role: "button", "aria-label": `${index + 1}: ${choice.label ?? choice.id}`,
+    class: "option", tabindex: 0, role: "button", "aria-label": `${choice.id}: ${choice.label ?? ""}`,
     onclick: answer, onkeydown: (event) => event.key === "Enter" && answer(),
   },
   s("path", { d: found ? path(found.rings) : `M${x0} ${y0}H${x1}V${y1}H${x0}Z` }),
   s("circle", { cx: (x0 + x1) / 2, cy: (y0 + y1) / 2, r: 13 * unit() }),
-  s("text", { x: (x0 + x1) / 2, y: (y0 + y1) / 2, dy: "0.35em", "font-size": 14 * unit() }, index + 1));
+  s("text", { x: (x0 + x1) / 2, y: (y0 + y1) / 2, dy: "0.35em", "font-size": 14 * unit() }, choice.id.slice(1)));
 };
 
 on("point", outlined);

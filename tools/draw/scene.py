@@ -13,11 +13,12 @@ from shapely.geometry.base import BaseGeometry
 from ..fleet.protocol import Pose
 from ..formation.checking.allowed import allowed_area
 from ..formation.checking.verdict import parts_of
+from ..formation.contract import OUTSIDE
 from ..formation.editing.draft import numbers_of
 from ..formation.encounters import notes_of
 from ..formation.plan import Plan
 from ..formation.units import length_text
-from ..geometry.outline import Outline
+from ..geometry.outline import Outline, distances
 from ..perception.referring.attributes import Candidate
 from ..world import PlanNode, World
 from .marks import rings
@@ -153,7 +154,7 @@ def _plan_data(world: World, node: PlanNode) -> dict[str, Any]:
     arrival = world.arrivals.get(plan.id)
     return data | {
         "areas": [ring_data(area) for area in areas],
-        "groups": [g.model_dump(mode="json", exclude_none=True) for g in contract.groups],
+        "groups": _groups(plan, world),
         "measures": [
             f"{name.removesuffix('_px').replace('_', ' ')} {length_text(float(value), scale)}"
             for name, value in plan.verdict.measures.items()
@@ -165,20 +166,37 @@ def _plan_data(world: World, node: PlanNode) -> dict[str, Any]:
     }
 
 
+def _off(plan: Plan, world: World) -> dict[str, float]:
+    """How far the edges of robots that stand outside of something are from it, px, by their ids."""
+    contract, formation = plan.formation.contract, plan.formation
+    names, off, first = formation.robot_of_place, dict[str, float](), 0
+    for group in contract.groups:
+        members = slice(first, first + group.robots)
+        first += group.robots
+        if group.relation in OUTSIDE:
+            solid = world.outline(group.targets[0]).filled
+            apart = distances(solid, formation.points[members]) - contract.robot_radius
+            off |= dict(zip(names[members], apart.tolist(), strict=True))
+    return off
+
+
+def _groups(plan: Plan, world: World) -> list[dict[str, Any]]:
+    """The contract's groups; of those outside of something also how far the nearest robot is."""
+    off, first, rows = _off(plan, world), 0, list[dict[str, Any]]()
+    for group in plan.formation.contract.groups:
+        names = plan.formation.robot_of_place[first : first + group.robots]
+        first += group.robots
+        row = group.model_dump(mode="json", exclude_none=True)
+        if group.relation in OUTSIDE:
+            row["nearest_px"] = round(min(off[name] for name in names), 1)
+        rows.append(row)
+    return rows
+
+
 def _worst(plan: Plan, world: World) -> dict[str, Any] | None:
     """The robot nearest to what it stands around, and how far its edge is from it."""
-    contract, formation = plan.formation.contract, plan.formation
-    nearest: tuple[float, str] | None = None
-    first = 0
-    for group in contract.groups:
-        members = range(first, first + group.robots)
-        first += group.robots
-        if group.enters or not group.targets or group.relation == "between":
-            continue
-        solid = world.outline(group.targets[0]).filled
-        for i in members:
-            off = solid.distance(shapely.Point(formation.points[i])) - contract.robot_radius
-            nearest = min(nearest or (math.inf, ""), (off, formation.robot_of_place[i]))
-    if nearest is None:
+    off = _off(plan, world)
+    if not off:
         return None
-    return {"robot": nearest[1], "text": length_text(nearest[0], world.metres_per_pixel)}
+    robot = min(off, key=lambda name: off[name])
+    return {"robot": robot, "text": length_text(off[robot], world.metres_per_pixel)}

@@ -1,6 +1,7 @@
 """Servers one after another, each in a process of its own that starts without importing anew.
 
-Each line on standard input starts one; its process id and port are printed as a line.
+Each line on standard input starts one, at the port that it names, if it names one; its process id
+and port are printed as a line.
 """
 
 import asyncio
@@ -28,12 +29,12 @@ async def slow(self: SimulatedFleet, motion: Motion) -> AsyncGenerator[tuple[Pos
         await asyncio.sleep(0.02)
 
 
-def serve(store: str) -> None:
+def serve(store: str, port: int) -> None:
     SimulatedFleet.drive = slow  # type: ignore[method-assign]
     fixed = ServerSettings(requests_per_minute=10**6)
     app = make_app(Service(Agent(), store_at(store)), fixed, Tokens(None))
     config = uvicorn.Config(
-        app, port=0, lifespan="on", log_config=None, timeout_graceful_shutdown=2
+        app, port=port, lifespan="on", log_config=None, timeout_graceful_shutdown=2
     )
     server = Server(config, app.state.hub)
 
@@ -49,7 +50,7 @@ def serve(store: str) -> None:
     asyncio.run(work())
 
 
-for _ in sys.stdin:
+for line in sys.stdin:
     if not os.fork():
-        serve(sys.argv[1])
+        serve(sys.argv[1], int(line.strip() or 0))
         os._exit(0)

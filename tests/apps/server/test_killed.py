@@ -20,7 +20,7 @@ PHOTO = Path(__file__).parents[3] / "evals/photos/images/us_coins.jpg"
 JSON = {"Content-Type": "application/json"}
 KILLS = 40
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")
-Start = Callable[[], tuple[int, httpx.Client]]
+Start = Callable[..., tuple[int, httpx.Client]]
 
 
 @pytest.fixture
@@ -34,9 +34,9 @@ def start(tmp_path: Path) -> Generator[Start]:
     ) as forking:
         assert forking.stdin is not None and forking.stdout is not None
 
-        def begin() -> tuple[int, httpx.Client]:
+        def begin(at: str = "") -> tuple[int, httpx.Client]:
             assert forking.stdin is not None and forking.stdout is not None
-            forking.stdin.write("\n")
+            forking.stdin.write(f"{at}\n")
             forking.stdin.flush()
             pid, port = map(int, forking.stdout.readline().split())
             pids.append(pid)

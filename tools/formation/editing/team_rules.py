@@ -19,6 +19,7 @@ from ..checking.verdict import Part as Placed
 from ..contract import (
     MAX_ROBOTS,
     MIN_SPACING,
+    OUTSIDE,
     default_clearance,
     exact_clearance,
     nominal,
@@ -41,6 +42,9 @@ from .part import ON_CURVE, Part, check_known, closed_up, skipped, without_pitch
 from .regrouping import added_about, arranged, left_of, merged, more_of, targeted, without
 from .ring_rules import closed, ringed
 from .staying import alone
+
+EXACT = 0.01
+"""How far inside of its limits, px, a distance is kept that is made exact."""
 
 
 def _swapped(draft: Draft, edit: Swap) -> Draft:
@@ -219,7 +223,15 @@ def _allowed_near(part: Part, point: FloatArray) -> FloatArray:
     area = allowed_area(Placed(part.group, part.points, 0, part.radius, part.site))
     if area is None or area.is_empty:
         return point
-    return shapely.get_coordinates(shapely.shortest_line(area, shapely.Point(point)))[0]
+    near = shapely.get_coordinates(shapely.shortest_line(area, shapely.Point(point)))[0]
+    if part.group.relation not in OUTSIDE:
+        return near
+    # The area's round corners are polygons: the distance itself is made exact.
+    solid = part.site.outlines[part.group.targets[0]].filled
+    foot = shapely.get_coordinates(shapely.shortest_line(solid, shapely.Point(near)))[0]
+    off, (least, most) = float(np.linalg.norm(near - foot)), part.group.offsets(part.radius)
+    slack = min(EXACT, (most - least) / 2)
+    return foot + (near - foot) * np.clip(off, least + slack, most - slack) / off if off else near
 
 
 def _beside(part: Part, point: FloatArray, name: str) -> FloatArray:

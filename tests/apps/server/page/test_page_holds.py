@@ -1,0 +1,121 @@
+"""What a page has to bear: a server that dies, random gestures, narrow screens, assistive tools."""
+
+import os
+import random
+import signal
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import expect
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+start = import_module("test_killed").start
+LONG = 20_000
+WIDTHS = (390, 768, 1440)
+FUZZED = 60
+
+
+def test_a_server_that_is_killed_while_robots_drive(
+    server: Any, visit: Any, start: Any, unused_tcp_port_factory: Any = None
+) -> None:
+    pid, client = start()
+    here = visit(str(client.base_url).rstrip("/"))
+    here.begin()
+    here.say("Surround the largest coin")
+    here.page.click("#go")
+    here.page.click("#approve")
+    expect(here.page.locator("#stop.urgent")).to_have_count(1, timeout=LONG)
+    os.kill(pid, signal.SIGKILL)
+    expect(here.page.locator("#connection")).to_contain_text("Connection lost", timeout=LONG)
+    here.page.click("#undo")
+    expect(here.page.locator("#plan-problem")).to_contain_text("cannot be reached", timeout=LONG)
+    start(str(client.base_url.port))
+    expect(here.page.locator("#connection")).to_have_text("", timeout=LONG)
+    here.say("are they there?")
+    here.say("go")
+    expect(here.page.locator("#log > li").last).to_have_attribute("data-status", "deployed")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_screen_fits_and_is_usable_by_all(
+    server: Any, visit: Any, width: int, scheme: str
+) -> None:
+    here = visit(server.url, viewport={"width": width, "height": 844}, color_scheme=scheme)
+    here.page.goto(here.url)
+    here.page.locator("#examples button").first.wait_for(timeout=LONG)
+    check(here)
+    here.begin()
+    here.say("Surround the coin")
+    check(here)
+    here.say("c1")
+    here.say("a bit further out")
+    check(here)
+    here.page.click("#go")
+    check(here)
+
+
+def check(here: Any) -> None:
+    """Nothing is cut off at the side, and axe finds nothing."""
+    width = here.page.viewport_size["width"]
+    assert here.page.evaluate("document.documentElement.scrollWidth") <= width
+    found = Axe().run(here.page).response["violations"]
+    assert [(v["id"], v["nodes"][0]["html"][:200]) for v in found] == []
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_random_gestures_leave_page_and_server_agreed(server: Any, visit: Any, seed: int) -> None:
+    here, chance = visit(server.url), random.Random(seed)
+    here.begin()
+    here.say("Surround the largest coin")
+    page = here.page
+    stage = page.locator("#stage").bounding_box()
+
+    def somewhere() -> tuple[float, float]:
+        x = stage["x"] + chance.random() * stage["width"]
+        return x, stage["y"] + chance.random() * stage["height"]
+
+    def dragged() -> None:
+        page.mouse.move(*somewhere())
+        page.mouse.down()
+        page.mouse.move(*somewhere(), steps=3)
+        if chance.random() < 0.2:
+            page.keyboard.press("Escape")
+        page.mouse.up()
+
+    def robot() -> None:
+        marks = page.locator(".robot .disc").all()
+        box = chance.choice(marks).bounding_box() if marks else None
+        if box is not None:
+            page.mouse.move(box["x"] + 3, box["y"] + 3)
+            page.mouse.down()
+            page.mouse.move(*somewhere(), steps=3)
+            page.mouse.up()
+
+    def key() -> None:
+        page.keyboard.press(
+            chance.choice(
+                ["v", "p", "b", "l", "g", "Escape", "Enter", "Tab", "ArrowUp", "Control+z"]
+            )
+        )
+
+    def wheel() -> None:
+        page.mouse.move(*somewhere())
+        page.mouse.wheel(0, chance.choice([-300, 300]))
+
+    for _ in range(FUZZED):
+        chance.choice([dragged, robot, robot, key, wheel, lambda: page.mouse.click(*somewhere())])()
+        if page.locator("dialog[open]").count():
+            page.keyboard.press("Escape")
+    page.wait_for_timeout(1500)
+    here.rest()
+    current = server.client.get(here.session).json()["current"]
+    page.reload()
+    expect(page.locator(".robot").first).to_be_attached(timeout=LONG)
+    scene = server.client.get(f"{here.session}/scene").json()
+    assert scene["current"] == current
+    assert page.locator(".robot").count() == len(scene["plan"]["robots"])
