@@ -15,8 +15,14 @@ export const token = {
   set: (value) => sessionStorage.setItem(TOKEN, value.trim()),
 };
 
-const signed = (headers = {}) =>
-  token.get() ? { ...headers, Authorization: `Bearer ${token.get()}` } : headers;
+// The code of a shared link, while one is looked at.
+let shared = null;
+export const lookWith = (code) => (shared = code);
+
+const signed = (headers = {}) => {
+  if (shared) return { ...headers, Authorization: `Share ${shared}` };
+  return token.get() ? { ...headers, Authorization: `Bearer ${token.get()}` } : headers;
+};
 
 const answered = async (method, path, { json, body, type, query, key } = {}) => {
   const headers = signed();

@@ -12,9 +12,9 @@ export const app = {
   pointed: [], // {prompt, outline}: what the next words point at
   turns: new Map(), // plan id -> how many turns led to it
   busy: false,
+  reading: false, // whether it is only looked at, by a shared link
   moving: false,
   poses: [],
-  said: "", // words that a failed request gives back
 };
 
 const listeners = new Map();
@@ -49,7 +49,7 @@ const loadPicture = async () => {
   app.picture = URL.createObjectURL(await fetched(at("/picture")));
   app.things = [];
   const session = app.session;
-  call("GET", at("/things")).then((things) => {
+  if (!app.reading) call("GET", at("/things")).then((things) => {
     if (session === app.session) app.things = things;
     tell("things");
   }, () => {});

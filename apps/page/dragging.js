@@ -53,7 +53,7 @@ export const commit = latest(async (wanted) => {
 
 const free = ([edit]) => [{ kind: edit.kind, robot: edit.robot, to: edit.to }];
 
-const usable = () => app.scene.plan && !app.looking && !app.busy && !app.scene.plan.void;
+const usable = () => app.scene.plan && !app.reading && !app.looking && !app.busy && !app.scene.plan.void;
 
 export const pressedRobot = (down) => {
   const group = down.target.closest(".robot");

@@ -1,8 +1,8 @@
 // The page as a whole: which session is open, what its events mean, keys, light and dark.
-import { follow } from "./api.js";
-import { app, clear, fail, on, refresh, stop, tell, turn } from "./app.js";
+import { call, fetched, follow, lookWith } from "./api.js";
+import { app, at, clear, fail, on, refresh, stop, tell, turn } from "./app.js";
 import { reset, told } from "./chat.js";
-import { announce, byId } from "./dom.js";
+import { announce, byId, h } from "./dom.js";
 import { choose, drawingKey, toolKeys } from "./pointing.js";
 import "./plan.js";
 import { received, start } from "./start.js";
@@ -13,9 +13,9 @@ const open = async ({ id: session, words = "", pointed = [] }) => {
   leave?.();
   reset();
   Object.assign(app, { session, state: null, scene: null, looking: null, pointed: [], poses: [], moving: false });
-  if (location.hash !== `#${session}`) history.pushState(null, "", `#${session}`);
+  if (!app.reading && location.hash !== `#${session}`) history.pushState(null, "", `#${session}`);
   byId("start").hidden = true;
-  for (const name of ["talk", "view", "export", "stop"]) byId(name).hidden = false;
+  for (const name of ["talk", "view", "share", "export", "stop"]) byId(name).hidden = false;
   clear("problem");
   try {
     await refresh();
@@ -78,7 +78,30 @@ on("file", (file) => {
 on("scene", () => (document.title = `${app.state.last?.instruction ?? "formup"} – formup`));
 
 byId("stop").onclick = stop;
-byId("export").onclick = () => tell("export");
+byId("export").onclick = async () => {
+  try {
+    const address = URL.createObjectURL(await fetched(at("/export")));
+    h("a", { href: address, download: `formup-${app.session}.zip` }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 10_000);
+  } catch (problem) {
+    fail("problem", problem);
+  }
+};
+
+byId("share").onclick = async () => {
+  try {
+    const { code } = await call("POST", at("/shares"));
+    byId("link").value = `${location.origin}/#share=${code}`;
+    byId("shared").showModal();
+    byId("link").select();
+  } catch (problem) {
+    fail("problem", problem);
+  }
+};
+byId("copy").onclick = () => {
+  byId("link").select();
+  navigator.clipboard?.writeText(byId("link").value);
+};
 
 const writing = () => /^(INPUT|TEXTAREA|SELECT)$/.test(document.activeElement?.tagName ?? "");
 addEventListener("keydown", (event) => {
@@ -106,12 +129,16 @@ byId("scheme").onclick = () => {
 document.documentElement.dataset.scheme = localStorage.getItem("formup-scheme") ?? "";
 
 const routed = () => {
-  const session = location.hash.slice(1);
+  const shared = location.hash.startsWith("#share=") ? location.hash.slice(7) : null;
+  lookWith(shared);
+  document.body.classList.toggle("reading", shared !== null);
+  app.reading = shared !== null;
+  const session = shared ? shared.split(".")[0] : location.hash.slice(1);
   if (session && session !== app.session) return open({ id: session });
   if (session) return undefined;
   leave?.();
   app.session = null;
-  for (const name of ["export", "stop"]) byId(name).hidden = true;
+  for (const name of ["share", "export", "stop"]) byId(name).hidden = true;
   return start();
 };
 addEventListener("popstate", routed);

@@ -122,7 +122,7 @@ on("scene", () => {
       h("button", { type: "button", onclick: () => lookAt(app.scene.current) }, "Close")));
   } else {
     const focused = sliders.contains(document.activeElement) && document.activeElement.ariaLabel;
-    sliders.replaceChildren(...(plan.void ? [] : plan.groups.slice(0, MOST_GROUPS).flatMap((g, i) => slidersOf(g, i + 1))));
+    sliders.replaceChildren(...(plan.void || app.reading ? [] : plan.groups.slice(0, MOST_GROUPS).flatMap((g, i) => slidersOf(g, i + 1))));
     if (focused) sliders.querySelector(`[aria-label="${focused}"]`)?.focus();
   }
   usable();

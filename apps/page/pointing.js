@@ -152,11 +152,11 @@ export const drawingKey = (key) => {
 
 const forget = (id) => {
   app.pointed = app.pointed.filter((one) => one.prompt.id !== id);
-  if (!app.pointed.length && (tool === "plus" || tool === "minus")) choose("move");
   tell("pointed");
 };
 
 on("pointed", () => {
+  if (!app.pointed.length && (tool === "plus" || tool === "minus")) choose("move");
   for (const name of ["plus", "minus"]) tools.querySelector(`[data-tool=${name}]`).disabled = !app.pointed.length;
   byId("pointed").replaceChildren(...app.pointed.map(({ prompt, outline }) => h(
     "li", { className: outline.sound ? "chip" : "chip doubted" },

@@ -88,8 +88,8 @@ const list = async () => {
 byId("search").addEventListener("input", () => list().catch((problem) => fail("start-problem", problem)));
 
 const pickers = async () => {
-  const [agents, examples] = await Promise.all([
-    call("GET", "/agents"), fetch("/page/examples.json").then((response) => response.json()),
+  const [agents, reports, examples] = await Promise.all([
+    call("GET", "/agents"), call("GET", "/reports"), fetch("/page/examples.json").then((response) => response.json()),
   ]);
   byId("agent").replaceChildren(...agents.map((agent) => h("option", { value: agent.name }, agent.name || agent.model)));
   const chosen = () => {
@@ -98,6 +98,10 @@ const pickers = async () => {
   };
   byId("agent").onchange = chosen;
   chosen();
+  byId("reported").hidden = !reports.length;
+  byId("reports").replaceChildren(...reports.map(({ name, address }) => h(
+    "li", {}, h("a", { href: address, target: "_blank", rel: "noopener" }, name),
+  )));
   byId("examples").replaceChildren(...examples.map(example));
 };
 

@@ -11,12 +11,17 @@ from starlette.exceptions import HTTPException
 
 from ...agent.service import Service
 from ...tools.errors import FormupError
-from . import health, openai_chat, openai_responses, page, scenes, sessions, streams, turns
+from . import health, openai_chat, openai_responses, page, scenes, sessions, sharing, streams, turns
 from .guard import Guard
 from .hub import Hub, error_response, told
 from .metrics import Metrics
 from .settings import ServerSettings
 from .tokens import Tokens
+
+PARTS = (
+    *(page, health, sessions, scenes, sharing, turns, streams),
+    *(openai_chat, openai_responses),
+)
 
 
 def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> FastAPI:
@@ -42,7 +47,17 @@ def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> Fast
         redoc_url=None,
     )
     app.state.hub = hub
-    for part in (page, health, sessions, scenes, turns, streams, openai_chat, openai_responses):
+    for part in (
+        page,
+        health,
+        sessions,
+        scenes,
+        sharing,
+        turns,
+        streams,
+        openai_chat,
+        openai_responses,
+    ):
         app.include_router(part.router)
     if find_spec("mcp") is not None:
         from ..mcp.server import mount

@@ -144,6 +144,12 @@ class Outlined(BaseModel):
     doubtful: bool
 
 
+class Shared(BaseModel):
+    """A code that lets others look at a session."""
+
+    code: str
+
+
 class SessionFacts(BaseModel):
     """A session in a list."""
 

@@ -55,7 +55,7 @@ class Guard:
 
         try:
             self._check_place(scope["method"], headers)
-            async with self._known(scope["path"], headers) as person:
+            async with self._known(scope["method"], scope["path"], headers) as person:
                 scope.setdefault("state", {})["person"] = person
                 counts = nullcontext() if _is_open(scope["path"]) else self._counted(person)
                 with counts:
@@ -78,9 +78,13 @@ class Guard:
             await response(scope, receive, watched)
 
     @asynccontextmanager
-    async def _known(self, path: str, headers: Headers) -> AsyncGenerator[Person]:
+    async def _known(self, method: str, path: str, headers: Headers) -> AsyncGenerator[Person]:
         """Who asks; what they asked for ends with their token."""
         loop, person = asyncio.get_running_loop(), self._person(path, headers)
+        there = f"/api/sessions/{person.sees}"
+        inside = path == there or path.startswith(f"{there}/")
+        if person.sees and not (method in SAFE and inside):
+            raise _RefusedError(403, "A shared link shows one session, and lets do nothing else.")
 
         def look() -> None:
             nonlocal looks
@@ -120,9 +124,13 @@ class Guard:
             )
 
     def _person(self, path: str, headers: Headers) -> Person:
+        kind, _, token = headers.get("authorization", "").partition(" ")
+        if kind.lower() == "share" and not _is_open(path):
+            if (looking := self._hub.tokens.looking(token.strip())) is None:
+                raise _RefusedError(401, "This link does not hold any more: ask for another.")
+            return looking
         if _is_open(path) or not self._hub.tokens.needed:
             return Person()
-        kind, _, token = headers.get("authorization", "").partition(" ")
         person = self._hub.tokens.person(token.strip()) if kind.lower() == "bearer" else None
         if person is None:
             known = "A token is needed" if not token else "This token is not known here"

@@ -43,6 +43,9 @@ class ServerSettings(BaseModel):
     threshold: float | None = Field(
         default=None, ge=0, le=1, description="least confidence that a mask of theirs is used at"
     )
+    reports: Path | None = Field(
+        default=None, description="folder of reports, HTML files, that the page lists"
+    )
     origins: str = Field(
         default="",
         description="other origins whose pages may call it, as https://HOST, split by commas",
@@ -59,7 +62,7 @@ class ServerSettings(BaseModel):
         default=256, ge=1, description="most requests of one token at the same time"
     )
     requests_per_minute: int = Field(
-        default=1_200, ge=1, description="most of one token in a minute"
+        default=6_000, ge=1, description="most of one token in a minute"
     )
     streams: int = Field(
         default=1_200, ge=1, description="most event streams open at the same time"

@@ -1,6 +1,7 @@
 """Tokens: who may do what at a server. Their file holds names, scopes and hashes, no token."""
 
 import hashlib
+import hmac
 import re
 import secrets
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from typing import Literal, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import from_json, to_json
 
+from ...agent.store.protocol import owner_of
 from ...tools.errors import InputError, StorageError
 from ...tools.store import read_text, write_whole
 
@@ -31,10 +33,12 @@ class Person:
     Attributes:
         name: of their token, which the ids of their sessions begin with; empty where none is
             needed.
+        sees: the one session that they may look at, and do nothing else; None for all of theirs.
     """
 
     name: str = ""
     scope: Scope = "move"
+    sees: str | None = None
 
     def may(self, scope: Scope) -> bool:
         """Whether they may do what a scope stands for."""
@@ -77,6 +81,22 @@ class Tokens:
             if secrets.compare_digest(entry.sha256, digest):
                 found = Person(entry.name, entry.scope)
         return found
+
+    def mark(self, owner: str, what: str) -> str:
+        """What whoever has it may look at one thing with; a token's hash is the key to it."""
+        keys = [entry.sha256 for entry in self.entries() if entry.name == owner]
+        return hmac.new("".join(keys).encode(), what.encode(), hashlib.sha256).hexdigest()
+
+    def share(self, session: str) -> str:
+        """A code for looking at a session, which holds as long as its owner's token."""
+        return f"{session}.{self.mark(owner_of(session), f'share {session}')}"
+
+    def looking(self, code: str) -> Person | None:
+        """Who has a code for looking at a session, if it is one."""
+        session = code.rpartition(".")[0]
+        if not secrets.compare_digest(code.encode(), self.share(session).encode()):
+            return None
+        return Person(owner_of(session), "read", session)
 
     def entries(self) -> tuple[Entry, ...]:
         """All there are.

@@ -91,6 +91,8 @@ def test_a_session_that_another_process_deleted_is_nowhere(server: Running) -> N
         "edits": {"edits": [{"kind": "count", "robots": 6}]},
         "approvals": {"plan_id": "p-1", "nonce": "n"},
         "deployments": {"plan_id": "p-1"},
+        "outline": {"prompt": {"points": [[240, 90]]}},
+        "preview": {"edits": [{"kind": "count", "robots": 6}]},
         "{session}": {"name": "coins"},
     }
     for method, path in own:
