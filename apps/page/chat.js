@@ -11,8 +11,8 @@ const STEPS = {
 };
 // What a person did without words, as the log has it, and how it reads.
 const COMMANDS = [
-  [/^\/undo first$/, "Back to the first plan"], [/^\/undo (p-.*)$/, "Back to an earlier plan"], [/^\/undo/, "Undo"],
-  [/^\/redo/, "Redo"], [/^\/go/, "Move the robots"], [/^\/edit/, "Change"], [/^\/image (.*)$/, "Another picture: $1"],
+  [/^\/undo first$/, "Back to the first plan"], [/^\/undo (p-.*)$/, "Back to an earlier plan"], [/^\/undo.*$/, "Undo"],
+  [/^\/redo.*$/, "Redo"], [/^\/go/, "Move the robots"], [/^\/edit.*$/, "Change"], [/^\/image (.*)$/, "Another picture: $1"],
   [/^\/stop/, "Stop"],
 ];
 const EDITS = {

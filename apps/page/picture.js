@@ -139,7 +139,7 @@ export const drawMotion = () => {
   if (!robots.length || !seen || app.looking) return;
   const out = (scale * width) / seen[2];
   ink.setTransform(out, 0, 0, out, -seen[0] * out, -seen[1] * out);
-  const radius = Math.min(5 * unit(), radiusOf(robots));
+  const radius = Math.min(5 * unit(), robots.length > MOST_DRAGGED ? 2.5 * unit() : radiusOf(robots));
   ink.lineWidth = 1.5 * unit();
   ink.strokeStyle = "rgba(255, 209, 26, .55)";
   ink.beginPath();

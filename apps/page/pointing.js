@@ -9,7 +9,7 @@ import { pressedRobot } from "./dragging.js";
 const svg = byId("scene"), tools = byId("tools"), hint = byId("hint");
 const MOST_CORNERS = 150;
 const HINTS = {
-  point: "Click on the thing.",
+  point: "Click on the thing; what lights up was found already.",
   box: "Draw a box around the thing.",
   lasso: "Draw around the thing.",
   polygon: "Click corner after corner; double-click, or press Enter, to end.",
@@ -33,6 +33,7 @@ export const choose = (name) => {
   }
   svg.dataset.tool = name;
   show(HINTS[name]);
+  if (app.scene) drawPointed();
 };
 
 const nextId = () => {
@@ -60,8 +61,10 @@ const outlined = latest(async (prompt, replaces) => {
 
 const pointAt = (way) => outlined({ id: nextId(), ...way });
 
+// Points correct what was drawn; of a thing that was found, its outline is.
 const corrected = (kind, point) => {
-  const { prompt } = app.pointed.at(-1);
+  const { prompt: { candidate, ...prompt }, outline } = app.pointed.at(-1);
+  if (candidate) prompt.outline = thinned(outline.rings[0].slice(0, -1));
   outlined({ ...prompt, [kind]: [...(prompt[kind] ?? []), rounded(point)] });
 };
 
@@ -132,7 +135,8 @@ svg.addEventListener("pointerdown", (down) => {
     end: (event, click) => {
       if (!click) return;
       const point = place(event);
-      if (tool === "point") pointAt({ points: [rounded(point)] });
+      const found = down.target.closest(".thing");
+      if (tool === "point") pointAt(found ? { candidate: found.dataset.id } : { points: [rounded(point)] });
       else corrected(tool === "plus" ? "points" : "negative", point);
     },
     move: () => {},
@@ -167,10 +171,21 @@ on("pointed", () => {
   drawPointed();
 });
 
+const area = (ring) => Math.abs(ring.reduce((sum, [x, y], i) => {
+  const [u, v] = ring[(i + 1) % ring.length];
+  return sum + x * v - u * y;
+}, 0));
+
+// What stands out lights up under the pointer before it is clicked on; the smallest lies on top.
+const found = () => (tool !== "point" ? [] : [...app.things]
+  .sort((a, b) => area(b.rings[0]) - area(a.rings[0]))
+  .map((one) => s("path", { class: "thing", "data-id": one.id, d: path(one.rings) })));
+
 const drawPointed = () => {
   const r = 4 * unit();
   const marks = (points, kind) => (points ?? []).map(([cx, cy]) => s("circle", { class: kind, cx, cy, r }));
   layer("options").replaceChildren(
+    ...found(),
     ...app.pointed.flatMap(({ prompt, outline }) => [
       s("path", { class: outline.sound ? "pointed" : "pointed doubted", d: path(outline.rings) }),
       ...marks(prompt.points, "plus"), ...marks(prompt.negative, "minus"),

@@ -37,10 +37,10 @@ def test_a_scene_has_the_plan_as_it_is(server: Running, session: str) -> None:
     report = server.client.get(session).json()["last"]
     plan = server.client.get(f"{session}/scene").json()["plan"]
     assert plan["id"] == report["plan_id"] and plan["certified"]
-    places = dict(zip(report["robots"], map(tuple, report["positions"]), strict=True))
-    assert robots_of(plan) == places
+    pairs: Any = zip(report["robots"], report["positions"], strict=True)
+    assert robots_of(plan) == {name: (x, y) for name, (x, y) in pairs}
     assert plan["groups"][0]["nearest_px"] == pytest.approx(20, abs=1.1)
-    assert plan["worst"]["robot"] in places
+    assert plan["worst"]["robot"] in report["robots"]
     assert len(plan["areas"]) == 1
     missing = server.client.get(f"{session}/scene", params={"plan": "p-0"})
     assert missing.status_code == 404

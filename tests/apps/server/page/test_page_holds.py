@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 start = import_module("test_killed").start
+Axe: Any = import_module("axe_playwright_python.sync_playwright").Axe
 LONG = 20_000
 WIDTHS = (390, 768, 1440)
 FUZZED = 60
@@ -63,7 +63,7 @@ def check(here: Any) -> None:
     """Nothing is cut off at the side, and axe finds nothing."""
     width = here.page.viewport_size["width"]
     assert here.page.evaluate("document.documentElement.scrollWidth") <= width
-    found = Axe().run(here.page).response["violations"]
+    found: list[Any] = Axe().run(here.page).response["violations"]
     assert [(v["id"], v["nodes"][0]["html"][:200]) for v in found] == []
 
 

@@ -111,7 +111,9 @@ def test_by_touch_on_a_phone(server: Any, visit: Any) -> None:
     page.locator("#examples button").first.tap()
     expect(page.locator("#scene image")).to_be_attached(timeout=LONG)
     page.locator("[data-tool=point]").tap()
-    page.locator("#scene image").tap(position={"x": 160, "y": 65})
+    stage = page.locator("#scene image").bounding_box()
+    share = stage["width"] / 568
+    page.touchscreen.tap(stage["x"] + 246 * share, stage["y"] + 96 * share)
     expect(page.locator("#pointed .chip")).to_contain_text("confidence", timeout=LONG)
     page.fill("#words", "Surround it")
     page.locator("#send").tap()
@@ -188,6 +190,36 @@ def test_a_dragged_robot_that_breaks_the_contract_stands_by_itself(server: Any, 
     expect(here.page.locator("#certificate")).to_contain_text("stands by itself")
 
 
+def test_an_outline_is_corrected_by_points_on_it_and_off_it(server: Any, visit: Any) -> None:
+    here = visit(server.url)
+    page = here.page
+    here.begin()
+    page.click("[data-tool=point]")
+    expect(page.locator(".thing")).not_to_have_count(0, timeout=LONG)
+    stage = page.locator("#scene image").bounding_box()
+    scale = stage["width"] / 568
+
+    def click(x: float, y: float) -> Any:
+        with page.expect_request("**/outline") as asked:
+            page.mouse.click(stage["x"] + x * scale, stage["y"] + y * scale)
+        asked.value.response().finished()
+        return asked.value.post_data_json["prompt"]
+
+    assert click(246, 96)["candidate"].startswith("c")
+    expect(page.locator("#pointed .chip")).to_have_count(1, timeout=LONG)
+    page.click("[data-tool=plus]")
+    corrected = click(246, 40)
+    assert corrected["points"] == [[pytest.approx(246, abs=1), pytest.approx(40, abs=1)]]
+    assert len(corrected["outline"]) > 10 and "candidate" not in corrected
+    page.click("[data-tool=minus]")
+    again = click(350, 96)
+    assert len(again["points"]) == len(again["negative"]) == 1
+    expect(page.locator("#pointed .chip")).to_have_count(1)
+    page.click("#pointed button")
+    expect(page.locator("#pointed .chip")).to_have_count(0)
+    expect(page.locator("[data-tool=minus]")).to_be_disabled()
+
+
 def test_sliders_try_and_then_change_the_plan(server: Any, visit: Any) -> None:
     here = visit(server.url)
     here.begin()
@@ -230,6 +262,22 @@ def test_tokens_are_asked_for(serve: Any, visit: Any, tmp_path: Path, scheme: st
     here.page.keyboard.press("Enter")
     here.page.locator("#examples button").first.click(timeout=LONG)
     expect(here.page.locator("#scene image")).to_be_attached(timeout=LONG)
+
+
+def test_a_shared_link_shows_what_happens_and_lets_nothing_be_done(
+    server: Any, visit: Any
+) -> None:
+    here, other = visit(server.url), visit(server.url)
+    here.begin()
+    here.say("Surround the largest coin")
+    here.page.click("#share")
+    other.page.goto(here.page.input_value("#link"))
+    here.page.keyboard.press("Escape")
+    expect(other.page.locator(".robot")).to_have_count(8, timeout=LONG)
+    for hidden in ("#composer", "#go", "#undo", "#stop", "[data-tool=point]"):
+        expect(other.page.locator(hidden)).to_be_hidden()
+    here.say("take two away")
+    expect(other.page.locator(".robot")).to_have_count(6, timeout=LONG)
 
 
 def test_the_page_is_small(server: Any) -> None:
