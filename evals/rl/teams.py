@@ -105,23 +105,24 @@ class Teams:
         """What each robot sees, (teams, robots, SEEN), each axis as it moves along.
 
         The way to the outline, the distance from it (inside negative) and from the centre; the
-        gaps to the next robots either way round, 1 where all are even; the nearest others.
+        gaps to the next robots either way round, 1 where all are even; the ways to the nearest
+        others, by how close many stand in a unit of area, FAR for those there are not.
         """
         count = self.places.shape[1]
-        others = np.full((*self.places.shape[:2], NEIGHBOURS, 2), FAR)
-        order = np.argsort(self._apart, axis=2)[..., : min(NEIGHBOURS, count - 1)]
+        order = np.argsort(self._apart, axis=2)[..., : min(NEIGHBOURS, count - 1), None]
         ways = self.places[:, None] - self.places[:, :, None]
-        others[:, :, : order.shape[2]] = np.take_along_axis(ways, order[..., None], axis=2)
-        others[:, :, : order.shape[2]] *= np.sqrt(count)
-        others = np.stack([(others * axis[:, :, None]).sum(-1) for axis in self._frame], axis=-1)
+        near = np.take_along_axis(ways, order, axis=2) * np.sqrt(count)
+        others = np.stack([(near * axis[:, :, None]).sum(-1) for axis in self._frame], axis=-1)
+        flat = others.reshape(*self.places.shape[:2], -1)
+        lacking = ((0, 0), (0, 0), (0, 2 * NEIGHBOURS - flat.shape[2]))
         to_outline = [(self._way * axis).sum(-1) for axis in self._frame]
         from_centre = np.linalg.norm(self.places, axis=2)
         own = np.stack([*to_outline, self._off, from_centre, *self._gaps], axis=-1)
-        flat = others.reshape(*others.shape[:2], -1)
-        return np.clip(np.concatenate([own, flat], axis=2), -FAR, FAR).astype(np.float32)
+        seen = np.concatenate([own, np.pad(flat, lacking, constant_values=FAR)], axis=2)
+        return np.clip(seen, -FAR, FAR).astype(np.float32)
 
     def rewards(self) -> FloatArray:
-        """Of each robot as it stands, (teams, robots), at most 1; 1 for all where all is done.
+        """Of each robot as it stands, (teams, robots), at most 1.
 
         General: nearness to the point of the outline, at the usual clearance, that is nearest.
         Infill: nearness to the inside, and half of it by the distance to the nearest other robot.
@@ -146,7 +147,7 @@ class Teams:
         out = np.where(radius > 1e-6, self.places / np.maximum(radius, 1e-6), (1.0, 0.0))
         self._frame = (out, np.stack([-out[..., 1], out[..., 0]], axis=-1))
         self._apart = np.linalg.norm(self.places[:, None] - self.places[:, :, None], axis=-1)
-        self._apart += 2 * FAR * np.eye(self.places.shape[1])
+        self._apart += 4 * FAR * np.eye(self.places.shape[1])
         order = np.argsort(along, axis=1)
         rank = np.argsort(order, axis=1)
         ordered = np.take_along_axis(along, order, axis=1)
