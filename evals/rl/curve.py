@@ -16,7 +16,7 @@ from .policy import Checkpoint
 from .teams import CATEGORIES
 
 DRAWS, LEVEL = 2_000, 0.95
-SIZE, FRAME = (760, 440), (60, 40, 580, 390)
+SIZE, FRAME = (800, 440), (60, 40, 580, 390)
 """Of the picture, and its axes' box, px."""
 COLOURS = dict(zip(CATEGORIES, ((31, 119, 180), (44, 160, 44), (214, 39, 40)), strict=True))
 

@@ -92,7 +92,7 @@ class Trained:
         sizes = sorted({c.robots for c in self.checkpoints})
         seeds = min(map(len, self.policies.values()))
         words = f"PPO, teams of {' and '.join(map(str, sizes))}, {seeds} seed{'s'[: seeds > 1]}"
-        late = " and ".join(self.unconverged)
+        late = ", ".join(self.unconverged)
         return f"{words}; unconverged in {late}, not the paper's" if late else words
 
 
@@ -128,7 +128,7 @@ def trained(folder: Path) -> Trained:
     if lacking:
         options = "".join(f" --category {category}" for category in lacking)
         raise InputError(
-            f"{folder} holds no policy for {' and '.join(lacking)}; train it with "
+            f"{folder} holds no policy for {', '.join(lacking)}; train it with "
             f"{TRAIN} --out {folder}{options}."
         )
     hashes = "".join(c.sha256 for c in checkpoints)

@@ -193,7 +193,7 @@ def _learnt(row: Row, folder: Path | None, trials: int) -> list[Entry]:
     own = row.model_copy(update={"row": f"{row.row}: {policies.told}"})
     if not policies.unconverged:
         return [Entry(own, arm, trials)]
-    missing = "not run: the policies there are have not converged"
+    missing = f"not run: what was trained is unconverged; {TRAIN} with more --steps trains it anew"
     return [
         Entry(row.model_copy(update={"missing": missing}), None, trials),
         Entry(own.model_copy(update={"paper": {}}), arm, trials),

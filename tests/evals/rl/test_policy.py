@@ -86,7 +86,7 @@ def test_unconverged_policies_have_a_row_apart_from_the_papers_figures(tmp_path:
     assert (own["scored"], own["paper_sr"]) == ("4", "")
     assert list(found) == [ROW]
     assert (found[ROW]["scored"], found[ROW]["paper_sr"]) == ("0", "0.5")
-    assert "not run: the policies there are have not converged" in found[ROW]["remarks"]
+    assert "not run: what was trained is unconverged; formup eval train-rl with more --steps" in found[ROW]["remarks"]
 
 
 def test_without_policies_the_table_says_what_makes_them(
