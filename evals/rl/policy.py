@@ -91,7 +91,7 @@ class Trained:
         """In words, for the head of a row."""
         sizes = sorted({c.robots for c in self.checkpoints})
         seeds = min(map(len, self.policies.values()))
-        words = f"PPO, teams of {' and '.join(map(str, sizes))}, {seeds} seed{'s'[: seeds > 1]}"
+        words = f"PPO on true outlines, teams of {' and '.join(map(str, sizes))}, {seeds} seed{'s'[: seeds > 1]}"
         late = ", ".join(self.unconverged)
         return f"{words}; unconverged in {late}, not the paper's" if late else words
 

@@ -58,7 +58,7 @@ def test_converged_policies_stand_beside_the_papers_figures(tmp_path: Path) -> N
     policies, out = write_policies(tmp_path / "policies"), tmp_path / "run"
     assert formup(*TABLE, "--checkpoints", policies, "--out", out) == 0
     (line,) = totals(out).values()
-    assert line["row"] == f"{ROW}: PPO, teams of 6, 2 seeds"
+    assert line["row"] == f"{ROW}: PPO on true outlines, teams of 6, 2 seeds"
     assert (line["scored"], line["planned"], line["paper_sr"]) == ("4", "4", "0.5")
     rows = sorted(read_rows(out), key=lambda row: row.trial)
     assert {row.arm.model for row in rows} == {f"ppo#{trained(policies).sha256[:12]}"}
@@ -82,7 +82,7 @@ def test_unconverged_policies_have_a_row_apart_from_the_papers_figures(tmp_path:
     policies = write_policies(tmp_path / "policies", late="caging")
     assert formup(*TABLE, "--checkpoints", policies, "--out", tmp_path / "run") == 0
     found = totals(tmp_path / "run")
-    own = found.pop(f"{ROW}: PPO, teams of 6, 2 seeds; unconverged in caging, not the paper's")
+    own = found.pop(f"{ROW}: PPO on true outlines, teams of 6, 2 seeds; unconverged in caging, not the paper's")
     assert (own["scored"], own["paper_sr"]) == ("4", "")
     assert list(found) == [ROW]
     assert (found[ROW]["scored"], found[ROW]["paper_sr"]) == ("0", "0.5")
