@@ -89,9 +89,9 @@ class Trained:
     @property
     def told(self) -> str:
         """In words, for the head of a row."""
-        sizes = sorted({c.robots for c in self.checkpoints})
+        sizes = " and ".join(sorted({str(c.robots) for c in self.checkpoints}))
         seeds = min(map(len, self.policies.values()))
-        words = f"PPO on true outlines, teams of {' and '.join(map(str, sizes))}, {seeds} seed{'s'[: seeds > 1]}"
+        words = f"PPO on true outlines, teams of {sizes}, {seeds} seed{'s'[: seeds > 1]}"
         late = ", ".join(self.unconverged)
         return f"{words}; unconverged in {late}, not the paper's" if late else words
 

@@ -82,11 +82,16 @@ def test_unconverged_policies_have_a_row_apart_from_the_papers_figures(tmp_path:
     policies = write_policies(tmp_path / "policies", late="caging")
     assert formup(*TABLE, "--checkpoints", policies, "--out", tmp_path / "run") == 0
     found = totals(tmp_path / "run")
-    own = found.pop(f"{ROW}: PPO on true outlines, teams of 6, 2 seeds; unconverged in caging, not the paper's")
+    own = found.pop(
+        f"{ROW}: PPO on true outlines, teams of 6, 2 seeds; unconverged in caging, not the paper's"
+    )
     assert (own["scored"], own["paper_sr"]) == ("4", "")
     assert list(found) == [ROW]
     assert (found[ROW]["scored"], found[ROW]["paper_sr"]) == ("0", "0.5")
-    assert "not run: what was trained is unconverged; formup eval train-rl with more --steps" in found[ROW]["remarks"]
+    assert (
+        "not run: what was trained is unconverged; formup eval train-rl with more --steps"
+        in found[ROW]["remarks"]
+    )
 
 
 def test_without_policies_the_table_says_what_makes_them(
