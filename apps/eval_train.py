@@ -77,5 +77,5 @@ def _print(made: Checkpoint) -> None:
 def _print_category(name: str, own: list[Checkpoint]) -> None:
     if own:
         _, mean, (low, high) = summary(own)
-        ends = f"{low[-1]:.3f} to {high[-1]:.3f}, bootstrap over {len(own)} seeds"
-        say(f"{name}: interquartile mean {mean[-1]:.3f} (95 %: {ends})")
+        ends = f" (95 %: {low[-1]:.3f} to {high[-1]:.3f} by bootstrap)" if len(own) > 1 else ""
+        say(f"{name}: {mean[-1]:.3f}{ends}, interquartile mean of seeds: {len(own)}")

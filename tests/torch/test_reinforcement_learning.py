@@ -44,7 +44,7 @@ def test_a_seed_twice_makes_the_same_policy_and_what_is_trained_is_left(
     assert {path: path.stat().st_mtime_ns for path in before} == before
     said = capsys.readouterr().out
     assert f"unconverged: the budget ended it; weights {first.sha256[:12]}" in said
-    assert "caging: interquartile mean" in said
+    assert "interquartile mean of seeds: 1" in said
     assert (folder / "curve.png").read_bytes().startswith(b"\x89PNG")
 
 
