@@ -11,7 +11,7 @@ CONFORMANCE := @modelcontextprotocol/conformance@0.2.0-alpha.12
 # The build for processors alone; its own index is asked where no other has it.
 TORCH := torch==2.13.0+cpu
 TORCH_INDEX := https://download.pytorch.org/whl/cpu
-WITH_TORCH := -c constraints.txt -e '.[torch]' '$(TORCH)' hypothesis pytest
+WITH_TORCH := -c constraints.txt -e '.[torch,rl]' '$(TORCH)' hypothesis pytest
 
 .PHONY: wordings demo test test-servers test-torch check bench bench-evals bench-loop clean
 
@@ -48,9 +48,9 @@ test-servers: .venv/.ready-dev $(SERVERS:%=.venv/servers/%/.ready)
 	@$(call environment,$(@D),-r $<)
 	@touch $@
 
-# Networks are loaded and run on tiny checkpoints that the tests write.
+# Networks are loaded and run on tiny checkpoints that the tests write; robots are trained a little.
 test-torch: .venv/torch/.ready
-	.venv/torch/bin/pytest -q tests/torch
+	.venv/torch/bin/pytest -q tests/torch tests/evals/rl
 
 .venv/torch/.ready: pyproject.toml constraints.txt
 	@mkdir -p $(@D)

@@ -12,7 +12,8 @@ MethodName = Annotated[
     str,
     typer.Option(
         "--method",
-        help="rules, agent, alone, zerocap, segment-only, pile, scatter, boundary, circle or line.",
+        help="rules, agent, alone, zerocap, segment-only, rl, pile, scatter, boundary, circle or "
+        "line.",
     ),
 ]
 ModeName = Annotated[
@@ -27,7 +28,7 @@ ModelList = Annotated[
     typer.Option(
         "--model",
         help="Of agent, alone and zerocap, as in formup run, or replay:FOLDER; of segment-only a "
-        "segmenter; repeatable.",
+        "segmenter; of rl a folder of formup eval train-rl; repeatable.",
     ),
 ]
 PromptList = Annotated[

@@ -46,6 +46,9 @@ Segmenters = Annotated[
 Methods = Annotated[
     list[str] | None, typer.Option("--method", help="Only rows of this method; repeatable.")
 ]
+Checkpoints = Annotated[
+    Path | None, typer.Option("--checkpoints", help="Of formup eval train-rl, for the method rl.")
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with the latest run of the table.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Run nothing; say what it would cost.")]
 Form = Annotated[
@@ -61,6 +64,7 @@ def table(
     models: Models = None,
     segmenter: Segmenters = None,
     method: Methods = None,
+    checkpoints: Checkpoints = None,
     base_url: o.BaseUrl = None,
     prompts: o.PromptsFolder = None,
     task: e.TaskList = None,
@@ -82,7 +86,7 @@ def table(
     wanted, limit = table_named(name), inputs.dollars("--budget", budget)
     tries = None if trials is None else inputs.whole("--trials", trials, least=1)
     base = Method("agent", base_url=base_url, library=PromptLibrary(prompts))
-    found = entries(wanted, base, models or [], segmenter or [], tries)
+    found = entries(wanted, base, models or [], segmenter or [], tries, checkpoints)
     found = [entry for entry in found if not method or entry.row.method in method]
     suite = load_suite(wanted.suite)
     if dry_run:

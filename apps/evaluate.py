@@ -2,7 +2,15 @@
 
 import typer
 
-from . import eval_compare, eval_perception, eval_report, eval_run, eval_suites, eval_table
+from . import (
+    eval_compare,
+    eval_perception,
+    eval_report,
+    eval_run,
+    eval_suites,
+    eval_table,
+    eval_train,
+)
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
@@ -16,6 +24,7 @@ app.command(name="suites")(eval_suites.suites)
 app.command(name="add")(eval_suites.add)
 app.command(name="run")(eval_run.run_suite)
 app.command(name="table")(eval_table.table)
+app.command(name="train-rl")(eval_train.train_rl)
 app.command(name="compare")(eval_compare.compare)
 app.command(name="gate")(eval_compare.gate)
 app.command(name="merge")(eval_compare.merge_shards)

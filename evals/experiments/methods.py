@@ -14,6 +14,8 @@ from ...tools.errors import InputError
 from ...tools.perception.segmenters.registry import segmenter_named
 from ...tools.tool import Tool
 from ..grading.policies import POLICIES
+from ..rl.policy import RL, TRAIN, trained
+from ..rl.teams import CATEGORIES
 from ..tasks.task import Task
 from .coordinate_frame import PIXELS, Frame
 from .pointing import Mode, can_point
@@ -24,7 +26,7 @@ from .simulated_model import SIMULATED, SimulatedModel
 from .trials import USUAL, USUAL_SEGMENTER, Arm, Trial, canonical
 from .zerocap import CALLED, OBJECT, PLACES, ZEROCAP, ZeroCap
 
-METHODS = ("rules", "agent", "alone", ZEROCAP, SEGMENT_ONLY, *POLICIES)
+METHODS = ("rules", "agent", "alone", ZEROCAP, SEGMENT_ONLY, RL, *POLICIES)
 DIRECT = "former-direct"
 """The prompt of a model alone: to write coordinates."""
 NO_MODEL = {"rules": "offline", **dict.fromkeys(POLICIES, "none")}
@@ -34,6 +36,11 @@ WRITERS = ("alone", ZEROCAP)
 """Methods whose model writes coordinates itself."""
 DESCRIBED = (*WITH_TOOLS, ZEROCAP)
 """Methods that put shapes into words."""
+EXAMPLES = {
+    SEGMENT_ONLY: "langsam, a segmenter that takes text",
+    RL: f"DIR, a folder that {TRAIN} --out DIR has written",
+}
+"""Models of methods that take no language model."""
 SHIPPED = PromptLibrary()
 
 
@@ -44,7 +51,8 @@ class Method:
     Attributes:
         name: one of METHODS.
         model: of agent and alone, as Agent takes it, `simulated`, or replay:FOLDER; of
-            segment-only a segmenter that takes text; the others have their own.
+            segment-only a segmenter that takes text; of rl a folder of trained policies; the others
+            have their own.
         prompt: id@vNNN, None for the current one of the model's own.
         descriptor: how shapes are described.
         mode: how things are pointed at.
@@ -75,6 +83,8 @@ class Method:
         Raises:
             InputError: no such model or prompt.
         """
+        if self.name == RL:
+            return Arm(method=RL, model=f"ppo#{trained(Path(self.model)).sha256[:12]}")
         recorded = recordings(self.model)
         cut = None if self.segmenter == USUAL_SEGMENTER else self.segmenter
         if self.name in POLICIES or recorded:
@@ -146,6 +156,8 @@ class Method:
         """
         if task.dialogue is not None and self.name not in WITH_TOOLS:
             return False
+        if self.name == RL:
+            return bool(task.goals) and task.category in CATEGORIES
         recorded = recordings(self.model)
         return can_point(task, self.mode) and (
             recorded is None or recorded.of(task.id, 0) is not None
@@ -162,7 +174,7 @@ def check_method(arm: Method) -> Method:
     if name not in METHODS:
         raise InputError(f"Unknown method {name!r}. There are: {', '.join(METHODS)}.")
     for option, given, takers in (
-        ("--model", arm.model, ("agent", *WRITERS, SEGMENT_ONLY)),
+        ("--model", arm.model, ("agent", *WRITERS, *EXAMPLES)),
         ("--prompt", arm.prompt, ("agent", "alone")),
         ("--planner", arm.planner, ("agent", ZEROCAP)),
         ("--descriptor", arm.descriptor != USUAL, DESCRIBED),
@@ -174,7 +186,7 @@ def check_method(arm: Method) -> Method:
     if arm.model == "offline":
         raise InputError("The offline rules are a method of their own: --method rules.")
     if not arm.model and name not in NO_MODEL:
-        example = "langsam, a segmenter that takes text" if name == SEGMENT_ONLY else "openai:NAME"
+        example = EXAMPLES.get(name, "openai:NAME")
         raise InputError(f"The method {name} takes a --model, such as {example}.")
     if name == SEGMENT_ONLY and not (
         arm.model == USUAL_SEGMENTER or "text" in segmenter_named(arm.model).takes

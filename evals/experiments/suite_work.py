@@ -20,6 +20,7 @@ from ..grading.attempts import Attempt, grade_attempt
 from ..grading.dialogue import summary
 from ..grading.grades import VERSION, Graded
 from ..grading.policies import POLICIES, positions
+from ..rl.policy import RL, places
 from ..tasks.task import Dialogue, Task
 from .dialogue_work import Held, hold
 from .methods import WRITERS, Method
@@ -58,8 +59,8 @@ class SuiteWork:
         task, arm = self.tasks[trial.task], self.arms[trial.arm.name]
         if task.dialogue is not None:
             return self._dialogue(task, task.dialogue, arm, trial)
-        if arm.name in POLICIES:
-            attempt, run, cost = _by_policy(task, arm.name, trial.seed), None, {}
+        if arm.name in POLICIES or arm.name == RL:
+            attempt, run, cost = _by_policy(task, arm, trial), None, {}
         else:
             run, cost = self._run(task, arm, trial)
             lost = _lost(run)
@@ -167,9 +168,14 @@ def attempt_files(folder: Path, trial: Trial) -> tuple[Path, Path]:
     return folder / f"{name}.json", folder / f"{name}.jsonl"
 
 
-def _by_policy(task: Task, name: str, seed: int) -> Attempt:
+def _by_policy(task: Task, arm: Method, trial: Trial) -> Attempt:
     """Where nothing is to be placed, a policy moves robots all the same."""
-    placed = positions(name, task.goals, seed).tolist() if task.goals else [(0.0, 0.0)]
+    placed = [(0.0, 0.0)]
+    if arm.name == RL:
+        found = places(Path(arm.model), task.category, task.goals, trial.trial, trial.seed)
+        placed = found.tolist()
+    elif task.goals:
+        placed = positions(arm.name, task.goals, trial.seed).tolist()
     return Attempt("deployed", placed, placed)
 
 

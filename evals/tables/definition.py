@@ -16,6 +16,7 @@ from ..experiments.recordings import REPLAY
 from ..experiments.segment_only import SEGMENT_ONLY
 from ..experiments.simulated_model import SIMULATED
 from ..experiments.trials import USUAL_SEGMENTER, Trial
+from ..rl.policy import RL, TRAIN, trained
 from ..statistics.cells import cell_names
 
 _FILE = Path(__file__).with_name("tables.yaml")
@@ -130,6 +131,7 @@ def entries(
     models: Sequence[str],
     segmenters: Sequence[str],
     trials: int | None = None,
+    checkpoints: Path | None = None,
 ) -> list[Entry]:
     """The rows of a table with who fills them: a row stands for each of its models.
 
@@ -139,6 +141,7 @@ def entries(
         models: as Agent takes them, `simulated`, or replay:FOLDER; A+B where B plans for A.
         segmenters: NAME or NAME:CHECKPOINT of the networks there are.
         trials: tries of each task, in place of the table's own.
+        checkpoints: the folder of the policies of reinforcement learning.
 
     Raises:
         InputError: a model or segmenter that no row takes, or that cannot be used.
@@ -146,6 +149,11 @@ def entries(
     found, taken = list[Entry](), set[str]()
     cut = {name.partition(":")[0]: name for name in segmenters} | {USUAL_SEGMENTER: USUAL_SEGMENTER}
     for row in table.rows:
+        count = trials or row.trials or table.trials
+        if row.method == RL:
+            found += _learnt(row, checkpoints, count)
+            taken.add(str(checkpoints))
+            continue
         chosen = [""] if row.models is None else [m for m in models if _takes(table, row, m)]
         taken |= {*chosen, cut.get(row.segmenter, "")}
         wants = ""
@@ -154,9 +162,9 @@ def entries(
         elif not chosen:
             wants = f"--models {f'whose name holds {row.models}' if row.models else 'of yours'}"
         arms = [None] if row.missing or wants else [_arm(row, m, base, cut) for m in chosen]
-        count = trials or row.trials or table.trials
         found += [Entry(row, arm, count, wants) for arm in arms]
-    for option, names in (("model", models), ("segmenter", segmenters)):
+    given = [] if checkpoints is None else [str(checkpoints)]
+    for option, names in (("model", models), ("segmenter", segmenters), ("checkpoints", given)):
         lost = sorted(set(names) - taken)
         if lost:
             raise InputError(f"No row of this table is for the {option} {lost[0]!r}; leave it out.")
@@ -174,6 +182,22 @@ def _takes(table: Table, row: Row, model: str) -> bool:
     own = model.lower().rpartition("+")[2].partition(":")[2]
     named = [word for word in others if word in own]
     return row.models in (named or [""])
+
+
+def _learnt(row: Row, folder: Path | None, trials: int) -> list[Entry]:
+    """The row of trained policies; unconverged ones have a row apart from the paper's figures."""
+    if folder is None:
+        return [Entry(row, None, trials, f"--checkpoints DIR, which {TRAIN} --out DIR writes")]
+    policies = trained(folder)
+    arm = check_method(Method(RL, str(folder)))
+    own = row.model_copy(update={"row": f"{row.row}: {policies.told}"})
+    if not policies.unconverged:
+        return [Entry(own, arm, trials)]
+    missing = f"not run: what was trained is unconverged; {TRAIN} with more --steps trains it anew"
+    return [
+        Entry(row.model_copy(update={"missing": missing}), None, trials),
+        Entry(own.model_copy(update={"paper": {}}), arm, trials),
+    ]
 
 
 def _arm(row: Row, model: str, base: Method, cut: Mapping[str, str]) -> Method:

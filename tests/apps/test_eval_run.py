@@ -195,7 +195,7 @@ def test_a_task_with_a_wrong_truth_is_not_added(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--method", "magic"], "There are: rules, agent, alone, zerocap, segment-only, pile"),
+        (["--method", "magic"], "There are: rules, agent, alone, zerocap, segment-only, rl, pile"),
         (["--method", "agent"], "takes a --model"),
         (["--method", "alone", "--model", "offline"], "--method rules"),
         (["--method", "alone", "--model", "simulated"], "writes no coordinates alone"),

@@ -1,0 +1,1 @@
+"""The paper's baseline of reinforcement learning: teams of robots about a target, and policies."""
