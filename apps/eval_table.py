@@ -1,4 +1,4 @@
-"""`formup eval table`: the paper's tables with our rows beside the paper's, and one of our own."""
+"""`formup eval table`: the paper's tables with our rows beside the paper's, and two of our own."""
 
 from functools import partial
 from pathlib import Path
@@ -34,7 +34,7 @@ from .terminal import say, styled
 TERMINAL = "terminal"
 HEAD, CELL = 28, 12
 """Characters of the columns on a terminal, which may have to be wider than it is."""
-Name = Annotated[str, typer.Argument(metavar="TABLE", help="1, 2, 3 or hard.")]
+Name = Annotated[str, typer.Argument(metavar="TABLE", help="1, 2, 3, hard or ablations.")]
 Models = Annotated[
     list[str] | None,
     typer.Option("--models", help="As in formup run, or replay:FOLDER; repeatable."),
@@ -45,6 +45,10 @@ Segmenters = Annotated[
 ]
 Methods = Annotated[
     list[str] | None, typer.Option("--method", help="Only rows of this method; repeatable.")
+]
+Versions = Annotated[
+    list[str] | None,
+    typer.Option("--prompt", help="ID@VERSION that an ablation is made with; repeatable."),
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with the latest run of the table.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Run nothing; say what it would cost.")]
@@ -62,6 +66,7 @@ def table(
     segmenter: Segmenters = None,
     method: Methods = None,
     base_url: o.BaseUrl = None,
+    prompt: Versions = None,
     prompts: o.PromptsFolder = None,
     task: e.TaskList = None,
     trials: Tries = None,
@@ -82,7 +87,7 @@ def table(
     wanted, limit = table_named(name), inputs.dollars("--budget", budget)
     tries = None if trials is None else inputs.whole("--trials", trials, least=1)
     base = Method("agent", base_url=base_url, library=PromptLibrary(prompts))
-    found = entries(wanted, base, models or [], segmenter or [], tries)
+    found = entries(wanted, base, models or [], segmenter or [], tries, prompt or [])
     found = [entry for entry in found if not method or entry.row.method in method]
     suite = load_suite(wanted.suite)
     if dry_run:
