@@ -97,7 +97,7 @@ def _metric_named(text: str) -> Metric:
 
 
 def arm_rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
-    """The rows of one arm of a folder: the only one, or the one with all these words, or just them."""
+    """The rows of one arm of a folder: the only one, or that of, else with, all these words."""
     rows = read_rows(folder)
     words = named.split() if named else []
     arms = {arm.name: arm for arm in (row.arm for row in rows)}

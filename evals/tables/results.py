@@ -110,7 +110,7 @@ def tabled(
         if tokens and plan.entry.row.descriptor == USUAL:
             edges[who] = tokens
         others = (of_arms[arm] for arm in plan.entry.whole if arm in of_arms)
-        whole = next((rows for rows in others if _share(rows, trials)), list[TrialRow]())
+        whole = next((rows for rows in others if _tried_alike(rows, trials)), list[TrialRow]())
         made.append(_row(table, plan, trials, tasks, edges.get(who), whole))
     known = [row for trials in own for row in trials]
     return Tabled(name, table, known[0].suite if known else "", made, known)
@@ -161,12 +161,12 @@ def _result(
     scored: Sequence[TrialRow], planned: int, paper: Figure | None, whole: Sequence[TrialRow]
 ) -> Result:
     gcr = sum(row.gcr or 0.0 for row in scored) / max(len(scored), 1)
-    difference = compare(whole, scored).overall if _share(whole, scored) else None
+    difference = compare(whole, scored).overall if _tried_alike(whole, scored) else None
     passed = sum(bool(row.sr) for row in scored)
     return Result(passed, len(scored), planned, gcr, paper, difference)
 
 
-def _share(whole: Sequence[TrialRow], rows: Sequence[TrialRow]) -> bool:
+def _tried_alike(whole: Sequence[TrialRow], rows: Sequence[TrialRow]) -> bool:
     """Whether any scored trial of the ones is one of the others too."""
     tried = {(row.task, row.trial) for row in whole if row.scored}
     return any(row.scored and (row.task, row.trial) in tried for row in rows)
