@@ -51,7 +51,6 @@ Versions = Annotated[
     typer.Option("--prompt", help="ID@VERSION that an ablation is made with; repeatable."),
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with the latest run of the table.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Run nothing; say what it would cost.")]
 Form = Annotated[
     str, typer.Option("--format", help=f"What is printed: {', '.join([TERMINAL, *FORMATS])}.")
 ]
@@ -72,7 +71,7 @@ def table(
     trials: Tries = None,
     out: e.RunFolder = None,
     resume: Resume = False,
-    dry_run: DryRun = False,
+    dry_run: e.DryRun = False,
     budget: e.Budget = None,
     jobs: e.Jobs = "1",
     form: Form = TERMINAL,

@@ -128,7 +128,8 @@ def _row(
     left = 0 if entry.row.missing else plan.tasks * entry.trials - len(scored)
     tokens = _tokens(rows)
     each = tokens or usual_tokens(entry.row.method)
-    cost = _cost_usd(plan, left, each)
+    arm = entry.arm
+    cost = expected_usd(plan.model, left, each, base_url=arm and arm.base_url)
     said = [plan.model, f"{plan.tasks} of {tasks} tasks" if plan.tasks < tasks else ""]
     said += ["one try"] if entry.trials == 1 and scored else []
     said += [f"{tokens[0]:,} + {tokens[1]:,} tokens a trial"] if tokens else []
@@ -183,21 +184,41 @@ def _tokens(rows: Sequence[TrialRow]) -> tuple[int, int] | None:
 
 def _missing(entry: Entry, left: int, each: tuple[int, int], cost: float | None) -> str:
     """How much is missing, and what it would take."""
-    what = f"not run: {left:,} trial{'s' if left > 1 else ''}"
-    tokens = f"; about {left * each[0]:,} tokens in and {left * each[1]:,} out" if any(each) else ""
-    if entry.arm is None:
-        return f"{what} for want of {entry.wants}{tokens}"
+    if entry.arm is not None:
+        return f"not run: {expected(left, each, cost)}"
+    return f"not run: {_of_trials(left)} for want of {entry.wants}{_in_tokens(left, each)}"
+
+
+def expected(trials: int, each: tuple[int, int], cost: float | None) -> str:
+    """How many trials, and the dollars, else the tokens of each, that they are about to take."""
     if cost is None:
-        return f"{what}{tokens}, at a price that is not known"
-    return f"{what}; about {cost:.2f} USD" if cost else what
+        return f"{_of_trials(trials)}{_in_tokens(trials, each)}, at a price that is not known"
+    return f"{_of_trials(trials)}; about {cost:.2f} USD" if cost else _of_trials(trials)
 
 
-def _cost_usd(plan: Planned, trials: int, tokens: tuple[int, int]) -> float | None:
-    """What trials of a model would cost, of two the dearer; None where a price is not known."""
-    arm, model = plan.entry.arm, plan.model
+def _of_trials(trials: int) -> str:
+    return f"{trials:,} trial{'s' if trials > 1 else ''}"
+
+
+def _in_tokens(trials: int, each: tuple[int, int]) -> str:
+    told = f"; about {trials * each[0]:,} tokens in and {trials * each[1]:,} out"
+    return told if any(each) else ""
+
+
+def expected_usd(
+    model: str, trials: int, tokens: tuple[int, int], *, base_url: str | None = None
+) -> float | None:
+    """What trials of a model would cost, of two the dearer; None where a price is not known.
+
+    Args:
+        model: as Agent takes it, or A+B.
+        trials: how many.
+        tokens: of each, in and out.
+        base_url: of a server of one's own, whose prices are not known.
+    """
     if not any(tokens) or model == SIMULATED or model.startswith(REPLAY):
         return 0.0
     prices = [price_of(*name.partition(":")[::2]) for name in model.split("+")]
-    if UNKNOWN in prices or (arm is not None and arm.base_url):
+    if UNKNOWN in prices or base_url:
         return None
     return trials * max(p.cost(fresh=tokens[0], cached=0, output=tokens[1]) for p in prices)
