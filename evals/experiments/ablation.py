@@ -55,18 +55,19 @@ async def _placed(context: Context, **given: Any) -> ToolResult:
     node = context.world.plans.get(given["plan_id"] or context.proposed or "")
     if node is None or node.plan.verdict.certified or not context.settings.may_deploy:
         return await _done(deploy, context, given)
-    places = node.plan.formation.positions
+    places, robots = node.plan.formation.positions, node.plan.formation.robots
     arrival = Arrival(
         arrived=True,
         ended="arrived",
-        robots=node.plan.formation.robots,
+        robots=robots,
         certified=False,
         observed=places,
         residual_px=(0.0,) * len(places),
         tolerance_px=0.0,
         corrections=0,
     )
-    data = {"plan_id": node.plan.id, "arrived": True}
+    data = {"plan_id": node.plan.id, "arrived": True, "corrections": 0, "tolerance_px": 0.0}
+    data |= {"worst_residual_px": 0.0, "worst_robot": next(iter(robots), "1")}
     world = context.world.with_arrival(node.plan.id, arrival)
     return ToolResult(data, world=world, message=given["tell"])
 

@@ -216,6 +216,10 @@ REPORTS: list[tuple[dict[str, Any], tuple[str, ...]]] = [
         ("its a is former@v003", "its b is former@v002", "verdict is 'x'"),
     ),
     ({"a": None, "suite": 3}, ("is no report", "a:", "suite:")),
+    (
+        {"b": {"prompt": "former@v003", "sha256": "0" * 64, "without": "certificate"}},
+        ("its b was tried without certificate", "its b is another text"),
+    ),
 ]
 
 

@@ -119,3 +119,12 @@ def test_without_the_look_the_first_certified_plan_is_carried_out(
     assert "look_first" in heard[0].text
     less = carry_out("look", [[named, ("deploy", DONE)]])
     assert (less.outcome, less.requests) == ("deployed", 1)
+
+
+def test_nothing_but_the_methods_of_the_evaluation_leads_there() -> None:
+    root = Path(__file__).parents[3]
+    files = [
+        path for room in ("agent", "apps", "evals", "tools") for path in (root / room).rglob("*.py")
+    ]
+    named = {str(p.relative_to(root)) for p in files if "tools_without" in p.read_text("utf-8")}
+    assert named == {"evals/experiments/ablation.py", "evals/experiments/methods.py"}
