@@ -141,7 +141,7 @@ def _row(
     lost = len(rows) - len(scored)
     said += [f"{n} {what}" for n, what in ((invalid, "invalid"), (lost, "lost")) if n]
     if table.factors and scored:
-        said.append(f"{sum(row.placed and not row.sr for row in scored)} moved to wrong places")
+        said.append(f"{sum(row.placed and not row.sr for row in scored)} sent to wrong places")
     said += [entry.row.missing, _missing(entry, left, each, cost) if left else ""]
     said += [UNTRAINED] if entry.untrained and not left else []
     shown = [] if entry.untrained else scored

@@ -240,7 +240,7 @@ def test_ablations_are_compared_with_the_whole_on_the_same_trials(
         cell = found[head, "total"]
         assert (cell["passed"], cell["scored"], cell["difference"]) == ("1", "1", "0.0")
         assert float(cell["difference_low"]) < 0 < float(cell["difference_high"])
-    assert "0 moved to wrong places" in capsys.readouterr().out
+    assert "0 sent to wrong places" in capsys.readouterr().out
     before = read_table(tmp_path / "run")
     assert formup(*run, "--format", "json") == 0
     assert read_table(tmp_path / "run") == before == capsys.readouterr().out

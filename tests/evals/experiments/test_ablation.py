@@ -90,6 +90,7 @@ def test_without_the_certificate_a_wrong_plan_counts_as_driven_to_and_nothing_is
     assert (less.sr, less.placed, less.requests) == (False, True, 1)
     carry_out("certificate", calls)
     assert '"certified":true' in heard[0].text and '"findings":[]' in heard[0].text
+    assert '"arrived":true' in heard[1].text and '"worst_residual_px":0.0' in heard[1].text
 
 
 def test_without_the_certificate_a_right_plan_is_driven_to_as_ever(carry_out: Try) -> None:
