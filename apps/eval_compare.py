@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..evals.experiments.compare import compare as compared
-from ..evals.experiments.comparison import Comparison, Metric, Range
+from ..evals.experiments.comparison import Comparison, Metric, Range, in_points
 from ..evals.experiments.gate import MARGIN, Rise
 from ..evals.experiments.journal import merge, read_rows
 from ..evals.experiments.trials import Arm, TrialRow
@@ -97,11 +97,12 @@ def _metric_named(text: str) -> Metric:
 
 
 def arm_rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
-    """The rows of one arm of a folder: the only one, or the one with all these words."""
+    """The rows of one arm of a folder: the only one, or that of, else with, all these words."""
     rows = read_rows(folder)
     words = named.split() if named else []
     arms = {arm.name: arm for arm in (row.arm for row in rows)}
     chosen = {name for name, arm in arms.items() if all(_says(name, arm, word) for word in words)}
+    chosen = {name for name in chosen if len(name.split()) == len(words)} or chosen
     if rows and len(chosen) != 1:
         what = f"{option} {named!r} fits {len(chosen)} of these" if named else f"Give {option}"
         raise InputError(
@@ -154,7 +155,7 @@ def _differences(made: Comparison) -> Table:
         table.add_row(
             styled(name),
             str(found.tasks),
-            _in_points(found.estimate),
+            in_points(found.estimate),
             _interval_points(found.interval),
             _p(found.p_holm),
             "-" if found.fixed_tasks is None else _interval_points(found.fixed_tasks),
@@ -202,11 +203,7 @@ def _shares(found: Range | None) -> str:
 
 
 def _interval_points(found: Range | Rise) -> str:
-    return f"{_in_points(found.low)} to {_in_points(found.high)}"
-
-
-def _in_points(share: float) -> str:
-    return f"{round(100 * share, 1) + 0.0:+.1f}"
+    return f"{in_points(found.low)} to {in_points(found.high)}"
 
 
 def _p(value: float) -> str:

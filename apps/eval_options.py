@@ -53,6 +53,7 @@ RateList = Annotated[
     list[str] | None,
     typer.Option("--rate", help="MODEL=N: requests a minute at most, over all jobs; repeatable."),
 ]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Run nothing; say what it would cost.")]
 Jobs = Annotated[str, typer.Option("--jobs", help="Processes at once.")]
 DescribedSuite = Annotated[str, typer.Argument(metavar="[SUITE]", help="Whose things.")]
 NewFolder = Annotated[

@@ -20,6 +20,8 @@ from ..evals.experiments.runner import Sweep
 from ..evals.experiments.suite_work import SuiteWork
 from ..evals.experiments.trials import Trial
 from ..evals.statistics.cells import Chance, cells, chances
+from ..evals.tables.definition import usual_tokens
+from ..evals.tables.results import expected, expected_usd
 from ..evals.tasks.heldout_ledger import NAME as LEDGER
 from ..evals.tasks.heldout_ledger import look
 from ..evals.tasks.rendered_pictures import RenderedPicture, render
@@ -61,6 +63,7 @@ def run_suite(
     budget: e.Budget = None,
     rate: e.RateList = None,
     jobs: e.Jobs = "1",
+    dry_run: e.DryRun = False,
 ) -> None:
     """Run a suite: successes of trials by category and setup, with intervals and the chance level.
 
@@ -78,6 +81,9 @@ def run_suite(
     count, limit = inputs.whole("--trials", tries, least=1), inputs.dollars("--budget", budget)
     loaded = load_suite(suite, split, seeds)
     tasks, folder = tasks_tried(loaded, arms, task), out or new_folder(loaded.name)
+    if dry_run:
+        _say_costs(arms, len(tasks) * count)
+        return
     tried = [(arm, tasks, count) for arm in arms]
     with prepared(loaded, tried, split, folder) as made:
         planned = [trial for own in made.trials for trial in own]
@@ -121,6 +127,18 @@ def _arms(
         for prompt in prompts or [None]
         for descriptor in descriptors or ["edges"]
     ]
+
+
+def _say_costs(arms: Sequence[Method], trials: int) -> None:
+    """About what the trials of each arm would take, with tokens as usual for its method."""
+    costs = list[float | None]()
+    for arm in arms:
+        each, model = usual_tokens(arm.name), "+".join(filter(None, (arm.model, arm.planner)))
+        costs.append(expected_usd(model, trials, each, base_url=arm.base_url))
+        named = " ".join(filter(None, (arm.name, arm.prompt, model)))
+        say(f"{named}: {expected(trials, each, costs[-1])}")
+    more = ", and what has no known price" if None in costs else ""
+    say(f"all: {len(arms) * trials:,} trials; about {sum(filter(None, costs)):.2f} USD{more}")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""`formup eval table`: the paper's tables with our rows beside the paper's, and one of our own."""
+"""`formup eval table`: the paper's tables with our rows beside the paper's, and two of our own."""
 
 from functools import partial
 from pathlib import Path
@@ -34,7 +34,7 @@ from .terminal import say, styled
 TERMINAL = "terminal"
 HEAD, CELL = 28, 12
 """Characters of the columns on a terminal, which may have to be wider than it is."""
-Name = Annotated[str, typer.Argument(metavar="TABLE", help="1, 2, 3 or hard.")]
+Name = Annotated[str, typer.Argument(metavar="TABLE", help="1, 2, 3, hard or ablations.")]
 Models = Annotated[
     list[str] | None,
     typer.Option("--models", help="As in formup run, or replay:FOLDER; repeatable."),
@@ -49,8 +49,11 @@ Methods = Annotated[
 Checkpoints = Annotated[
     Path | None, typer.Option("--checkpoints", help="Of formup eval train-rl, for the method rl.")
 ]
+Versions = Annotated[
+    list[str] | None,
+    typer.Option("--prompt", help="ID@VERSION that an ablation is made with; repeatable."),
+]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with the latest run of the table.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Run nothing; say what it would cost.")]
 Form = Annotated[
     str, typer.Option("--format", help=f"What is printed: {', '.join([TERMINAL, *FORMATS])}.")
 ]
@@ -66,12 +69,13 @@ def table(
     method: Methods = None,
     checkpoints: Checkpoints = None,
     base_url: o.BaseUrl = None,
+    prompt: Versions = None,
     prompts: o.PromptsFolder = None,
     task: e.TaskList = None,
     trials: Tries = None,
     out: e.RunFolder = None,
     resume: Resume = False,
-    dry_run: DryRun = False,
+    dry_run: e.DryRun = False,
     budget: e.Budget = None,
     jobs: e.Jobs = "1",
     form: Form = TERMINAL,
@@ -86,7 +90,7 @@ def table(
     wanted, limit = table_named(name), inputs.dollars("--budget", budget)
     tries = None if trials is None else inputs.whole("--trials", trials, least=1)
     base = Method("agent", base_url=base_url, library=PromptLibrary(prompts))
-    found = entries(wanted, base, models or [], segmenter or [], tries, checkpoints)
+    found = entries(wanted, base, models or [], segmenter or [], tries, checkpoints, prompt or [])
     found = [entry for entry in found if not method or entry.row.method in method]
     suite = load_suite(wanted.suite)
     if dry_run:

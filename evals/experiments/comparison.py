@@ -15,6 +15,11 @@ Outcome = Literal["better", "worse", "inconclusive"]
 Rounded = Annotated[float, PlainSerializer(lambda value: round(value, 6), return_type=float)]
 
 
+def in_points(share: float) -> str:
+    """A difference of shares in points, with its sign."""
+    return f"{round(100 * share, 1) + 0.0:+.1f}"
+
+
 class _Value(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 

@@ -17,10 +17,11 @@ from ..grading.policies import POLICIES
 from ..rl.policy import RL, TRAIN, trained
 from ..rl.teams import CATEGORIES
 from ..tasks.task import Task
+from .ablation import Part, tools_without
 from .coordinate_frame import PIXELS, Frame
 from .pointing import Mode, can_point
 from .rate_limiter import RateLimited, rate_limiter
-from .recordings import REPLAY, recordings
+from .recordings import REPLAY, Spoken, recordings
 from .segment_only import SEGMENT_ONLY, SegmentOnly
 from .simulated_model import SIMULATED, SimulatedModel
 from .trials import USUAL, USUAL_SEGMENTER, Arm, Trial, canonical
@@ -59,6 +60,7 @@ class Method:
         planner: a second model of an agent, which plans without the picture.
         segmenter: what cuts things out; of segment-only the model itself.
         frame: in which one that writes coordinates alone gives them.
+        without: the part of the tools that is left out; of methods with tools.
         library: where prompts are.
         base_url: of the model's server.
         rate: requests per minute in each process at most; None for no limit.
@@ -72,6 +74,7 @@ class Method:
     planner: str | None = None
     segmenter: str = USUAL_SEGMENTER
     frame: Frame = PIXELS
+    without: Part | None = None
     library: PromptLibrary = SHIPPED
     base_url: str | None = None
     rate: float | None = None
@@ -89,7 +92,13 @@ class Method:
         cut = None if self.segmenter == USUAL_SEGMENTER else self.segmenter
         if self.name in POLICIES or recorded:
             model = recorded.name if recorded else self.model
-            return Arm(method=self.name, model=model, mode=self.mode, segmenter=cut)
+            return Arm(
+                method=self.name,
+                model=model,
+                mode=self.mode,
+                segmenter=cut,
+                without=self.without,
+            )
         agent = self.agent(0)
         return Arm(
             method=self.name,
@@ -101,6 +110,7 @@ class Method:
             mode=self.mode,
             segmenter=cut,
             frame=self.frame.name,
+            without=self.without,
         )
 
     def agent(self, seed: int, recording: Path | None = None) -> Agent:
@@ -117,6 +127,8 @@ class Method:
             return Agent(SegmentOnly(self.model))
         name = self.model if recording is None else f"{REPLAY}{recording}"
         model: str | Model = SimulatedModel(seed) if name == SIMULATED else name
+        if recording is not None and self.without:  # what tools answer is not what they answered
+            model = Spoken(recording)
         url = self.base_url if isinstance(model, str) and model != "offline" else None
         if self.name in WRITERS and name in ("offline", SIMULATED):
             raise InputError(f"{name} writes no coordinates alone; --model takes another.")
@@ -132,6 +144,7 @@ class Method:
                 prompt=self.prompt,
                 planner=self.planner,
                 library=self.library,
+                tools=tools_without(self.without),
             )
         if self.rate is not None:
             agent.model = RateLimited(agent.model, rate_limiter(self.model, self.rate))

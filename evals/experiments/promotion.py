@@ -14,12 +14,13 @@ from ...tools.tool import violations
 
 
 class Side(BaseModel):
-    """One of the two compared: the name of its prompt and the hash of its text."""
+    """One of the two compared: prompt, hash of its text, the part that it was tried without."""
 
     model_config = ConfigDict(frozen=True)
 
     prompt: str
     sha256: str
+    without: str | None = None
 
 
 class Comparison(BaseModel):
@@ -48,6 +49,8 @@ def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
     sides = (("a", report.a, current, "current"), ("b", report.b, promoted, "promoted"))
     wrong: list[str] = []
     for name, side, prompt, role in sides:
+        if side.without:
+            wrong.append(f"its {name} was tried without {side.without}")
         if not _is_named(side, prompt):
             wrong.append(f"its {name} is {side.prompt}, not {prompt.name}, the {role} version")
         elif side.sha256 != prompt.sha256:

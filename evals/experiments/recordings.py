@@ -6,12 +6,17 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from ...agent.fold import read_messages
+from ...agent.messages import Reply
+from ...agent.model import Request
 from ...agent.store.folder import read_events
-from ...tools.errors import InputError
+from ...agent.wrappers.replay import ReplayModel
+from ...tools.errors import InputError, ModelError
 
 REPLAY = "replay:"
 NAMED = 80
 """Characters of a task's id in the names of its files."""
+PLAN = re.compile(r"p-[0-9a-f]{10}")
 
 
 def file_name(task: str) -> str:
@@ -48,10 +53,43 @@ class Recordings:
             )
         return found[0] if found else None
 
+    @property
+    def staged(self) -> bool:
+        """Whether two shared the work: one looked, another planned."""
+        first = min(self.folder.glob("*.jsonl"), default=None)
+        return first is not None and "+" in read_events(first)[0].data["model"]
+
     def seed(self, path: Path) -> int:
         """The simulator's seed at the time, on which the tools' replies depend."""
         turn = next(event for event in read_events(path) if event.kind == "turn")
         return int(turn.data["settings"].get("seed", 0))
+
+
+class Spoken(ReplayModel):
+    """The recorded replies in turn, whatever is said in between; plans go by their new ids."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        lines = [event.data for event in read_events(path) if event.kind == "message"]
+        self._said = read_messages(lines, None)
+
+    async def reply(self, request: Request) -> Reply:
+        """The next one.
+
+        Raises:
+            ModelError: there is none.
+        """
+        count = len(request.messages)
+        said = self._said[count] if count < len(self._said) else None
+        if not isinstance(said, Reply):
+            raise ModelError("The recorded replies fit no more.")
+        named = {
+            old: new
+            for then, now in zip(self._said, request.messages, strict=False)
+            for old, new in zip(PLAN.findall(then.text), PLAN.findall(now.text), strict=False)
+        }
+        line = said.model_dump_json()
+        return Reply.model_validate_json(PLAN.sub(lambda m: named.get(m[0], m[0]), line))
 
 
 def recordings(model: str) -> Recordings | None:

@@ -38,6 +38,7 @@ class Arm(BaseModel):
         mode: how things are pointed at; words where they are not.
         segmenter: what cuts things out; None for the usual one.
         frame: in which coordinates were written; None for pixels.
+        without: the part that was left out; None for the whole.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -51,6 +52,7 @@ class Arm(BaseModel):
     mode: Name = "words"
     segmenter: Name | None = None
     frame: Name | None = None
+    without: Name | None = None
 
     @property
     def name(self) -> str:
@@ -58,7 +60,8 @@ class Arm(BaseModel):
         prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
         shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
         mode = "" if self.mode == "words" else f" {self.mode}"
-        more = "".join(f" {said}" for said in (self.segmenter, self.frame) if said)
+        less = self.without and f"without {self.without}"
+        more = "".join(f" {said}" for said in (self.segmenter, self.frame, less) if said)
         return f"{self.method}{prompt} {self.model}{shapes}{mode}{more}"
 
 

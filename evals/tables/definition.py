@@ -1,18 +1,20 @@
 """A table as data: columns, rows, the paper's figures, and who fills a row; see tables.yaml."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Literal, get_args
 
 import yaml
 from pydantic import BaseModel
 
 from ...tools.context import Descriptor
 from ...tools.errors import InputError
+from ..experiments.ablation import Part
 from ..experiments.methods import Method, check_method
 from ..experiments.pointing import Mode
-from ..experiments.recordings import REPLAY
+from ..experiments.recordings import REPLAY, recordings
 from ..experiments.segment_only import SEGMENT_ONLY
 from ..experiments.simulated_model import SIMULATED
 from ..experiments.trials import USUAL_SEGMENTER, Trial
@@ -24,6 +26,8 @@ TRAINED = 5_000_000
 """Bytes of weights under which no network was trained to see: a test's, written at random."""
 Figure = tuple[float, float | None]
 """SR and GCR as the paper prints them; Tables II and III have no GCR."""
+Factor = Literal["stages", "prompt"] | Part
+"""What an ablation changes: one stage for two or the other way, the prompt, or a part left out."""
 
 
 class Row(BaseModel, frozen=True, extra="forbid"):
@@ -56,6 +60,7 @@ class Table(BaseModel, frozen=True, extra="forbid"):
 
     Attributes:
         columns: title, and the cell (category, setup or style) that it shows.
+        factors: how rows are called that differ from one above in this alone.
         notes: what has to be said beside it.
         stand_ins: which task of the paper each of ours stands for.
     """
@@ -65,6 +70,7 @@ class Table(BaseModel, frozen=True, extra="forbid"):
     trials: int
     columns: dict[str, str]
     rows: tuple[Row, ...]
+    factors: dict[Factor, str] = {}
     notes: tuple[str, ...] = ()
     stand_ins: dict[str, str] = {}
 
@@ -81,12 +87,14 @@ class Entry:
         arm: None where nobody can, or has been named.
         trials: tries of each task.
         wants: what has to be named for it, such as an option; nothing where there is an arm.
+        whole: whom an ablation is compared with: the first of them who tried the same.
     """
 
     row: Row
     arm: Method | None
     trials: int
     wants: str = ""
+    whole: tuple[Method, ...] = ()
 
     @property
     def untrained(self) -> bool:
@@ -132,6 +140,7 @@ def entries(
     segmenters: Sequence[str],
     trials: int | None = None,
     checkpoints: Path | None = None,
+    prompts: Sequence[str] = (),
 ) -> list[Entry]:
     """The rows of a table with who fills them: a row stands for each of its models.
 
@@ -142,6 +151,7 @@ def entries(
         segmenters: NAME or NAME:CHECKPOINT of the networks there are.
         trials: tries of each task, in place of the table's own.
         checkpoints: the folder of the policies of reinforcement learning.
+        prompts: ID@VERSION, where they are a factor; else the version before the current one.
 
     Raises:
         InputError: a model or segmenter that no row takes, or that cannot be used.
@@ -168,7 +178,48 @@ def entries(
         lost = sorted(set(names) - taken)
         if lost:
             raise InputError(f"No row of this table is for the {option} {lost[0]!r}; leave it out.")
-    return found
+    if prompts and "prompt" not in table.factors:
+        raise InputError(f"No row of this table is for the prompt {prompts[0]!r}; leave it out.")
+    return list(_varied(table, found, prompts)) if table.factors else found
+
+
+def _varied(table: Table, found: Sequence[Entry], prompts: Sequence[str]) -> Iterator[Entry]:
+    """The rows, each followed by those that differ from it in one factor.
+
+    What was recorded in two stages differs from what was recorded in one.
+    """
+    recorded = {e.arm: recordings(e.arm.model) for e in found if e.arm is not None}
+    whole = tuple(arm for arm, kept in recorded.items() if kept and not kept.staged)
+    for entry in found:
+        arm = entry.arm
+        if arm is None:
+            yield entry
+        elif (kept := recorded[arm]) and kept.staged:
+            yield _less(entry, table.factors["stages"], arm, whole)
+        else:
+            yield entry
+            for factor, head in table.factors.items():
+                for other in _changed(factor, arm, prompts):
+                    yield _less(entry, head, other, (arm,))
+
+
+def _less(entry: Entry, head: str, arm: Method, whole: tuple[Method, ...]) -> Entry:
+    row = entry.row.model_copy(update={"row": f"{head} {arm.prompt or ''}".strip()})
+    return replace(entry, row=row, arm=arm, whole=whole)
+
+
+def _changed(factor: Factor, arm: Method, prompts: Sequence[str]) -> list[Method]:
+    """Who differs from an arm in a factor, if anybody can."""
+    if factor in get_args(Part):
+        return [replace(arm, without=factor)]
+    if arm.name != "agent" or arm.model.startswith(REPLAY):
+        return []
+    if factor == "stages":
+        other = None if arm.planner else arm.model
+        return [] if arm.model == SIMULATED else [replace(arm, planner=other)]
+    current = arm.library.load("planner" if arm.planner else "former")
+    before = [current.front.parent] if current.front.parent else []
+    return [replace(arm, prompt=name) for name in prompts or before]
 
 
 def _takes(table: Table, row: Row, model: str) -> bool:

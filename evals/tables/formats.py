@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ..experiments.comparison import in_points
 from ..report.matrix import STEPS, Matrix, MatrixCell, MatrixRow
 from .results import Result, Tabled
 
@@ -13,12 +14,19 @@ _ESCAPES = {c: f"\\{c}" for c in "&%$#_{}"} | {"–": "--", "~": r"\textasciitil
 
 
 def parts(result: Result) -> list[str]:
-    """What came of a cell: k/n, how many there are to be where some are missing; interval; GCR."""
+    """What came of a cell: k/n, how many there are to be where some are missing; interval; GCR.
+
+    Of an ablation also the difference to the whole, in points, and its interval.
+    """
     if result.interval is None:
         return ["–"]
     of = f" of {result.planned}" if result.scored < result.planned else ""
     ends = "–".join(_two_digits(end) for end in result.interval)
-    return [f"{result.passed}/{result.scored}{of}", ends, f"GCR {_two_digits(result.gcr)}"]
+    told = [f"{result.passed}/{result.scored}{of}", ends, f"GCR {_two_digits(result.gcr)}"]
+    if (found := result.difference) is None:
+        return told
+    low, high = (in_points(end) for end in (found.interval.low, found.interval.high))
+    return [*told, f"{in_points(found.estimate)} points", f"{low} to {high}"]
 
 
 def paper(result: Result) -> str:
@@ -48,7 +56,7 @@ def as_matrix(made: Tabled) -> Matrix:
 
 
 def _matrix_cell(result: Result) -> MatrixCell:
-    upper, lower, *more = [*parts(result), " "][:3]
+    upper, lower, *more = parts(result) if result.scored else ["–", " "]
     told = [f"paper {paper(result)}"] if result.paper else []
     shade = f"h{round(STEPS * result.passed / result.scored)}" if result.scored else ""
     return MatrixCell(upper, lower, (*more, *told), shade)
@@ -87,6 +95,9 @@ def _records(made: Tabled) -> list[dict[str, Any]]:
             "low": r.interval and round(r.interval.low, 4),
             "high": r.interval and round(r.interval.high, 4),
             "gcr": round(r.gcr, 4) if r.scored else None,
+            "difference": r.difference and round(r.difference.estimate, 4),
+            "difference_low": r.difference and round(r.difference.interval.low, 4),
+            "difference_high": r.difference and round(r.difference.interval.high, 4),
             "paper_sr": r.paper and r.paper[0],
             "paper_gcr": r.paper and r.paper[1],
             "left_usd": row.left_usd,

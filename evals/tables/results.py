@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from statistics import median
 
 from ...agent.providers.prices import UNKNOWN, price_of
+from ..experiments.compare import compare
+from ..experiments.comparison import Difference
 from ..experiments.recordings import REPLAY
 from ..experiments.simulated_model import SIMULATED
 from ..experiments.trials import USUAL, Trial, TrialRow
@@ -19,13 +21,18 @@ UNTRAINED = "run, but figures of weights too few to be trained are not shown"
 
 @dataclass(frozen=True)
 class Result:
-    """A cell: `passed` of `scored` trials and their mean GCR, of `planned`; the paper's figure."""
+    """A cell: `passed` of `scored` trials and their mean GCR, of `planned`; the paper's figure.
+
+    Attributes:
+        difference: of an ablation to the whole, over the trials that both have.
+    """
 
     passed: int
     scored: int
     planned: int
     gcr: float
     paper: Figure | None
+    difference: Difference | None = None
 
     @property
     def interval(self) -> Interval | None:
@@ -95,13 +102,16 @@ def tabled(
     """
     by_key = {row.key: row for row in rows}
     own = [[by_key[t.key] for t in plan.trials if t.key in by_key] for plan in planned]
+    of_arms = {plan.entry.arm: trials for plan, trials in zip(planned, own, strict=True)}
     edges: dict[tuple[str, str], tuple[int, int]] = {}
     made = list[ResultRow]()
     for plan, trials in zip(planned, own, strict=True):
         who, tokens = (plan.entry.row.method, plan.model), _tokens(trials)
         if tokens and plan.entry.row.descriptor == USUAL:
             edges[who] = tokens
-        made.append(_row(table, plan, trials, tasks, edges.get(who)))
+        others = (of_arms[arm] for arm in plan.entry.whole if arm in of_arms)
+        whole = next((rows for rows in others if _tried_alike(rows, trials)), list[TrialRow]())
+        made.append(_row(table, plan, trials, tasks, edges.get(who), whole))
     known = [row for trials in own for row in trials]
     return Tabled(name, table, known[0].suite if known else "", made, known)
 
@@ -112,12 +122,14 @@ def _row(
     rows: Sequence[TrialRow],
     tasks: int,
     edges: tuple[int, int] | None,
+    whole: Sequence[TrialRow],
 ) -> ResultRow:
     entry, scored = plan.entry, [row for row in rows if row.scored]
     left = 0 if entry.row.missing else plan.tasks * entry.trials - len(scored)
     tokens = _tokens(rows)
     each = tokens or usual_tokens(entry.row.method)
-    cost = _cost_usd(plan, left, each)
+    arm = entry.arm
+    cost = expected_usd(plan.model, left, each, base_url=arm and arm.base_url)
     said = [plan.model, f"{plan.tasks} of {tasks} tasks" if plan.tasks < tasks else ""]
     said += ["one try"] if entry.trials == 1 and scored else []
     said += [f"{tokens[0]:,} + {tokens[1]:,} tokens a trial"] if tokens else []
@@ -128,6 +140,8 @@ def _row(
     invalid = sum(row.status == "model_invalid" for row in scored)
     lost = len(rows) - len(scored)
     said += [f"{n} {what}" for n, what in ((invalid, "invalid"), (lost, "lost")) if n]
+    if table.factors and scored:
+        said.append(f"{sum(row.placed and not row.sr for row in scored)} sent to wrong places")
     said += [entry.row.missing, _missing(entry, left, each, cost) if left else ""]
     said += [UNTRAINED] if entry.untrained and not left else []
     shown = [] if entry.untrained else scored
@@ -136,6 +150,7 @@ def _row(
             [row for row in shown if table.within(column, row)],
             sum(table.within(column, trial) for trial in plan.trials),
             entry.row.paper.get(column),
+            [row for row in whole if table.within(column, row)],
         )
         for column in table.columns
     }
@@ -143,9 +158,19 @@ def _row(
     return ResultRow(entry.row.row, plan.model, results, tuple(filter(None, said)), spent, cost)
 
 
-def _result(scored: Sequence[TrialRow], planned: int, paper: Figure | None) -> Result:
+def _result(
+    scored: Sequence[TrialRow], planned: int, paper: Figure | None, whole: Sequence[TrialRow]
+) -> Result:
     gcr = sum(row.gcr or 0.0 for row in scored) / max(len(scored), 1)
-    return Result(sum(bool(row.sr) for row in scored), len(scored), planned, gcr, paper)
+    difference = compare(whole, scored).overall if _tried_alike(whole, scored) else None
+    passed = sum(bool(row.sr) for row in scored)
+    return Result(passed, len(scored), planned, gcr, paper, difference)
+
+
+def _tried_alike(whole: Sequence[TrialRow], rows: Sequence[TrialRow]) -> bool:
+    """Whether any scored trial of the ones is one of the others too."""
+    tried = {(row.task, row.trial) for row in whole if row.scored}
+    return any(row.scored and (row.task, row.trial) in tried for row in rows)
 
 
 def _tokens(rows: Sequence[TrialRow]) -> tuple[int, int] | None:
@@ -159,21 +184,41 @@ def _tokens(rows: Sequence[TrialRow]) -> tuple[int, int] | None:
 
 def _missing(entry: Entry, left: int, each: tuple[int, int], cost: float | None) -> str:
     """How much is missing, and what it would take."""
-    what = f"not run: {left:,} trial{'s' if left > 1 else ''}"
-    tokens = f"; about {left * each[0]:,} tokens in and {left * each[1]:,} out" if any(each) else ""
-    if entry.arm is None:
-        return f"{what} for want of {entry.wants}{tokens}"
+    if entry.arm is not None:
+        return f"not run: {expected(left, each, cost)}"
+    return f"not run: {_of_trials(left)} for want of {entry.wants}{_in_tokens(left, each)}"
+
+
+def expected(trials: int, each: tuple[int, int], cost: float | None) -> str:
+    """How many trials, and the dollars, else the tokens of each, that they are about to take."""
     if cost is None:
-        return f"{what}{tokens}, at a price that is not known"
-    return f"{what}; about {cost:.2f} USD" if cost else what
+        return f"{_of_trials(trials)}{_in_tokens(trials, each)}, at a price that is not known"
+    return f"{_of_trials(trials)}; about {cost:.2f} USD" if cost else _of_trials(trials)
 
 
-def _cost_usd(plan: Planned, trials: int, tokens: tuple[int, int]) -> float | None:
-    """What trials of a model would cost, of two the dearer; None where a price is not known."""
-    arm, model = plan.entry.arm, plan.model
+def _of_trials(trials: int) -> str:
+    return f"{trials:,} trial{'s' if trials > 1 else ''}"
+
+
+def _in_tokens(trials: int, each: tuple[int, int]) -> str:
+    told = f"; about {trials * each[0]:,} tokens in and {trials * each[1]:,} out"
+    return told if any(each) else ""
+
+
+def expected_usd(
+    model: str, trials: int, tokens: tuple[int, int], *, base_url: str | None = None
+) -> float | None:
+    """What trials of a model would cost, of two the dearer; None where a price is not known.
+
+    Args:
+        model: as Agent takes it, or A+B.
+        trials: how many.
+        tokens: of each, in and out.
+        base_url: of a server of one's own, whose prices are not known.
+    """
     if not any(tokens) or model == SIMULATED or model.startswith(REPLAY):
         return 0.0
     prices = [price_of(*name.partition(":")[::2]) for name in model.split("+")]
-    if UNKNOWN in prices or (arm is not None and arm.base_url):
+    if UNKNOWN in prices or base_url:
         return None
     return trials * max(p.cost(fresh=tokens[0], cached=0, output=tokens[1]) for p in prices)

@@ -214,3 +214,21 @@ def test_what_cannot_be_run_is_said(
 ) -> None:
     with pytest.raises(InputError, match=said):
         formup("eval", "run", suite, "--out", tmp_path / "x", *arguments)
+
+
+def test_what_it_would_cost_is_said_before_anything_is_run(
+    suite: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run: list[str | Path] = ["eval", "run", suite, "--method", "agent", "--trials", "10"]
+    run += ["--model", "openai:gpt-5", "--model", "ollama:x", "--model", "simulated"]
+    assert formup(*run, "--dry-run", "--out", tmp_path / "run") == 0
+    dear, own, free, total = capsys.readouterr().out.splitlines()
+    count = 10 * TASKS
+    assert re.fullmatch(rf"agent openai:gpt-5: {count} trials; about 0\.\d\d USD", dear)
+    assert own.startswith(f"agent ollama:x: {count} trials; about 420,000 tokens in and ")
+    assert own.endswith(" at a price that is not known")
+    assert free == f"agent simulated: {count} trials"
+    assert re.fullmatch(
+        rf"all: {3 * count} trials; about 0\.\d\d USD, and what has no known price", total
+    )
+    assert not (tmp_path / "run").exists()

@@ -98,7 +98,7 @@ def test_the_latest_run_of_a_table_is_gone_on_with(
 
 def test_what_is_not_tabled_is_refused_by_name(chance_run: Path, tmp_path: Path) -> None:
     for given, said in (
-        (["4"], "Unknown table '4'. There are: 1, 2, 3, hard."),
+        (["4"], "Unknown table '4'. There are: 1, 2, 3, hard, ablations."),
         (["1", "--format", "pdf"], "Unknown format 'pdf'. There are: terminal, markdown"),
         (["1", "--segmenter", "clipseg"], "No row of this table is for the segmenter 'clipseg'"),
         (["1", *CHANCE[3:], "--trials", "2", "--out", str(chance_run)], "one more than are tabled"),
@@ -219,3 +219,34 @@ def test_marks_are_not_where_any_frame_has_them(
     assert "openai:gpt-x is not comparable: marks are off by" in cell["remarks"]
     assert cell["scored"] == "0"
     assert len(asked) == 1
+
+
+def test_ablations_are_compared_with_the_whole_on_the_same_trials(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run: list[str | Path] = ["eval", "table", "ablations", "--method", "agent", "--trials", "1"]
+    run += ["--models", "simulated", "--models", "replay:tests/recordings/photos"]
+    run += ["--models", "replay:tests/recordings/two-stages", "--prompt", "former@v001"]
+    run += ["--task", "us_coins_t1", "--out", tmp_path / "run"]
+    assert formup(*run) == 0
+    found = cells(tmp_path / "run")
+    rows = [line["row"] for line in json.loads(read_table(tmp_path / "run"))["cells"]]
+    whole, less = rows[0], list(dict.fromkeys(rows))[1:5]
+    assert whole.startswith("formup: tools")
+    assert less[:3] == list(dict.fromkeys(rows))[1:4]
+    assert less[3] == "with the prompt former@v001"
+    assert found[whole, "total"]["difference"] == ""
+    for head in (*less, "in two stages, or one where the whole has two"):
+        cell = found[head, "total"]
+        assert (cell["passed"], cell["scored"], cell["difference"]) == ("1", "1", "0.0")
+        assert float(cell["difference_low"]) < 0 < float(cell["difference_high"])
+    assert "0 sent to wrong places" in capsys.readouterr().out
+    before = read_table(tmp_path / "run")
+    assert formup(*run, "--format", "json") == 0
+    assert read_table(tmp_path / "run") == before == capsys.readouterr().out
+    with pytest.raises(InputError, match="No row of this table is for the prompt 'former@v001'"):
+        formup("eval", "table", "3", "--prompt", "former@v001")
+
+
+def read_table(folder: Path) -> str:
+    return (folder / "table.json").read_text("utf-8")

@@ -82,7 +82,7 @@ def comparison(path: Path, old: str, new: str, **changes: Any) -> Path:
 def test_the_page_about_prompts_runs_as_written(cli_as_shipped: Cli, tmp_path: Path) -> None:
     page = (ROOT / "docs/prompts.md").read_text("utf-8")
     assert not re.search("|".join(f"{id}@v[0-9]" for id in PromptLibrary().ids()), page)
-    blocks = re.findall(r"```console\n(.*?)```", page, re.DOTALL)
+    blocks = re.findall(r"```console\n(.*?)```", page.partition("## Half an hour")[0], re.DOTALL)
     commands = [line.removeprefix("$ formup ") for block in blocks for line in block.splitlines()]
     shown: list[tuple[str, str]] = []
     for number, words in enumerate(map(shlex.split, commands), start=1):
@@ -216,6 +216,10 @@ REPORTS: list[tuple[dict[str, Any], tuple[str, ...]]] = [
         ("its a is former@v003", "its b is former@v002", "verdict is 'x'"),
     ),
     ({"a": None, "suite": 3}, ("is no report", "a:", "suite:")),
+    (
+        {"b": {"prompt": "former@v003", "sha256": "0" * 64, "without": "certificate"}},
+        ("its b was tried without certificate", "its b is another text"),
+    ),
 ]
 
 

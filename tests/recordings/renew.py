@@ -6,7 +6,6 @@ before and now: replies that no longer fit have to be given anew by somebody who
 """
 
 import json
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,51 +13,17 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from formup.agent.agent import Agent
-from formup.agent.fold import read_messages
-from formup.agent.messages import Reply
-from formup.agent.model import Request
 from formup.agent.store.folder import read_events
 from formup.agent.store.protocol import Event
-from formup.agent.wrappers.replay import ReplayModel
 from formup.evals.experiments.dialogue_work import hold
 from formup.evals.experiments.pointing import pointing
+from formup.evals.experiments.recordings import PLAN, Spoken
 from formup.evals.tasks.suites import load_suite
 from formup.tools.context import Settings
-from formup.tools.errors import ModelError
 from formup.tools.perception.image import load_picture
 
 DRAWN = Path(__file__).parent / "injected" / "images"
 TASKS = {t.id: t for name in ("photos", "many", "dialogues") for t in load_suite(name).tasks}
-
-
-PLAN = re.compile(r"p-[0-9a-f]{10}")
-
-
-class Spoken(ReplayModel):
-    """The recorded replies in turn, whatever is said in between; plans go by their new ids."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        lines = [event.data for event in read_events(path) if event.kind == "message"]
-        self._said = read_messages(lines, None)
-
-    async def reply(self, request: Request) -> Reply:
-        """The next one.
-
-        Raises:
-            ModelError: there is none.
-        """
-        count = len(request.messages)
-        said = self._said[count] if count < len(self._said) else None
-        if not isinstance(said, Reply):
-            raise ModelError("The recorded replies fit no more.")
-        named = {
-            old: new
-            for then, now in zip(self._said, request.messages, strict=False)
-            for old, new in zip(PLAN.findall(then.text), PLAN.findall(now.text), strict=False)
-        }
-        line = said.model_dump_json()
-        return Reply.model_validate_json(PLAN.sub(lambda m: named.get(m[0], m[0]), line))
 
 
 def renewed(path: Path, written: Path) -> tuple[Event, ...]:

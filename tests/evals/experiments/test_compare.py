@@ -86,6 +86,7 @@ def test_the_report_is_what_promotion_reads() -> None:
         "mode": "words",
         "segmenter": None,
         "frame": None,
+        "without": None,
     }
     assert report["b"]["prompt"] == "former@v002"
     assert (report["suite"], report["verdict"]) == (SUITE, "pass")

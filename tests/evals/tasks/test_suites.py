@@ -78,6 +78,7 @@ def test_a_right_answer_scores_1_and_no_understanding_little(name: str, split: s
 
 def test_what_ships() -> None:
     assert shipped() == [
+        "ablations",
         "dialogues",
         "exact",
         "formation-dev",

@@ -1,0 +1,103 @@
+"""The tools less one part of what they do, to see what it is worth: in the evaluation alone.
+
+They go by the same names and schemas. What is not certified reaches no fleet: where it was planned
+is taken for where it was observed, and nothing moves.
+"""
+
+from dataclasses import replace
+from inspect import isawaitable
+from typing import Any, Literal
+
+from ...tools.builtin import TOOLS
+from ...tools.builtin.committing import deploy, propose_formation
+from ...tools.builtin.editing import edit_formation
+from ...tools.context import Context
+from ...tools.errors import ToolError
+from ...tools.fleet.arrival import Arrival
+from ...tools.tool import Tool, ToolFunction, ToolResult
+
+Part = Literal["certificate", "doubts", "look"]
+"""The certificate of a formation, the doubts of a contract, the look at an outline before robots
+move."""
+
+
+def tools_without(part: Part | None) -> tuple[Tool, ...]:
+    """All tools, those that a part is in without it."""
+    changed: dict[Part | None, dict[str, ToolFunction]] = {
+        "certificate": {propose_formation.name: _uncertified, deploy.name: _placed},
+        "doubts": {propose_formation.name: _undoubted},
+        "look": {t.name: _unlooked(t) for t in (propose_formation, edit_formation)},
+    }
+    functions = changed.get(part, {})
+    return tuple(replace(t, function=functions.get(t.name, t.function)) for t in TOOLS)
+
+
+async def _done(tool: Tool, context: Context, given: dict[str, Any]) -> ToolResult:
+    """What a tool of formup's own gives back."""
+    made = tool.function(context, **given)
+    made = await made if isawaitable(made) else made
+    assert isinstance(made, ToolResult)
+    return made
+
+
+async def _uncertified(context: Context, **given: Any) -> ToolResult:
+    """A proposal of which the model hears no finding."""
+    made = await _done(propose_formation, context, given)
+    if made.data["certified"]:
+        return made
+    data = {k: v for k, v in made.data.items() if k not in ("partial", "next")}
+    message = None if context.settings.may_deploy else given["tell"]
+    return replace(made, data=data | {"certified": True, "findings": []}, message=message)
+
+
+async def _placed(context: Context, **given: Any) -> ToolResult:
+    """A deployment of what is certified, and else what is planned, taken as observed."""
+    node = context.world.plans.get(given["plan_id"] or context.proposed or "")
+    if node is None or node.plan.verdict.certified or not context.settings.may_deploy:
+        return await _done(deploy, context, given)
+    places, robots = node.plan.formation.positions, node.plan.formation.robots
+    arrival = Arrival(
+        arrived=True,
+        ended="arrived",
+        robots=robots,
+        certified=False,
+        observed=places,
+        residual_px=(0.0,) * len(places),
+        tolerance_px=0.0,
+        corrections=0,
+    )
+    data = {"plan_id": node.plan.id, "arrived": True, "corrections": 0, "tolerance_px": 0.0}
+    data |= {"worst_residual_px": 0.0, "worst_robot": next(iter(robots), "1")}
+    world = context.world.with_arrival(node.plan.id, arrival)
+    return ToolResult(data, world=world, message=given["tell"])
+
+
+async def _undoubted(context: Context, **given: Any) -> ToolResult:
+    """A proposal whose contract is taken for what the words say."""
+    try:
+        return await _done(propose_formation, context, given)
+    except ToolError as error:
+        if error.kind != "doubt":
+            raise
+        known = replace(context, doubted=context.doubted.union(error.facts["doubts"]))
+    meant = given["contract"].model_copy(update={"reading": "not asked for"})
+    return await _done(propose_formation, known, given | {"contract": meant})
+
+
+def _unlooked(tool: Tool) -> ToolFunction:
+    """A tool whose first certified plan is carried out, whatever its outlines look like."""
+
+    async def function(context: Context, **given: Any) -> ToolResult:
+        made = await _done(tool, context, given)
+        if made.world is None or "look_first" not in made.data:
+            return made
+        node = made.world.latest.model_copy(update={"unseen": ()})
+        world = made.world.with_plan(node)
+        if context.settings.may_deploy:
+            tell = given["tell"] or "They stand there."
+            called = {"plan_id": node.plan.id, "tell": tell, "follow": None}
+            return await _done(deploy, context.at(world), called)
+        data = {k: v for k, v in made.data.items() if k != "look_first"}
+        return ToolResult(data, world=world, message=given["tell"])
+
+    return function
