@@ -107,70 +107,70 @@ class Newcomer:
         self.page.screenshot(path=self.folder / f"{len(self.rows):02}.png")
 
 
-def _settled(page: "Page", turns: int) -> None:
-    page.locator("#log > li[data-status]").nth(turns - 1).wait_for(timeout=LONG)
-    page.wait_for_selector("#talk:not([aria-busy])", timeout=LONG)
-
-
 def _turns(page: "Page") -> int:
     return page.locator("#log > li[data-status]").count()
 
 
+def _open(new: Newcomer) -> None:
+    new.page.goto(new.url)
+    new.acts += 1
+    new.page.set_input_files("#file", PHOTOS / "us_coins.jpg")
+    new.page.wait_for_selector("#scene image", timeout=LONG)
+
+
+def _point(new: Newcomer) -> None:
+    new.click("[data-tool=box]")
+    new.drag(new.on_picture(*COIN[:2]), new.on_picture(*COIN[2:]))
+    new.page.wait_for_selector("#pointed .chip", timeout=LONG)
+
+
+def _drag(new: Newcomer) -> None:
+    new.click("[data-tool=move]")
+    x, y = new.robot(3)
+    new.drag((x, y), (x + 25, y + 10))
+
+
+def _move(new: Newcomer) -> None:
+    new.click("#go")
+    new.click("#approve")
+
+
+def _stop(new: Newcomer) -> None:
+    new.say("surround the smallest coin")
+    new.say("c9")
+    _move(new)
+    new.page.wait_for_selector("#stop.urgent", timeout=LONG)
+    new.page.wait_for_timeout(500)
+    new.acts += 1
+    new.page.keyboard.press("Escape")
+    new.page.locator("#log > li[data-status=stopped]").wait_for(timeout=LONG)
+
+
+def _share(new: Newcomer) -> None:
+    new.click("#share")
+    new.page.wait_for_selector("#shared[open]", timeout=LONG)
+
+
 def _tour(new: Newcomer) -> None:
-    page = new.page
-
-    def opened() -> None:
-        page.goto(new.url)
-        new.acts += 1
-        page.set_input_files("#file", PHOTOS / "us_coins.jpg")
-        page.wait_for_selector("#scene image", timeout=LONG)
-
-    def pointed() -> None:
-        new.click("[data-tool=box]")
-        new.drag(new.on_picture(*COIN[:2]), new.on_picture(*COIN[2:]))
-        page.wait_for_selector("#pointed .chip", timeout=LONG)
-
-    def done(act: Callable[[], None]) -> Callable[[], None]:
+    def turn(act: Callable[[], None]) -> Callable[[], None]:
         def work() -> None:
-            turns = _turns(page)
+            turns = _turns(new.page)
             act()
-            _settled(page, turns + 1)
+            new.page.locator("#log > li[data-status]").nth(turns).wait_for(timeout=LONG)
+            new.page.wait_for_selector("#talk:not([aria-busy])", timeout=LONG)
 
         return work
 
-    def dragged() -> None:
-        new.click("[data-tool=move]")
-        x, y = new.robot(3)
-        new.drag((x, y), (x + 25, y + 10))
-
-    def moved() -> None:
-        new.click("#go")
-        new.click("#approve")
-
-    def stopped() -> None:
-        new.say("surround the smallest coin")
-        new.say("c9")
-        moved()
-        page.wait_for_selector("#stop.urgent", timeout=LONG)
-        page.wait_for_timeout(500)
-        new.acts += 1
-        page.keyboard.press("Escape")
-        page.locator("#log > li[data-status=stopped]").wait_for(timeout=LONG)
-
-    def shared() -> None:
-        new.click("#share")
-        page.wait_for_selector("#shared[open]", timeout=LONG)
-
-    new.tries("open a photograph of one's own", opened)
-    new.tries("point at a thing with a box", pointed)
+    new.tries("open a photograph of one's own", lambda: _open(new))
+    new.tries("point at a thing with a box", lambda: _point(new))
     new.tries("say what to do", lambda: new.say("Surround it with 8 robots, 20 px from it"))
     new.tries("a bit further out", lambda: new.say("a bit further out"))
-    new.tries("drag a robot", done(dragged))
-    new.tries("undo", done(lambda: new.click("#undo")))
-    new.tries("move the team, and see it arrive", done(moved))
+    new.tries("drag a robot", turn(lambda: _drag(new)))
+    new.tries("undo", turn(lambda: new.click("#undo")))
+    new.tries("move the team, and see it arrive", turn(lambda: _move(new)))
     new.tries("ask how far robot 4 is", lambda: new.say("how far is robot 4 from it?"))
-    new.tries("send it elsewhere, and stop it on the way", stopped)
-    new.tries("share a link", shared)
+    new.tries("send it elsewhere, and stop it on the way", lambda: _stop(new))
+    new.tries("share a link", lambda: _share(new))
 
 
 def _frames(page: "Page", during: Callable[[], Any]) -> tuple[float, float]:

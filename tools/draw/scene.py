@@ -91,7 +91,7 @@ def robot_data(plan: Plan, before: Plan | None = None) -> list[dict[str, Any]]:
     formation = plan.formation
     wrong = {str(f.robot) for f in plan.verdict.findings if f.robot is not None}
     wrong |= {str(k) for f in plan.verdict.findings for k in f.others}
-    old = _places(before) if before else dict[str, tuple[float, float]]()
+    old = _places_of_robots(before) if before else dict[str, tuple[float, float]]()
     rows: list[dict[str, Any]] = []
     groups = [k for k, group in enumerate(formation.contract.groups) for _ in range(group.robots)]
     headings, numbers = formation.place_headings, {i: n for n, i in numbers_of(plan).items()}
@@ -117,7 +117,7 @@ def verdict_data(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _places(plan: Plan) -> Mapping[str, tuple[float, float]]:
+def _places_of_robots(plan: Plan) -> Mapping[str, tuple[float, float]]:
     formation = plan.formation
     return {
         name: (float(x), float(y))
@@ -166,7 +166,7 @@ def _plan_data(world: World, node: PlanNode) -> dict[str, Any]:
     }
 
 
-def _off(plan: Plan, world: World) -> dict[str, float]:
+def _clearances_of_robots(plan: Plan, world: World) -> dict[str, float]:
     """How far the edges of robots that stand outside of something are from it, px, by their ids."""
     contract, formation = plan.formation.contract, plan.formation
     names, off, first = formation.robot_of_place, dict[str, float](), 0
@@ -182,7 +182,7 @@ def _off(plan: Plan, world: World) -> dict[str, float]:
 
 def _groups(plan: Plan, world: World) -> list[dict[str, Any]]:
     """The contract's groups; of those outside of something also how far the nearest robot is."""
-    off, first, rows = _off(plan, world), 0, list[dict[str, Any]]()
+    off, first, rows = _clearances_of_robots(plan, world), 0, list[dict[str, Any]]()
     for group in plan.formation.contract.groups:
         names = plan.formation.robot_of_place[first : first + group.robots]
         first += group.robots
@@ -195,7 +195,7 @@ def _groups(plan: Plan, world: World) -> list[dict[str, Any]]:
 
 def _worst(plan: Plan, world: World) -> dict[str, Any] | None:
     """The robot nearest to what it stands around, and how far its edge is from it."""
-    off = _off(plan, world)
+    off = _clearances_of_robots(plan, world)
     if not off:
         return None
     robot = min(off, key=lambda name: off[name])

@@ -17,6 +17,7 @@ Axe: Any = import_module("axe_playwright_python.sync_playwright").Axe
 LONG = 20_000
 WIDTHS = (390, 768, 1440)
 FUZZED = 60
+KEYS = ("v", "p", "b", "l", "g", "Escape", "Enter", "Tab", "ArrowUp", "Control+z")
 
 
 def test_a_server_that_is_killed_while_robots_drive(
@@ -67,48 +68,55 @@ def check(here: Any) -> None:
     assert [(v["id"], v["nodes"][0]["html"][:200]) for v in found] == []
 
 
+class Hands:
+    """Does anything at all with a page."""
+
+    def __init__(self, page: Any, seed: int) -> None:
+        self.page, self.chance = page, random.Random(seed)
+        self.stage = page.locator("#stage").bounding_box()
+
+    def somewhere(self) -> tuple[float, float]:
+        x = self.stage["x"] + self.chance.random() * self.stage["width"]
+        return x, self.stage["y"] + self.chance.random() * self.stage["height"]
+
+    def drag(self) -> None:
+        self.page.mouse.move(*self.somewhere())
+        self._pressed()
+
+    def drag_robot(self) -> None:
+        marks = self.page.locator(".robot .disc").all()
+        box = self.chance.choice(marks).bounding_box() if marks else None
+        if box is not None:
+            self.page.mouse.move(box["x"] + 3, box["y"] + 3)
+            self._pressed()
+
+    def _pressed(self) -> None:
+        self.page.mouse.down()
+        self.page.mouse.move(*self.somewhere(), steps=3)
+        if self.chance.random() < 0.1:
+            self.page.keyboard.press("Escape")
+        self.page.mouse.up()
+
+    def press(self) -> None:
+        self.page.keyboard.press(self.chance.choice(KEYS))
+
+    def turn_wheel(self) -> None:
+        self.page.mouse.move(*self.somewhere())
+        self.page.mouse.wheel(0, self.chance.choice([-300, 300]))
+
+    def click(self) -> None:
+        self.page.mouse.click(*self.somewhere())
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_random_gestures_leave_page_and_server_agreed(server: Any, visit: Any, seed: int) -> None:
-    here, chance = visit(server.url), random.Random(seed)
+    here = visit(server.url)
     here.begin()
     here.say("Surround the largest coin")
-    page = here.page
-    stage = page.locator("#stage").bounding_box()
-
-    def somewhere() -> tuple[float, float]:
-        x = stage["x"] + chance.random() * stage["width"]
-        return x, stage["y"] + chance.random() * stage["height"]
-
-    def dragged() -> None:
-        page.mouse.move(*somewhere())
-        page.mouse.down()
-        page.mouse.move(*somewhere(), steps=3)
-        if chance.random() < 0.2:
-            page.keyboard.press("Escape")
-        page.mouse.up()
-
-    def robot() -> None:
-        marks = page.locator(".robot .disc").all()
-        box = chance.choice(marks).bounding_box() if marks else None
-        if box is not None:
-            page.mouse.move(box["x"] + 3, box["y"] + 3)
-            page.mouse.down()
-            page.mouse.move(*somewhere(), steps=3)
-            page.mouse.up()
-
-    def key() -> None:
-        page.keyboard.press(
-            chance.choice(
-                ["v", "p", "b", "l", "g", "Escape", "Enter", "Tab", "ArrowUp", "Control+z"]
-            )
-        )
-
-    def wheel() -> None:
-        page.mouse.move(*somewhere())
-        page.mouse.wheel(0, chance.choice([-300, 300]))
-
+    page, hands = here.page, Hands(here.page, seed)
+    gestures = [hands.drag, hands.drag_robot, hands.drag_robot, hands.press, hands.turn_wheel]
     for _ in range(FUZZED):
-        chance.choice([dragged, robot, robot, key, wheel, lambda: page.mouse.click(*somewhere())])()
+        hands.chance.choice([*gestures, hands.click])()
         if page.locator("dialog[open]").count():
             page.keyboard.press("Escape")
     page.wait_for_timeout(1500)

@@ -264,9 +264,7 @@ def test_tokens_are_asked_for(serve: Any, visit: Any, tmp_path: Path, scheme: st
     expect(here.page.locator("#scene image")).to_be_attached(timeout=LONG)
 
 
-def test_a_shared_link_shows_what_happens_and_lets_nothing_be_done(
-    server: Any, visit: Any
-) -> None:
+def test_a_shared_link_shows_what_happens_and_lets_nothing_be_done(server: Any, visit: Any) -> None:
     here, other = visit(server.url), visit(server.url)
     here.begin()
     here.say("Surround the largest coin")
