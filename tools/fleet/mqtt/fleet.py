@@ -57,7 +57,6 @@ class MqttFleet:
         self.tracking_error = settings.pixels(settings.tracking_error)
         self.stopped, self._stops = False, 0
         self._driving = self._closed = False
-        self._restless: tuple[str, ...] = ()
         self._others = -OTHERS
         self.poses = Poses(settings)
         patterns = (topics.pose, topics.goal)
@@ -78,13 +77,6 @@ class MqttFleet:
         if len(poses) < len(self.settings.robots):
             self._check_seen()
         check_ages(poses, now, max_age)
-        if self._restless:
-            robots, self._restless = self._restless, ()
-            raise RobotsFailedError(
-                f"Robot {', '.join(robots)} was told to hold and was seen to move on: hold it by "
-                "hand, and look at its watchdog.",
-                robots,
-            )
         return poses
 
     async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
@@ -95,7 +87,14 @@ class MqttFleet:
         self._driving, stops = True, self._stops
         try:
             await self.observe()
+            if moving := await self._until_still():
+                raise RobotsFailedError(
+                    f"Robot {', '.join(moving)} moves, though it is not driven: hold it by hand, "
+                    "and look at its watchdog.",
+                    moving,
+                )
             joined, release = self._link.joined, Release(motion, self)
+            due = time.monotonic()
             while True:
                 poses = self.poses.seen()
                 self._check_going(motion, stops, joined)
@@ -105,7 +104,8 @@ class MqttFleet:
                 yield poses
                 if release.there:
                     return
-                await asyncio.sleep(self.settings.period)
+                due = max(due + self.settings.period, time.monotonic())
+                await asyncio.sleep(due - time.monotonic())
         finally:
             self._hold("end")
             await self._until_still()
@@ -145,20 +145,22 @@ class MqttFleet:
         message = {"reason": reason}
         self._link.say(self.settings.topics.hold, message, surely=True)
 
-    async def _until_still(self) -> None:
-        """Wait until robots that were told to hold stand, and note those that do not."""
+    async def _until_still(self) -> tuple[str, ...]:
+        """Wait until all robots stand, a while at most; return those that move on."""
         pause = max(3 * self.settings.period, HOLDING / 10)
         slow, before, since = 0.1 * self.speed * pause, self.poses.seen(), time.monotonic()
         middle = before
         while self._link.connected and time.monotonic() < since + HOLDING:
             await asyncio.sleep(pause)
             now = self.poses.seen()
-            if not _moved(before, now, max(SETTLED, slow)):
-                return
+            if any(a.seen == b.seen for a, b in zip(before, now, strict=False)):
+                continue
+            if not _seen_moving(before, now, max(SETTLED, slow)):
+                return ()
             before = now
             if time.monotonic() < since + HOLDING / 2:
                 middle = now
-        self._restless = _moved(middle, before, self.tracking_error)
+        return _seen_moving(middle, before, self.tracking_error)
 
     def _check_open(self) -> None:
         if self._closed:
@@ -247,8 +249,8 @@ class Release:
 
     def _look(self, points: FloatArray) -> None:
         """Note whether robots are there, or as near as they can come."""
-        off, now = _distances(points, self._ends), time.monotonic()
-        if _distances(points, self._stood).max() > SETTLED:
+        off, now = _lengths(points, self._ends), time.monotonic()
+        if _lengths(points, self._stood).max() > SETTLED:
             self._stood, self._since = points, now
         calm = now - self._since >= CALM and off.max() <= self._fleet.tracking_error
         self.there = bool(calm or off.max() <= SETTLED)
@@ -265,11 +267,13 @@ def open_fleet(request: FleetRequest) -> MqttFleet:
     return MqttFleet(mqtt_fleet(request.config))
 
 
-def _distances(points: FloatArray, others: FloatArray) -> FloatArray:
+def _lengths(points: FloatArray, others: FloatArray) -> FloatArray:
     return np.linalg.norm(points - others, axis=1)
 
 
-def _moved(before: tuple[Pose, ...], after: tuple[Pose, ...], limit: float) -> tuple[str, ...]:
+def _seen_moving(
+    before: tuple[Pose, ...], after: tuple[Pose, ...], limit: float
+) -> tuple[str, ...]:
     """Robots that were seen further away than so many px."""
     was = {pose.id: (pose.x, pose.y) for pose in before}
     return tuple(

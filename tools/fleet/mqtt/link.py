@@ -23,6 +23,8 @@ these, and then says the last will."""
 AGAIN = 0.5
 """Seconds between tries to connect."""
 CONNECTING = 5.0
+MOST_BYTES = 65_536
+"""Of a message; longer ones are not passed on by the broker."""
 EXPIRY = 1
 """Seconds for which a broker keeps what it cannot pass on."""
 
@@ -45,7 +47,7 @@ class Link:
         trouble: why not, in words.
 
     Raises:
-        InputError: the library is not installed.
+        InputError: the library is not installed, or the environment names no certificates.
     """
 
     def __init__(
@@ -85,12 +87,12 @@ class Link:
         while not self._closed.is_set():
             try:
                 self._client = client = self._made()
-                client.connect(host, port, KEEP_ALIVE, clean_start=True)
+                client.connect(host, port, KEEP_ALIVE, clean_start=True, properties=self._small)
                 client.loop_start()
                 self._ended.wait()
                 client.disconnect()
                 client.loop_stop()
-            except (OSError, ValueError) as error:
+            except (OSError, ValueError, InputError) as error:
                 self.trouble = getattr(error, "strerror", None) or str(error)
             self._closed.wait(AGAIN)
             self._ended.clear()
@@ -103,16 +105,26 @@ class Link:
             from paho.mqtt.properties import Properties
         except ImportError:
             raise InputError("Robots on MQTT need an extra: pip install 'formup[mqtt]'.") from None
-        self._expiring = Properties(PacketTypes.PUBLISH)
+        self._expiring, self._small = (
+            Properties(PacketTypes.PUBLISH),
+            Properties(PacketTypes.CONNECT),
+        )
         self._expiring.MessageExpiryInterval = EXPIRY
+        self._small.MaximumPacketSize = MOST_BYTES
         version = CallbackAPIVersion.VERSION2
         client = Client(version, protocol=MQTTProtocolVersion.MQTTv5, reconnect_on_failure=False)
         client.connect_timeout = CONNECTING
-        if name := _said("USERNAME"):
-            client.username_pw_set(name, _said("PASSWORD"))
+        if name := _environment("USERNAME"):
+            client.username_pw_set(name, _environment("PASSWORD"))
         if self._address[2]:
-            trusted, own, key = (_said(word) for word in ("CA", "CERTIFICATE", "KEY"))
-            client.tls_set(trusted, own, key)
+            trusted, own, key = (_environment(word) for word in ("CA", "CERTIFICATE", "KEY"))
+            try:
+                client.tls_set(trusted, own, key)
+            except (OSError, ValueError) as error:
+                raise InputError(
+                    "FORMUP_MQTT_CA, FORMUP_MQTT_CERTIFICATE and FORMUP_MQTT_KEY have to name PEM "
+                    f"files: {getattr(error, 'strerror', None) or error}."
+                ) from None
         if self._will is not None:
             client.will_set(self._will[0], json.dumps(self._will[1]), qos=1)
         client.on_connect, client.on_disconnect = self._came, self._went
@@ -150,7 +162,7 @@ class Link:
         self._ended.set()
 
 
-def _said(word: str) -> str | None:
+def _environment(word: str) -> str | None:
     """What the environment says of who logs in."""
     return os.environ.get(f"FORMUP_MQTT_{word}") or None
 

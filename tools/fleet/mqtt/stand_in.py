@@ -114,8 +114,9 @@ class StandIns:
         self._sim.step(np.hstack([np.array(goals), np.zeros((len(goals), 2))]))
         self._seq += 1
         for i, name in enumerate(self.robots):
-            if self._sim.seen[i] >= self._sim.now:
-                self._say(i, name)
+            message = self._message(i)
+            if message is not None:
+                self.link.say(self._settings.topics.pose.replace("{robot}", name), message)
         for what, names in [*self._changes.items()]:
             self._told(f"{what}: {', '.join(names)}")
         self._changes.clear()
@@ -124,11 +125,12 @@ class StandIns:
         """Leave the wire."""
         self.link.close()
 
-    def _say(self, i: int, name: str) -> None:
-        frame, (x, y) = self._settings.frame, self._sim.sensed[i].tolist()
-        x, y = frame.to_robots(x, y)
-        message: dict[str, object] = {"seq": self._seq, "x": round(x, 6), "y": round(y, 6)}
-        self.link.say(self._settings.topics.pose.replace("{robot}", name), message)
+    def _message(self, i: int) -> dict[str, object] | None:
+        """What a robot says; None where it is not seen."""
+        if self._sim.seen[i] < self._sim.now:
+            return None
+        x, y = self._settings.frame.to_robots(*self._sim.sensed[i].tolist())
+        return {"seq": self._seq, "x": round(x, 6), "y": round(y, 6)}
 
     def _heard(self, topic: str, payload: bytes) -> None:
         if topic == self._settings.topics.hold:  # whatever it says

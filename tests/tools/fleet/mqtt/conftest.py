@@ -47,10 +47,10 @@ class Broker:
             self.port: int = free.getsockname()[1]
         self.url = f"mqtt://127.0.0.1:{self.port}"
         self._config = folder / f"mosquitto-{self.port}.conf"
-        mine = f"listener {self.port} 127.0.0.1\nset_tcp_nodelay true\nmax_queued_messages 0\n"
+        # As the user who runs the tests: else it could not read their files.
+        mine = f"user root\nlistener {self.port} 127.0.0.1\nset_tcp_nodelay true\n"
         self._config.write_text(mine + more)
         self._process: subprocess.Popen[bytes] | None = None
-        self.start()
 
     def start(self) -> None:
         assert MOSQUITTO is not None
@@ -79,6 +79,7 @@ def brokers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., 
 
     def make(more: str = "allow_anonymous true\n") -> Broker:
         made.append(Broker(tmp_path_factory.mktemp("broker"), more))
+        made[-1].start()
         return made[-1]
 
     yield make
@@ -90,6 +91,30 @@ def brokers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., 
 def shared(brokers: Callable[..., Broker]) -> Broker:
     """One broker for all tests that leave it alone; each has topics of its own."""
     return brokers()
+
+
+class Faulty(StandIns):
+    """Stand-ins of which some do what they should not, from when their ids are put in here."""
+
+    def __init__(self, settings: MqttSettings, told: Callable[[str], None]) -> None:
+        self.faults: dict[str, Callable[[dict[str, Any], int], dict[str, Any] | None]] = {}
+        self.runaway = set[str]()
+        super().__init__(settings, told)
+        self._seq = 1_000
+
+    def step(self) -> None:
+        for i, robot in enumerate(self.robots):
+            self._sim.points[i] += (5 * (robot in self.runaway), 0)
+        super().step()
+
+    def reboot(self) -> None:
+        self._seq = 0
+
+    def _message(self, i: int) -> dict[str, Any] | None:
+        message, robot = super()._message(i), self._settings.robots[i]
+        if message is None or robot not in self.faults:
+            return message
+        return self.faults[robot](message, self._seq)
 
 
 class Lab:
@@ -107,17 +132,17 @@ class Lab:
         self.path, self.told = path, list[str]()
         self.settings: MqttSettings = mqtt_fleet(path)
         self._done = threading.Event()
-        self._robots: StandIns | None = None
+        self._robots: Faulty | None = None
         self._thread: threading.Thread | None = None
         self._links: list[Link] = []
 
     @property
-    def robots(self) -> StandIns:
+    def robots(self) -> Faulty:
         assert self._robots is not None
         return self._robots
 
     def simulate(self) -> "Lab":
-        self._robots = StandIns(self.settings, self.told.append)
+        self._robots = Faulty(self.settings, self.told.append)
         wait_for(lambda: self.robots.link.connected)
         self._thread = threading.Thread(target=self.robots.run, args=(self._done.is_set,))
         self._thread.start()
