@@ -103,7 +103,8 @@ def main(robots: int = 100, seconds: float = 60.0) -> None:
     )
     found = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
     if found is None:
-        sys.exit("mosquitto is not installed: apt-get install mosquitto")
+        print("mosquitto is not installed: not measured")  # noqa: T201
+        return
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "mosquitto.conf"
         config.write_text(f"listener {port} 127.0.0.1\n{BROKER}")

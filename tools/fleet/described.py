@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeVar, cast
 
 import yaml
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from ..errors import InputError
 from ..formation.value import Value
@@ -119,13 +120,17 @@ def _validated(path: Path, model: type[Model], given: Mapping[str, Any]) -> Mode
     try:
         return model.model_validate(given)
     except ValidationError as error:
-        wrong = "; ".join(
-            f"{'.'.join(map(str, e['loc']))}: no such key"
-            if e["type"] == "extra_forbidden"
-            else f"{'.'.join(map(str, e['loc']))}: {e['msg'].lower()}, got {e['input']!r}"
-            for e in error.errors()
-        )
+        wrong = "; ".join(_mistake(found) for found in error.errors())
         raise InputError(f"{path} does not describe a fleet: {wrong}.") from None
+
+
+def _mistake(found: ErrorDetails) -> str:
+    where = ".".join(map(str, found["loc"]))
+    if found["type"] == "extra_forbidden":
+        return f"{where}: no such key"
+    if found["type"] == "value_error":  # a sentence of ours, which says what was given if it may
+        return f"{where}: {found['ctx']['error']}".removeprefix(": ")
+    return f"{where}: {found['msg'].lower()}, got {found['input']!r}"
 
 
 def _content(path: Path) -> dict[str, Any]:

@@ -135,8 +135,9 @@ class MqttSettings(Value):
                 "FORMUP_MQTT_PASSWORD"
             )
         if parts.scheme not in PORTS or not parts.hostname or parts.path.strip("/"):
-            raise ValueError("give mqtt://HOST:PORT, or mqtts:// for TLS")
-        assert parts.port is None or parts.port  # which raises ValueError where it is no port
+            raise ValueError(f"give mqtt://HOST:PORT, or mqtts:// for TLS, got {broker!r}")
+        if parts.port == 0:  # looking at it raises where it is no number
+            raise ValueError("a port is 1 to 65535, got 0")
         return broker
 
     @model_validator(mode="after")
