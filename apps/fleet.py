@@ -20,10 +20,9 @@ Seconds = Annotated[float, typer.Option("--seconds", help="To listen for.", min=
 @app.command()
 def check(file: File, seconds: Seconds = 3.0) -> None:
     """Say who is there and what is wrong; nothing is moved. Ends with 4 where all is not well."""
-    found = checked(mqtt_fleet(file), seconds)
-    for sentence in found.sentences:
-        say(sentence)
-    raise typer.Exit(0 if found.fit else 4)
+    told, fit = checked(mqtt_fleet(file), seconds)
+    say("\n".join(told))
+    raise typer.Exit(0 if fit else 4)
 
 
 @app.command()

@@ -129,7 +129,7 @@ def _mistake(found: ErrorDetails) -> str:
     if found["type"] == "extra_forbidden":
         return f"{where}: no such key"
     if found["type"] == "value_error":  # a sentence of ours, which says what was given if it may
-        return f"{where}: {found['ctx']['error']}".removeprefix(": ")
+        return f"{where}: {found.get('ctx', {})['error']}".removeprefix(": ")
     return f"{where}: {found['msg'].lower()}, got {found['input']!r}"
 
 

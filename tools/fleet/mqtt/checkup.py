@@ -2,7 +2,6 @@
 
 import os
 import time
-from dataclasses import dataclass
 
 from .link import Link
 from .poses import Poses, Track
@@ -11,21 +10,8 @@ from .settings import MqttSettings
 CALMLY = 0.02
 
 
-@dataclass(frozen=True)
-class Checkup:
-    """What was found.
-
-    Attributes:
-        sentences: what is to be told.
-        fit: whether robots could be driven.
-    """
-
-    sentences: tuple[str, ...]
-    fit: bool
-
-
-def checked(settings: MqttSettings, seconds: float) -> Checkup:
-    """Look for the broker for so many seconds at most, and listen for as many once it is found.
+def checked(settings: MqttSettings, seconds: float) -> tuple[list[str], bool]:
+    """What is to be told, and whether all could be driven, after listening for so many seconds.
 
     Raises:
         InputError: as of `Link`.
@@ -50,7 +36,7 @@ def checked(settings: MqttSettings, seconds: float) -> Checkup:
         while link.connected and time.monotonic() < begun + seconds:
             time.sleep(CALMLY)
         if not link.connected or link.trouble:
-            return Checkup((f"The broker {host}:{port} is of no use: {link.trouble}.",), False)
+            return [f"The broker {host}:{port} is of no use: {link.trouble}."], False
     finally:
         link.close()
     now = time.monotonic()
@@ -67,7 +53,7 @@ def checked(settings: MqttSettings, seconds: float) -> Checkup:
     )
     good = sum(fit for _, fit in robots)
     told.append(f"{good} of {len(robots)} robots can be driven.")
-    return Checkup(tuple(told), good == len(robots) and not others)
+    return told, good == len(robots) and not others
 
 
 def _guarded(secure: bool) -> str:

@@ -5,13 +5,15 @@ themselves. So whatever fails, here or on the way, ends with robots that stand.
 """
 
 import asyncio
+import json
+import math
 import time
 import uuid
 from collections.abc import AsyncGenerator
+from typing import Literal
 
 import numpy as np
 
-from ...errors import InputError
 from ...geometry.outline import FloatArray
 from ...motion.following import Following
 from ...motion.motion import Motion
@@ -25,11 +27,10 @@ from ..protocol import (
     Pose,
     RobotsFailedError,
     StalePosesError,
-    check_ages,
     points_of,
 )
 from .link import Link
-from .poses import Poses, named_few
+from .poses import Poses
 from .settings import MqttSettings
 
 WAIT = 3.0
@@ -44,6 +45,17 @@ HOLDING = 1.0
 """Seconds in which robots that were told to hold have to stand."""
 OTHERS = 2.0
 """Seconds after which another program that sent goals is taken to have ended."""
+MOST_TOLD = 5
+"""Robots that an error speaks of at length; it names all."""
+Reason = Literal["stop", "end", "gone"]
+
+
+def _holding(reason: Reason) -> dict[str, str]:
+    return {"reason": reason}
+
+
+OF_PROGRAMS = [json.dumps(_holding(reason)).encode() for reason in ("end", "gone")]
+"""Messages to hold that no person sent: a drive of another program ended."""
 
 
 class MqttFleet:
@@ -61,7 +73,7 @@ class MqttFleet:
         self.poses = Poses(settings)
         patterns = (topics.pose, topics.goal)
         listened = [*(p.replace("{robot}", "+") for p in patterns), topics.hold]
-        will = topics.hold, {"reason": "gone"}
+        will = topics.hold, _holding("gone")
         self._link = Link(
             settings.address, listened, self._heard, will=will, left=self.poses.forget
         )
@@ -73,18 +85,15 @@ class MqttFleet:
         while len(self.poses.seen()) < len(self.settings.robots) and time.monotonic() < ends:
             await asyncio.sleep(self.settings.period)
         self._check_link(self._link.joined)
-        now, poses = time.monotonic(), self.poses.seen()
-        if len(poses) < len(self.settings.robots):
-            self._check_seen()
-        check_ages(poses, now, max_age)
-        return poses
+        self._check_seen(math.inf if max_age is None else max_age)
+        return self.poses.seen()
 
     async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
         """Release the paths a little at a time, in their order of passage; poses as they come."""
         self._check_drive(motion)
         if not motion.paths:
             return
-        self._driving, stops = True, self._stops
+        self._driving, stops, begun = True, self._stops, False
         try:
             await self.observe()
             if moving := await self._until_still():
@@ -98,8 +107,8 @@ class MqttFleet:
             while True:
                 poses = self.poses.seen()
                 self._check_going(motion, stops, joined)
-                goals = release.goals(poses)
-                for robot, message in goals.items():
+                begun = True
+                for robot, message in release.goals(poses).items():
                     self._link.say(self.settings.topics.goal.replace("{robot}", robot), message)
                 yield poses
                 if release.there:
@@ -107,8 +116,9 @@ class MqttFleet:
                 due = max(due + self.settings.period, time.monotonic())
                 await asyncio.sleep(due - time.monotonic())
         finally:
-            self._hold("end")
-            await self._until_still()
+            if begun:
+                self._hold("end")
+                await self._until_still()
             self._driving = False
 
     async def stop(self) -> None:
@@ -129,21 +139,19 @@ class MqttFleet:
 
     def _heard(self, topic: str, payload: bytes) -> None:
         topics, now = self.settings.topics, time.monotonic()
-        if topic == topics.hold:
-            if not any(word in payload for word in (b'"end"', b'"gone"')):
-                self._latch()  # a person stopped the robots elsewhere
-        elif (robot := self.settings.robot_of(topic, topics.pose)) is not None:
+        if (robot := self.settings.robot_of(topic, topics.pose)) is not None:
             self.poses.heard(robot, payload, now)
-        elif self.settings.robot_of(topic, topics.goal) in self.poses.tracks:
+        elif topic != topics.hold or payload in OF_PROGRAMS:
             self._others = now
+        else:  # a person stopped the robots elsewhere
+            self._latch()
 
     def _latch(self) -> None:
         self.stopped = True
         self._stops += 1
 
-    def _hold(self, reason: str) -> None:
-        message = {"reason": reason}
-        self._link.say(self.settings.topics.hold, message, surely=True)
+    def _hold(self, reason: Reason) -> None:
+        self._link.say(self.settings.topics.hold, _holding(reason), surely=True)
 
     async def _until_still(self) -> tuple[str, ...]:
         """Wait until all robots stand, a while at most; return those that move on."""
@@ -193,22 +201,21 @@ class MqttFleet:
             raise FleetStoppedError("The mqtt fleet was stopped on the way.")
         self._check_link(joined)
         if time.monotonic() - self._others < OTHERS:
-            raise FleetBusyError(
-                "Another program sends goals to these robots; end it, and drive again."
-            )
-        self._check_seen()
+            raise FleetBusyError("Another program drives these robots; end it, and drive again.")
+        self._check_seen(self.settings.pose_timeout)
         faults = {r: self.poses.tracks[r].fault for r in motion.paths}
         failed = {robot: fault for robot, fault in faults.items() if fault}
         if failed:
             told = [f"Robot {robot} cannot drive: {fault!r}." for robot, fault in failed.items()]
-            raise RobotsFailedError(named_few(told), tuple(failed))
+            raise RobotsFailedError(" ".join(told[:MOST_TOLD]), tuple(failed))
 
-    def _check_seen(self) -> None:
-        old = self.poses.old(time.monotonic(), self.settings.pose_timeout)
+    def _check_seen(self, limit: float) -> None:
+        old = self.poses.old(time.monotonic(), limit)
         if old:
+            told = " ".join([*old.values()][:MOST_TOLD])
             raise StalePosesError(
-                f"{named_few([*old.values()])} Nothing is driven on old poses: see to these "
-                "robots, or take those that are away out of the file.",
+                f"{told} Nothing is driven while a robot is not seen: see to it ({len(old)} of "
+                f"{len(self.settings.robots)}), or take those that are away out of the file.",
                 tuple(old),
             )
 
@@ -260,10 +267,9 @@ def open_fleet(request: FleetRequest) -> MqttFleet:
     """The robots of the file that was given.
 
     Raises:
-        InputError: none was, or it does not describe robots on MQTT.
+        InputError: it does not describe robots on MQTT.
     """
-    if request.config is None:
-        raise InputError("Robots on MQTT are described by a file: --fleet FILE.yaml.")
+    assert request.config is not None  # see `fleet_named`
     return MqttFleet(mqtt_fleet(request.config))
 
 

@@ -105,10 +105,8 @@ class Link:
             from paho.mqtt.properties import Properties
         except ImportError:
             raise InputError("Robots on MQTT need an extra: pip install 'formup[mqtt]'.") from None
-        self._expiring, self._small = (
-            Properties(PacketTypes.PUBLISH),
-            Properties(PacketTypes.CONNECT),
-        )
+        self._expiring = Properties(PacketTypes.PUBLISH)
+        self._small = Properties(PacketTypes.CONNECT)
         self._expiring.MessageExpiryInterval = EXPIRY
         self._small.MaximumPacketSize = MOST_BYTES
         version = CallbackAPIVersion.VERSION2

@@ -6,7 +6,7 @@ have come to, is believed again once two messages in order agree.
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -122,9 +122,13 @@ class Poses:
         return math.inf if track.pose is None or torn else now - track.pose.seen
 
     def old(self, now: float, limit: float) -> dict[str, str]:
-        """What is to be said of each robot that was not seen for longer than so many seconds."""
+        """What is to be said of each robot that was not seen for longer, or never."""
         ages = {robot: self.age(robot, now) for robot in self._tracks}
-        return {robot: self._told(robot, age) for robot, age in ages.items() if age > limit}
+        return {
+            robot: self._told(robot, age)
+            for robot, age in ages.items()
+            if age > limit or self._tracks[robot].pose is None
+        }
 
     def seen(self) -> tuple[Pose, ...]:
         """The poses that are believed, however old."""
@@ -159,9 +163,3 @@ class Poses:
             return f"Robot {robot} is said to be in two places: do two robots use its id?"
         why = f"; its last message was {track.why}" if track.why else ""
         return f"Robot {robot} {seen}{why}."
-
-
-def named_few(sentences: Sequence[str], most: int = 5) -> str:
-    """Some of many sentences, and how many more there are."""
-    more = f" So {len(sentences) - most} more." if len(sentences) > most else ""
-    return " ".join(sentences[:most]) + more

@@ -4,7 +4,6 @@ Robots speak in their own frame, usually metres with y up; everything else here 
 """
 
 import math
-import re
 from typing import Annotated, Literal, Self
 from urllib.parse import urlsplit
 
@@ -169,6 +168,6 @@ class MqttSettings(Value):
 
     def robot_of(self, topic: str, pattern: str) -> str | None:
         """The robot whose topic of a pattern this is; None where it is of another pattern."""
-        before, after = map(re.escape, pattern.split("{robot}"))
-        found = re.fullmatch(f"{before}([^/]+){after}", topic)
-        return found and found[1]
+        before, after = pattern.split("{robot}")
+        robot = topic.removeprefix(before).removesuffix(after)
+        return robot if "/" not in robot and topic == before + robot + after else None

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from formup.tools.errors import InputError
-from formup.tools.fleet.mqtt.checkup import Checkup, checked
+from formup.tools.fleet.mqtt.checkup import checked
 
 Labs = Callable[..., Any]
 Brokers = Callable[..., Any]
@@ -31,8 +31,8 @@ asyncio.run(go())
 """
 
 
-def told(found: Checkup) -> str:
-    return "\n".join(found.sentences)
+def told(found: tuple[list[str], bool]) -> str:
+    return "\n".join(found[0])
 
 
 def until(what: Callable[[], bool], seconds: float = 10.0) -> None:
@@ -95,7 +95,7 @@ def test_a_look_says_who_is_there_and_what_is_wrong(lab: Labs) -> None:
     faults["c"] = lambda message, n: message | {"fault": "emergency stop"}
     faults["d"] = lambda message, n: message | ({"x": "?"} if n % 2 else {})
     found = checked(there.settings, 1.0)
-    assert not found.fit
+    assert not found[1]
     said = told(found)
     assert "is reachable, in the clear" in said
     assert "Robot a was seen 0." in said
@@ -106,7 +106,7 @@ def test_a_look_says_who_is_there_and_what_is_wrong(lab: Labs) -> None:
     assert "hold by themselves when no goal has come for 0.5 s; that cannot be seen" in said
     assert said.endswith("2 of 4 robots can be driven.")
     faults.clear()
-    assert checked(there.settings, 1.0).fit
+    assert checked(there.settings, 1.0)[1]
 
 
 def test_a_look_says_who_else_speaks(lab: Labs) -> None:
@@ -120,7 +120,7 @@ def test_a_look_says_who_else_speaks(lab: Labs) -> None:
 
     there.robots.faults["a"] = beside
     found = checked(there.settings, 0.5)
-    assert not found.fit
+    assert not found[1]
     assert "not in the file speak too: stranger." in told(found)
     assert "Another program is sending goals to robot b." in told(found)
 
@@ -129,8 +129,8 @@ def test_nobody_answers(lab: Labs, brokers: Brokers) -> None:
     broker = brokers()
     broker.kill()
     found = checked(lab(broker).settings, 0.3)
-    assert (found.fit, len(found.sentences)) == (False, 1)
-    assert "of no use: Connection refused" in found.sentences[0]
+    assert (found[1], len(found[0])) == (False, 1)
+    assert "of no use: Connection refused" in told(found)
 
 
 @pytest.fixture(scope="module")
