@@ -79,16 +79,3 @@ def test_the_table_has_the_keys_there_are() -> None:
         key for row in table.splitlines()[2:] for key in re.findall(r"`(\w+)`", row.split("|")[1])
     }
     assert keys == set(MqttSettings.model_fields)
-
-
-def test_a_file_that_is_wrong_or_a_broker_that_is_away_is_told_by_exit_codes(place: Path) -> None:
-    def check(name: str) -> tuple[int, str]:
-        command = [sys.executable, "-m", "formup", "fleet", "check", name, "--seconds", "0.3"]
-        done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
-        return done.returncode, done.stdout + done.stderr
-
-    code, text = check("examples/lab.yaml")
-    assert (code, "is of no use: Connection refused" in text) == (4, True)
-    (place / "wrong.yaml").write_text("fleet: mqtt\nrobots: [a]\n")
-    code, text = check("wrong.yaml")
-    assert (code, "broker: field required" in text) == (2, True)

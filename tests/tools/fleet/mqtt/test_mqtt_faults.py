@@ -14,6 +14,7 @@ from formup.tools.fleet import getting_on
 from formup.tools.fleet.arrival import Arrival
 from formup.tools.fleet.assigning import assign_robots
 from formup.tools.fleet.deploy import deploy
+from formup.tools.fleet.mqtt import fleet as fleet_module
 from formup.tools.fleet.protocol import (
     Fleet,
     FleetStoppedError,
@@ -159,6 +160,34 @@ def test_a_stop_holds_until_a_person_releases_it(lab: Labs) -> None:
     asyncio.run(fleet.close())
 
 
+def test_no_goal_is_sent_after_a_stop_but_to_hold(lab: Labs) -> None:
+    said: list[str] = []
+
+    def heard(topic: str, payload: bytes) -> None:
+        said.append(topic)
+
+    there = lab(**SURE).simulate()
+    goal, hold = there.topic("goal", "a"), there.topic("hold")
+    there.link(goal, hold, heard=heard)
+
+    async def go() -> None:
+        fleet, frames = there.fleet(), 0
+        first, *_ = await fleet.observe()
+        path = np.array([(first.x, first.y), (first.x + 200, first.y)])
+        with pytest.raises(FleetStoppedError):
+            async for _ in fleet.drive(Motion({first.id: path})):
+                frames += 1
+                if frames == 5:
+                    await fleet.stop()
+        await fleet.close()
+
+    asyncio.run(go())
+    ends = time.monotonic() + 5
+    while said.count(hold) < 2 and time.monotonic() < ends:
+        time.sleep(0.01)
+    assert said == [*[goal] * 5, hold, hold]  # of the stop, and of the end of the drive
+
+
 def test_a_robot_that_says_it_is_done_and_is_not_there_has_not_arrived(
     lab: Labs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -173,8 +202,9 @@ def test_a_robot_that_says_it_is_done_and_is_not_there_has_not_arrived(
 
 
 def test_a_broker_that_dies_ends_it_and_all_is_observed_anew_when_it_is_back(
-    lab: Labs, brokers: Callable[..., Any]
+    lab: Labs, brokers: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(fleet_module, "WAIT", 1.0)
     broker = brokers()
     there = lab(broker, **SURE).simulate()
     fleet = there.fleet()
@@ -190,6 +220,7 @@ def test_a_broker_that_dies_ends_it_and_all_is_observed_anew_when_it_is_back(
     assert stand(there)
     held = there.robots.points.copy()
     broker.start()
+    monkeypatch.setattr(fleet_module, "WAIT", 10.0)
     poses = asyncio.run(fleet.observe(max_age=1.0))
     assert stand(there), "nothing moves because of what was said before"
     assert np.allclose([(p.x, p.y) for p in poses], held, atol=0.5)
@@ -232,7 +263,8 @@ def test_nothing_is_driven_while_a_robot_does_not_hold(lab: Labs) -> None:
     asyncio.run(fleet.close())
 
 
-def test_what_was_kept_by_the_broker_is_no_news(lab: Labs) -> None:
+def test_what_was_kept_by_the_broker_is_no_news(lab: Labs, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet_module, "WAIT", 0.5)
     there = lab()
     for robot in there.settings.robots:
         for seq in (1, 2):
