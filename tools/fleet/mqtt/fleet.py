@@ -256,11 +256,12 @@ class Release:
 
     def _look(self, points: FloatArray) -> None:
         """Note whether robots are there, or as near as they can come."""
-        off, now = _lengths(points, self._ends), time.monotonic()
-        if _lengths(points, self._stood).max() > SETTLED:
+        off = np.linalg.norm(points - self._ends, axis=1).max()
+        now = time.monotonic()
+        if np.linalg.norm(points - self._stood, axis=1).max() > SETTLED:
             self._stood, self._since = points, now
-        calm = now - self._since >= CALM and off.max() <= self._fleet.tracking_error
-        self.there = bool(calm or off.max() <= SETTLED)
+        calm = now - self._since >= CALM and off <= self._fleet.tracking_error
+        self.there = bool(calm or off <= SETTLED)
 
 
 def open_fleet(request: FleetRequest) -> MqttFleet:
@@ -271,10 +272,6 @@ def open_fleet(request: FleetRequest) -> MqttFleet:
     """
     assert request.config is not None  # see `fleet_named`
     return MqttFleet(mqtt_fleet(request.config))
-
-
-def _lengths(points: FloatArray, others: FloatArray) -> FloatArray:
-    return np.linalg.norm(points - others, axis=1)
 
 
 def _seen_moving(
