@@ -8,6 +8,8 @@ from .poses import Poses, Track
 from .settings import MqttSettings
 
 CALMLY = 0.02
+OFTEN = 3
+"""So many messages of a robot have to come within `pose_timeout`: one may be lost."""
 
 
 def checked(settings: MqttSettings, seconds: float) -> tuple[list[str], bool]:
@@ -74,11 +76,12 @@ def _robot_told(
     if track.fault:
         return f"Robot {robot} cannot drive: {track.fault!r}.{refused}", False
     x, y = settings.frame.to_robots(track.pose.x, track.pose.y)
-    rate = track.heard / max(now - begun, CALMLY)
+    rate, least = track.heard / max(now - begun, CALMLY), OFTEN / settings.pose_timeout
+    seldom = f" That is too seldom: {least:.0f} times are needed." if rate < least else ""
     return (
         f"Robot {robot} was seen {poses.age(robot, now):.2f} s ago at ({x:.3f}, {y:.3f}), and "
-        f"speaks {rate:.0f} times a second.{refused}",
-        True,
+        f"speaks {rate:.0f} times a second.{seldom}{refused}",
+        not seldom,
     )
 
 

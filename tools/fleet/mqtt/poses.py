@@ -55,7 +55,7 @@ class Track:
         fault: as in its last message.
         heard: how many messages came.
         refused: how many of them were not believed, and why.
-        why: the last time.
+        why: the last of them was not, if it was not.
     """
 
     pose: Pose | None = None
@@ -111,7 +111,7 @@ class Poses:
         if refused:
             self._refuse(track, refused, now)
             return
-        track.last, track.fault = (said.seq, pose), said.fault
+        track.last, track.fault, track.why = (said.seq, pose), said.fault, None
         if agrees:
             track.pose = pose
 

@@ -137,6 +137,22 @@ def test_a_fault_on_the_way_ends_with_robots_that_stand_and_is_named(lab: Labs, 
     asyncio.run(fleet.close())
 
 
+def test_stand_ins_may_have_wheels_and_be_lost(lab: Labs, monkeypatch: pytest.MonkeyPatch) -> None:
+    starts = [[50, 50], [50, 100], [50, 150]]
+    there = lab(**SURE, simulated={"starts": starts, "drive": "differential"}).simulate()
+    fleet = there.fleet()
+    assert deployed(there, fleet).arrived
+    asyncio.run(fleet.close())
+    there.end()
+    monkeypatch.setattr(fleet_module, "WAIT", 1.0)
+    there = lab(**SURE, simulated={"starts": starts, "lost": [{"robot": "b"}]}).simulate()
+    fleet = there.fleet()
+    with pytest.raises(StalePosesError, match="Robot b not seen yet") as lost:
+        asyncio.run(fleet.observe())
+    assert lost.value.ids == ("b",)
+    asyncio.run(fleet.close())
+
+
 def test_robots_that_begin_to_count_anew_are_held_and_then_believed_again(lab: Labs) -> None:
     there = lab(**SURE).simulate()
     fleet = there.fleet()

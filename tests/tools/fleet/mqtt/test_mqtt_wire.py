@@ -107,6 +107,10 @@ def test_a_look_says_who_is_there_and_what_is_wrong(lab: Labs) -> None:
     assert said.endswith("2 of 4 robots can be driven.")
     faults.clear()
     assert checked(there.settings, 1.0)[1]
+    faults["a"] = lambda message, n: message if n % 5 == 0 else None
+    found = checked(there.settings, 1.0)
+    assert not found[1]
+    assert "That is too seldom: 6 times are needed." in told(found)
 
 
 def test_a_look_says_who_else_speaks(lab: Labs) -> None:
