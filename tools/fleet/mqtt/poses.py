@@ -55,7 +55,7 @@ class Track:
         fault: as in its last message.
         heard: how many messages came.
         refused: how many of them were not believed, and why.
-        why: the last of them was not, if it was not.
+        why: the last time, if none was believed since.
     """
 
     pose: Pose | None = None
@@ -111,9 +111,9 @@ class Poses:
         if refused:
             self._refuse(track, refused, now)
             return
-        track.last, track.fault, track.why = (said.seq, pose), said.fault, None
+        track.last, track.fault = (said.seq, pose), said.fault
         if agrees:
-            track.pose = pose
+            track.pose, track.why = pose, None
 
     def age(self, robot: str, now: float) -> float:
         """Seconds since a robot was seen; infinite if it never was, or may be two."""
