@@ -72,6 +72,18 @@ def fault(of: Callable[[dict[str, Any], int], dict[str, Any] | None]) -> Act:
     return lambda lab, fleet: lab.robots.faults.update(b=of)
 
 
+def lagging(lab: Any, fleet: Fleet) -> None:
+    """What all robots say of where they are is half a second old from now on."""
+    for robot in lab.settings.robots:
+        was: list[dict[str, Any]] = []
+
+        def of(message: dict[str, Any], n: int, was: list[dict[str, Any]] = was) -> dict[str, Any]:
+            was.append(message)
+            return {**was[max(len(was) - 10, 0)], "seq": n}
+
+        lab.robots.faults[robot] = of
+
+
 def stops(lab: Any, fleet: Fleet) -> None:
     asyncio.get_running_loop().create_task(fleet.stop())
 
@@ -102,6 +114,7 @@ CASES = {
     "more said than is asked": Case(
         fault(lambda m, n: m | {"state": "done", "sent": -1e9}), "arrived"
     ),
+    "a link that lags": Case(lagging, "arrived"),
     "silent": Case(fault(lambda m, n: None), "failed", "b not seen for 1.", ("b",)),
     "not a number": Case(fault(lambda m, n: m | {"y": "NaN"}), "failed", "malformed", ("b",)),
     "no number": Case(fault(lambda m, n: {"x": m["x"]}), "failed", "malformed", ("b",)),
