@@ -69,10 +69,10 @@ wordings: .venv/.ready-dev
 	$(BIN)/python -m formup.evals.wordings
 
 # The tools, placing and checking, who takes which place, cages, each beside the bare library calls;
-# long sessions; the simulator, beside pyrvo where that is installed.
+# long sessions; the simulator, beside pyrvo where that is installed; a minute of MQTT at a broker.
 bench: .venv/.ready-dev
 	@for what in bench bench_sampling bench_assignment bench_cages bench_sessions bench_turns bench_big \
-	  bench_simulator bench_motion; do \
+	  bench_simulator bench_motion bench_mqtt; do \
 	  echo "== $$what"; $(BIN)/python -m formup.benchmarks.$$what || exit 1; echo; \
 	done
 

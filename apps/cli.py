@@ -16,6 +16,7 @@ from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
 from . import arguments, chat, deploy, doctor, evaluate, prompts, serve, sessions, tools, trace
+from . import fleet as fleet_commands
 from . import options as o
 from .agents import agent_of, tracer_of_environment
 from .mcp.command import mcp
@@ -37,6 +38,7 @@ app.add_typer(tools.app, name="tools", help="The tools the model sees.")
 app.add_typer(evaluate.app, name="eval", help="How good it is.")
 app.add_typer(sessions.app, name="sessions", help="Conversations that were stored.")
 app.add_typer(prompts.app, name="prompts", help="What models are told, in versions.")
+app.add_typer(fleet_commands.app, name="fleet", help="Robots: look at them, or stand in for them.")
 
 
 def _say_version(wanted: bool) -> None:

@@ -22,6 +22,7 @@ Looks = Iterator[tuple[str, str, Callable[[], object]]]
 PURPOSES = {
     "dev": "tests",
     "mcp": "MCP clients",
+    "mqtt": "robots on MQTT",
     "otel": "spans",
     "postgres": "a store",
     "ray": "evals on a cluster",

@@ -14,6 +14,7 @@ from ..tools.builtin import TOOLS
 from ..tools.context import Context, Settings
 from ..tools.draw import draw_look, draw_plan
 from ..tools.errors import FleetError, InputError, ToolError
+from ..tools.fleet.described import schema as fleet_schema
 from ..tools.formation.contract import Contract
 from ..tools.perception.image import load_picture
 from ..tools.schema import compact_schema
@@ -42,8 +43,9 @@ def list_tools(as_json: o.Json = False) -> None:
 
 @app.command("schema")
 def print_schema(name: str) -> None:
-    """The JSON Schema (draft 2020-12) of `contract`, or of a tool's arguments, alone."""
-    schemas = {"contract": compact_schema(Contract)} | {t.name: t.schema for t in TOOLS}
+    """The JSON Schema (draft 2020-12) of `contract`, a file of a `fleet`, or a tool's arguments."""
+    schemas = {"contract": compact_schema(Contract), "fleet": fleet_schema()}
+    schemas |= {t.name: t.schema for t in TOOLS}
     if name not in schemas:
         raise InputError(f"There is no schema {name!r}. There are: {', '.join(schemas)}.")
     say(json.dumps(schemas[name], indent=2))

@@ -146,7 +146,7 @@ def _stop(new: Newcomer) -> None:
     new.page.locator("#log > li[data-status=stopped]").wait_for(timeout=LONG)
 
 
-def _share(new: Newcomer) -> None:
+def _share_link(new: Newcomer) -> None:
     new.click("#share")
     new.page.wait_for_selector("#shared[open]", timeout=LONG)
 
@@ -170,7 +170,7 @@ def _tour(new: Newcomer) -> None:
     new.tries("move the team, and see it arrive", turn(lambda: _move(new)))
     new.tries("ask how far robot 4 is", lambda: new.say("how far is robot 4 from it?"))
     new.tries("send it elsewhere, and stop it on the way", lambda: _stop(new))
-    new.tries("share a link", lambda: _share(new))
+    new.tries("share a link", lambda: _share_link(new))
 
 
 def _frames(page: "Page", during: Callable[[], Any]) -> tuple[float, float]:

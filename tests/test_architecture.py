@@ -32,6 +32,7 @@ HEAVY = {
     "ray",
     "mcp",
     "opentelemetry",
+    "paho",
     "pygame",
     "stable_baselines3",
     "scipy",

@@ -29,6 +29,7 @@ def blocks(language: str) -> list[tuple[str, str]]:
 
 
 ELSEWHERE = {
+    "fleets.md": "tests/tools/fleet/mqtt/test_fleets_page.py",
     "prompts.md": "tests/apps/test_prompts.py",
     "serving.md": "tests/apps/server/test_docs.py",
 }

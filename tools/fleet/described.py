@@ -1,18 +1,22 @@
 """Fleets that a file describes: YAML, a mapping whose `fleet` names the fleet it is for."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, TypeVar, cast
 
 import yaml
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from ..errors import InputError
+from ..formation.value import Value
+from .mqtt.settings import MqttSettings
 from .physics import Physics
 from .protocol import Fleet, FleetFactory, FleetRequest
 from .registry import FLEETS
 
+Model = TypeVar("Model", bound=Value)
 SUFFIXES = (".yaml", ".yml")
 MOST_BYTES = 1_000_000
 
@@ -36,16 +40,7 @@ class Described:
         Raises:
             InputError: the file says what cannot be; names every mistake.
         """
-        try:
-            return Physics.model_validate({**usual, **self.given})
-        except ValidationError as error:
-            wrong = "; ".join(
-                f"{'.'.join(map(str, e['loc']))}: no such key"
-                if e["type"] == "extra_forbidden"
-                else f"{'.'.join(map(str, e['loc']))}: {e['msg'].lower()}, got {e['input']!r}"
-                for e in error.errors()
-            )
-            raise InputError(f"{self.path} does not describe a fleet: {wrong}.") from None
+        return _validated(self.path, Physics, {**usual, **self.given})
 
 
 def fleet_named(name: str) -> FleetFactory:
@@ -56,6 +51,8 @@ def fleet_named(name: str) -> FleetFactory:
     """
     path = Path(name)
     if path.suffix.lower() not in SUFFIXES:
+        if name == "mqtt":
+            raise InputError("Robots on MQTT are described by a file: --fleet FILE.yaml.")
         return FLEETS.load(name)
     kind = _content(path).get("fleet")
     if not isinstance(kind, str):
@@ -63,6 +60,8 @@ def fleet_named(name: str) -> FleetFactory:
     load: Callable[[FleetRequest], Fleet] = FLEETS.load(kind)
     if kind == "simulated":
         described(path).physics({"speed": 1.0, "acceleration": 1.0})
+    if kind == "mqtt":
+        mqtt_fleet(path)
     return lambda request: load(replace(request, config=path))
 
 
@@ -78,6 +77,60 @@ def described(path: Path) -> Described:
     if pace not in ("fast", "real"):
         raise InputError(f"{path}: pace is fast or real, got {pace!r}.")
     return Described(path, content, pace)
+
+
+def mqtt_fleet(path: Path) -> MqttSettings:
+    """The robots on MQTT of a file.
+
+    Raises:
+        InputError: it cannot be read, or does not describe such; names every mistake.
+    """
+    content = _content(path)
+    if content.pop("fleet", None) != "mqtt":
+        raise InputError(f"{path} describes no robots on MQTT; begin it with `fleet: mqtt`.")
+    return _validated(path, MqttSettings, content)
+
+
+def schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of a fleet's file."""
+    pace = {"pace": {"enum": ["fast", "real"], "default": "fast"}}
+    usual = "speed", "acceleration"  # depend on the picture where a file leaves them out
+    simulated = _file_of("simulated", Physics, pace, usual)
+    mqtt = _file_of("mqtt", MqttSettings)
+    shared = simulated.pop("$defs") | mqtt.pop("$defs")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "A fleet",
+        "oneOf": [simulated, mqtt],
+        "$defs": shared,
+    }
+
+
+def _file_of(
+    kind: str, model: type[Value], more: dict[str, Any] | None = None, optional: Sequence[str] = ()
+) -> dict[str, Any]:
+    made = model.model_json_schema()
+    fields: dict[str, Any] = made["properties"]
+    made["properties"] = {"fleet": {"const": kind}, **(more or {}), **fields}
+    made["required"] = ["fleet", *(name for name in made["required"] if name not in optional)]
+    return made
+
+
+def _validated(path: Path, model: type[Model], given: Mapping[str, Any]) -> Model:
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        wrong = "; ".join(_mistake(found) for found in error.errors())
+        raise InputError(f"{path} does not describe a fleet: {wrong}.") from None
+
+
+def _mistake(found: ErrorDetails) -> str:
+    where = ".".join(map(str, found["loc"]))
+    if found["type"] == "extra_forbidden":
+        return f"{where}: no such key"
+    if found["type"] == "value_error":  # a sentence of ours, which says what was given if it may
+        return f"{where}: {found.get('ctx', {})['error']}".removeprefix(": ")
+    return f"{where}: {found['msg'].lower()}, got {found['input']!r}"
 
 
 def _content(path: Path) -> dict[str, Any]:

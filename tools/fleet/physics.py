@@ -3,13 +3,17 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from ..formation.value import Value
 from ..geometry.outline import FloatArray
 from .moving import Above0, Pixels, Seconds, TargetMotion
 
-RobotId = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int else name)]
+RobotId = Annotated[
+    str,
+    BeforeValidator(lambda name: str(name) if type(name) is int else name),
+    WithJsonSchema({"type": ["string", "integer"]}),
+]
 
 
 class Noise(Value):

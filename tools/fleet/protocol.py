@@ -32,6 +32,10 @@ class FleetClosedError(FleetError):
     """The fleet was closed before."""
 
 
+class FleetUnreachableError(FleetError):
+    """What connects the fleet is gone: robots are neither told nor seen anything."""
+
+
 class FleetSizeError(FleetError):
     """The fleet has, or can drive, another number of robots than is needed."""
 

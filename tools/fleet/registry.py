@@ -4,5 +4,10 @@ from ..registry import Registry
 from .protocol import FleetFactory
 
 FLEETS = Registry[FleetFactory](
-    "fleet", "formup.fleets", {"simulated": "formup.tools.fleet.simulated:open_fleet"}
+    "fleet",
+    "formup.fleets",
+    {
+        "simulated": "formup.tools.fleet.simulated:open_fleet",
+        "mqtt": "formup.tools.fleet.mqtt.fleet:open_fleet",
+    },
 )

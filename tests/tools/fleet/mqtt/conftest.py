@@ -1,0 +1,192 @@
+"""A real broker on a free port, robots that are simulated on its wire, and files of both."""
+
+import contextlib
+import json
+import shutil
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from formup.tools.fleet.described import mqtt_fleet
+from formup.tools.fleet.mqtt.fleet import MqttFleet
+from formup.tools.fleet.mqtt.link import Link
+from formup.tools.fleet.mqtt.settings import MqttSettings
+from formup.tools.fleet.mqtt.stand_in import StandIns
+
+MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
+PATIENCE = 10.0
+USUAL: dict[str, Any] = {
+    "fleet": "mqtt",
+    "robots": ["a", "b", "c"],
+    "speed": 100,
+    "radius": 5,
+    "tracking_error": 2,
+    "simulated": {"starts": [[50, 50], [50, 100], [50, 150]]},
+}
+
+
+def wait_for(what: Callable[[], object]) -> None:
+    ends = time.monotonic() + PATIENCE
+    while not what():
+        assert time.monotonic() < ends, "it has not come about"
+        time.sleep(0.01)
+
+
+class Broker:
+    """mosquitto, which can be killed and started again on the same port."""
+
+    def __init__(self, folder: Path, more: str = "allow_anonymous true\n") -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port: int = free.getsockname()[1]
+        self.url = f"mqtt://127.0.0.1:{self.port}"
+        self._config = folder / f"mosquitto-{self.port}.conf"
+        # As the user who runs the tests: else it could not read their files.
+        mine = f"user root\nlistener {self.port} 127.0.0.1\nset_tcp_nodelay true\n"
+        self._config.write_text(mine + more)
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        assert MOSQUITTO is not None
+        command = [MOSQUITTO, "-c", str(self._config)]
+        self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        wait_for(self._answers)
+
+    def kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+
+    def _answers(self) -> bool:
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1):
+            return True
+        return False
+
+
+@pytest.fixture(scope="session")
+def brokers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Broker]]:
+    """Starts brokers, with more lines of configuration if wanted."""
+    if MOSQUITTO is None:
+        pytest.skip("mosquitto is not installed (apt-get install mosquitto)")
+    pytest.importorskip("paho.mqtt.client", reason="the extra mqtt is not installed")
+    made: list[Broker] = []
+
+    def make(more: str = "allow_anonymous true\n") -> Broker:
+        made.append(Broker(tmp_path_factory.mktemp("broker"), more))
+        made[-1].start()
+        return made[-1]
+
+    yield make
+    for broker in made:
+        broker.kill()
+
+
+@pytest.fixture(scope="session")
+def shared(brokers: Callable[..., Broker]) -> Broker:
+    """One broker for all tests that leave it alone; each has topics of its own."""
+    return brokers()
+
+
+class Faulty(StandIns):
+    """Stand-ins of which some do what they should not, from when their ids are put in here."""
+
+    def __init__(self, settings: MqttSettings, told: Callable[[str], None]) -> None:
+        self.faults: dict[str, Callable[[dict[str, Any], int], dict[str, Any] | None]] = {}
+        self.runaway = set[str]()
+        super().__init__(settings, told)
+        self._seq = 1_000
+
+    def step(self) -> None:
+        for i, robot in enumerate(self.robots):
+            self._sim.points[i] += (5 * (robot in self.runaway), 0)
+        super().step()
+
+    def reboot(self) -> None:
+        self._seq = 0
+
+    def _message(self, i: int) -> dict[str, Any] | None:
+        message, robot = super()._message(i), self._settings.robots[i]
+        if message is None or robot not in self.faults:
+            return message
+        return self.faults[robot](message, self._seq)
+
+
+class Lab:
+    """A fleet's file, its stand-ins in a thread, and whatever speaks beside them."""
+
+    def __init__(self, path: Path, broker: Broker, more: dict[str, Any]) -> None:
+        own = path.parent.name
+        topics = {
+            "pose": f"{own}/{{robot}}/pose",
+            "goal": f"{own}/{{robot}}/goal",
+            "hold": f"{own}/hold",
+        }
+        given = {**USUAL, "broker": broker.url, "topics": topics, **more}
+        path.write_text(yaml.safe_dump(given))
+        self.path, self.told = path, list[str]()
+        self.settings: MqttSettings = mqtt_fleet(path)
+        self._done = threading.Event()
+        self._robots: Faulty | None = None
+        self._thread: threading.Thread | None = None
+        self._links: list[Link] = []
+
+    @property
+    def robots(self) -> Faulty:
+        assert self._robots is not None
+        return self._robots
+
+    def simulate(self) -> "Lab":
+        self._robots = Faulty(self.settings, self.told.append)
+        wait_for(lambda: self.robots.link.connected)
+        self._thread = threading.Thread(target=self.robots.run, args=(self._done.is_set,))
+        self._thread.start()
+        return self
+
+    def fleet(self) -> MqttFleet:
+        return MqttFleet(self.settings)
+
+    def link(self, *topics: str, heard: Callable[[str, bytes], None] | None = None) -> Link:
+        link = Link(self.settings.address, topics, heard or (lambda topic, payload: None))
+        self._links.append(link)
+        wait_for(lambda: link.connected)
+        return link
+
+    def topic(self, kind: str, robot: str = "") -> str:
+        return str(getattr(self.settings.topics, kind)).replace("{robot}", robot)
+
+    def was_told(self, what: str) -> bool:
+        return any(what in text for text in self.told)
+
+    def end(self) -> None:
+        self._done.set()
+        if self._thread is not None:
+            self._thread.join()
+        for link in self._links:
+            link.close()
+        if self._robots is not None:
+            self._robots.close()
+
+
+@pytest.fixture
+def lab(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Callable[..., Lab]]:
+    """Makes labs; what is given is said in their file."""
+    made: list[Lab] = []
+
+    def make(broker: Broker | None = None, **more: Any) -> Lab:
+        found: Broker = broker or request.getfixturevalue("shared")
+        made.append(Lab(tmp_path / "lab.yaml", found, more))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.end()
+
+
+def spoken(**message: Any) -> bytes:
+    return json.dumps(message).encode()

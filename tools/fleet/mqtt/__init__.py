@@ -1,0 +1,1 @@
+"""Robots that speak plain JSON over MQTT."""
