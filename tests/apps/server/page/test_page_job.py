@@ -282,3 +282,14 @@ def test_the_page_is_small(server: Any) -> None:
     files = resources.files("formup") / "apps/page"
     sizes = [len(gzip.compress(f.read_bytes())) for f in files.iterdir() if f.is_file()]
     assert sum(sizes) < 150_000
+
+
+def test_words_are_text_and_never_markup(server: Any, visit: Any) -> None:
+    here = visit(server.url)
+    here.begin()
+    here.say('Surround <img src="https://elsewhere.example/x" onerror="document.title=1">')
+    here.page.fill("#words", "<script>document.title = 1</script>")
+    expect(here.page.locator("#log img, #log script")).to_have_count(0)
+    expect(here.page.locator("#log")).to_contain_text("<img src=")
+    policy = here.page.request.get(here.url).headers["content-security-policy"]
+    assert "unsafe" not in policy and policy.startswith("default-src 'none'")
