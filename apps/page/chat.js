@@ -80,15 +80,15 @@ const TOLD = {
   RUN_ERROR: ({ code, message }) => ended(code, message),
 };
 
+let count = 0;
 export const reset = () => {
   log.replaceChildren();
-  current = null;
+  [current, count] = [null, 0];
   app.turns = new Map();
 };
 
-let count = 0;
 export const told = (event, live) => {
-  if (event.type === "RUN_STARTED") count = log.children.length + 1;
+  if (event.type === "RUN_STARTED" && event.input.words !== null) count++; // answers go on with a turn
   if (event.name === "world") {
     for (const id of Object.keys(event.value.changes?.plans?.items ?? {})) {
       if (!app.turns.has(id)) app.turns.set(id, count);
@@ -119,6 +119,7 @@ byId("composer").addEventListener("submit", (event) => {
   const text = words.value.trim();
   if (!text || (app.busy && !app.moving)) return;
   words.value = "";
+  keep();
   say(text);
 });
 
@@ -127,6 +128,16 @@ words.addEventListener("keydown", (event) => {
   event.preventDefault();
   byId("composer").requestSubmit();
 });
+
+// What was written or pointed at and not yet sent is there again after a reload.
+const draft = () => `formup-draft-${app.session}`;
+const keep = () => {
+  const kept = { words: words.value, pointed: app.pointed.map((one) => one.prompt) };
+  if (app.session) sessionStorage.setItem(draft(), JSON.stringify(kept));
+};
+export const drafted = () => JSON.parse(sessionStorage.getItem(draft()) ?? "{}");
+words.addEventListener("input", keep);
+on("pointed", () => app.scene && keep());
 
 on("answer", say);
 on("busy", () => {

@@ -1,7 +1,7 @@
 // The page as a whole: which session is open, what its events mean, keys, light and dark.
 import { call, fetched, follow, lookWith } from "./api.js";
 import { app, at, clear, fail, on, refresh, stop, tell, turn } from "./app.js";
-import { reset, told } from "./chat.js";
+import { drafted, reset, told } from "./chat.js";
 import { announce, byId, h } from "./dom.js";
 import { choose, drawingKey, toolKeys } from "./pointing.js";
 import "./plan.js";
@@ -9,7 +9,7 @@ import { received, start } from "./start.js";
 
 let leave = null;
 
-const open = async ({ id: session, words = "", pointed = [] }) => {
+const open = async ({ id: session, words, pointed }) => {
   leave?.();
   reset();
   Object.assign(app, { session, state: null, scene: null, looking: null, pointed: [], poses: [], moving: false });
@@ -17,6 +17,7 @@ const open = async ({ id: session, words = "", pointed = [] }) => {
   byId("start").hidden = true;
   for (const name of ["talk", "view", "share", "export", "stop"]) byId(name).hidden = false;
   clear("problem");
+  const kept = drafted();
   try {
     await refresh();
   } catch (problem) {
@@ -26,9 +27,10 @@ const open = async ({ id: session, words = "", pointed = [] }) => {
   }
   byId("name").textContent = session;
   leave = follow(session, { event: happened, connected });
-  byId("words").value = words;
+  const begun = { words: "", pointed: [], ...kept, ...(words ? { words, pointed } : {}) };
+  byId("words").value = begun.words;
   byId("words").focus();
-  pointed.forEach((prompt) => tell("point", prompt));
+  begun.pointed.forEach((prompt) => tell("point", prompt));
 };
 
 // Events up to the one that the page was opened at tell what was; later ones what happens now.

@@ -8,7 +8,7 @@ const SHARE = 0.42; // of the way to the neighbour: a robot's disc is no larger
 const NUDGE = 4; // a press that moves less, in pixels of the screen, is a click
 
 const layers = Object.fromEntries(
-  ["picture", "areas", "things", "arrows", "robots", "drawing", "options"].map((name) => [
+  ["picture", "areas", "things", "paths", "arrows", "robots", "drawing", "options"].map((name) => [
     name, s("g", { id: `layer-${name}` }),
   ]),
 );
@@ -170,8 +170,12 @@ on("poses", () => {
   due = true;
   requestAnimationFrame(() => ((due = false), drawMotion()));
 });
+// The ways that the robots are to take, from the approval on until they are there.
+on("paths", (paths) => layers.paths.replaceChildren(...Object.values(paths).map((points) => s(
+  "path", { class: "path", d: `M${points.map((point) => point.join(" ")).join("L")}` },
+))));
 on("moving", () => (app.moving && trails.clear(), draw()));
-on("scene", draw);
+on("scene", () => (layers.paths.replaceChildren(), draw()));
 on("picture", () => {
   const [width, height] = size();
   layers.picture.replaceChildren(

@@ -154,6 +154,7 @@ export const approve = () => {
   byId("approve").textContent = `Move ${count} ${count === 1 ? "robot" : "robots"}`;
   dialog.returnValue = "no";
   dialog.showModal();
+  call("GET", at(`/plans/${waits?.plan_id ?? plan.id}/paths`)).then((paths) => tell("paths", paths), () => {});
 };
 byId("go").onclick = approve;
 dialog.addEventListener("close", async () => {

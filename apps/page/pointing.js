@@ -43,7 +43,7 @@ const nextId = () => {
 
 const rounded = (point) => point.map((v) => Math.round(v * 10) / 10);
 
-const outlined = latest(async (prompt, replaces) => {
+const measure = async (prompt) => {
   clear("stage-problem");
   show("Measuring …");
   try {
@@ -57,7 +57,8 @@ const outlined = latest(async (prompt, replaces) => {
   }
   show(HINTS[tool]);
   tell("pointed");
-});
+};
+const outlined = latest(measure);
 
 const pointAt = (way) => outlined({ id: nextId(), ...way });
 
@@ -179,7 +180,11 @@ const area = (ring) => Math.abs(ring.reduce((sum, [x, y], i) => {
 // What stands out lights up under the pointer before it is clicked on; the smallest lies on top.
 const found = () => (tool !== "point" ? [] : [...app.things]
   .sort((a, b) => area(b.rings[0]) - area(a.rings[0]))
-  .map((one) => s("path", { class: "thing", "data-id": one.id, d: path(one.rings) })));
+  .map((one) => s("path", {
+    class: "thing", "data-id": one.id, d: path(one.rings), tabindex: 0, role: "button",
+    "aria-label": `Point at ${one.id}: ${one.label}`,
+    onkeydown: (event) => event.key === "Enter" && pointAt({ candidate: one.id }),
+  })));
 
 const drawPointed = () => {
   const r = 4 * unit();
@@ -214,7 +219,7 @@ const option = (choice) => {
   s("text", { x: (x0 + x1) / 2, y: (y0 + y1) / 2, dy: "0.35em", "font-size": 14 * unit() }, choice.id.slice(1)));
 };
 
-on("point", outlined);
+on("point", measure);
 on("scene", drawPointed);
 on("things", drawPointed);
 on("picture", () => {

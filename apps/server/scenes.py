@@ -12,6 +12,7 @@ from PIL import Image
 
 from ...agent.conversation import Session
 from ...tools.builtin.editing import previewed
+from ...tools.builtin.motions import paths_to
 from ...tools.builtin.targets import doubtful, measured
 from ...tools.draw.scene import candidate_data, robot_data, scene_data, thing_data, verdict_data
 from ...tools.errors import InputError, ToolError
@@ -64,6 +65,22 @@ async def scene(
     if plan is not None and plan not in world.plans:
         raise InputError(f"There is no plan {plan!r} in this session.", "missing")
     return await asyncio.to_thread(scene_data, world, plan)
+
+
+@router.get("/plans/{plan_id}/paths")
+async def paths(
+    session: str, plan_id: str, hub: AHub, person: APerson
+) -> dict[str, list[list[float]]]:
+    """How robots would get to a plan from where they were seen, px by their ids."""
+    context = (await hub.service.fresh(await check_seen(hub, session, person))).context
+    if plan_id not in context.world.plans:
+        raise InputError(f"There is no plan {plan_id!r} in this session.", "missing")
+    try:
+        plan = context.world.plan(plan_id).plan
+        found = await asyncio.to_thread(paths_to, context, plan)
+    except ToolError as error:
+        raise plainly(error) from None
+    return {robot: path.round(1).tolist() for robot, path in found.items()}
 
 
 @router.get("/things")

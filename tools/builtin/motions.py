@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..context import Context
 from ..errors import FleetError, ToolError
 from ..fleet.assigning import assign_robots
 from ..fleet.protocol import Fleet, FleetSizeError, Pose, body_radius, points_of
@@ -42,6 +43,22 @@ class Going:
     paths: dict[str, FloatArray]
     verdict: MotionVerdict | None
     radius: float
+
+
+def paths_to(context: Context, plan: Plan) -> dict[str, FloatArray]:
+    """How robots would get to a plan's places from where they were seen last.
+
+    Returns:
+        (k, 2) px by the robot's id; none where no fleet is in use yet, or there is no way.
+
+    Raises:
+        ToolError: robots that keep places stand in each other's way.
+    """
+    fleet = context.services.fleets.get(context.settings.fleet)
+    if fleet is None or not plan.formation.robots:
+        return {}
+    taking, poses = plan.formation.robot_of_place, context.world.robots
+    return going(context.world, plan, fleet, poses, taking).paths
 
 
 def going(
