@@ -120,6 +120,7 @@ class Session:
         if is_stop(words):
             return await self.astop()
         show, pointed = options.get("show"), (*self.pointed, *options.get("pointed", ()))
+        keep = options.get("keep_out", ())
         run, said = self.run, words
         if run is not None and CALLED_OFF.fullmatch(words.lower()):
             if isinstance(run.outcome, Paused):
@@ -127,9 +128,10 @@ class Session:
             if run.world.current == run.began.current:
                 return await self.aact(words, text=UNCHANGED, show=show)
         if run is not None and isinstance(run.outcome, Paused):
-            if not pointed and read_followup(words, self._standing(run)).kind not in DROPS:
+            shown = (*pointed, *keep)
+            if not shown and read_followup(words, self._standing(run)).kind not in DROPS:
                 return self._keep(await self._answered(run, words, show))
-            if pointed:  # the answer is a point
+            if shown:  # the answer is a point
                 words = f"{run.report.instruction} {words}".strip()
         settings = await self._for_turn(words)
         if run is not None and words != said:  # the same instruction: its numbers still hold
@@ -141,7 +143,7 @@ class Session:
                 self.picture,
                 words,
                 pointed=pointed,
-                keep_out=self.keep_out,
+                keep_out=(*self.keep_out, *keep),
                 settings=settings,
                 trace=self.stored,
                 begun=self.begun,
@@ -149,7 +151,6 @@ class Session:
                 show=show,
             )
         else:
-            keep = options.get("keep_out", ())
             made = self.agent.asay(
                 run, words, pointed=pointed, keep_out=keep, settings=settings, show=show
             )

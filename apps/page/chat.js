@@ -100,7 +100,7 @@ export const told = (event, live) => {
 };
 
 export const say = async (text) => {
-  const pointed = app.pointed.map((one) => one.prompt);
+  const those = (off) => app.pointed.filter((one) => one.off === off).map((one) => one.prompt);
   const doubted = app.pointed.find((one) => !one.outline.sound);
   if (doubted) {
     const problem = `${doubted.prompt.id} is not outlined surely enough: draw around it, correct it, or forget it.`;
@@ -108,7 +108,7 @@ export const say = async (text) => {
     byId("problem").hidden = false;
     return;
   }
-  const done = await turn("problem", "/messages", { words: text, pointed });
+  const done = await turn("problem", "/messages", { words: text, pointed: those(false), keep_out: those(true) });
   if (!done) return void (words.value ||= text);
   app.pointed = [];
   tell("pointed");

@@ -27,6 +27,8 @@ const told = (found) => {
     ...lines(shown.findings, "bad"),
     ...(found ? [] : lines([...plan.notes, way(plan)].filter(Boolean), "soft")),
     ...(found ? [] : arrived(plan)),
+    ...(found || !plan.groups.length ? [] : [h("details", {}, h("summary", {}, "Contract"),
+      h("pre", { tabIndex: 0 }, JSON.stringify(plan.groups.map(({ nearest_px: _, ...group }) => group), null, 1)))]),
   );
 };
 

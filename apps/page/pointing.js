@@ -48,8 +48,9 @@ const measure = async (prompt) => {
   show("Measuring …");
   try {
     const outline = await call("POST", at("/outline"), { json: { prompt } });
-    const kept = app.pointed.filter((one) => one.prompt.id !== prompt.id);
-    app.pointed = [...kept, { prompt, outline }];
+    const before = app.pointed.find((one) => one.prompt.id === prompt.id);
+    const others = app.pointed.filter((one) => one !== before);
+    app.pointed = [...others, { prompt, outline, off: before?.off ?? false }];
     const sure = outline.sound ? "" : `, too little: ${outline.threshold} is needed`;
     announce(`Outlined ${prompt.id}, confidence ${outline.confidence}${sure}.`);
   } catch (problem) {
@@ -160,17 +161,27 @@ const forget = (id) => {
   tell("pointed");
 };
 
+const keptOff = (one, off) => {
+  one.off = off;
+  tell("pointed");
+};
+
 on("pointed", () => {
   if (!app.pointed.length && (tool === "plus" || tool === "minus")) choose("move");
   for (const name of ["plus", "minus"]) tools.querySelector(`[data-tool=${name}]`).disabled = !app.pointed.length;
-  byId("pointed").replaceChildren(...app.pointed.map(({ prompt, outline }) => h(
-    "li", { className: outline.sound ? "chip" : "chip doubted" },
-    `${prompt.id}: confidence ${outline.confidence.toFixed(2)}`,
-    outline.sound ? "" : ` (${outline.threshold.toFixed(2)} is needed: draw around it, or correct it)`,
-    h("button", { type: "button", ariaLabel: `Forget ${prompt.id}`, onclick: () => forget(prompt.id) }, "×"),
-  )));
+  byId("pointed").replaceChildren(...app.pointed.map(chip));
   drawPointed();
 });
+
+const chip = (one) => {
+  const { prompt: { id }, outline: { confidence, sound, threshold }, off } = one;
+  const away = h("input", { type: "checkbox", checked: off, onchange: ({ target }) => keptOff(one, target.checked) });
+  return h("li", { className: sound ? "chip" : "chip doubted" },
+    `${id}: confidence ${confidence.toFixed(2)}`,
+    sound ? "" : ` (${threshold.toFixed(2)} is needed: draw around it, or correct it)`,
+    h("label", { title: "No robot stands on it or drives over it" }, away, " keep off"),
+    h("button", { type: "button", ariaLabel: `Forget ${id}`, onclick: () => forget(id) }, "×"));
+};
 
 const area = (ring) => Math.abs(ring.reduce((sum, [x, y], i) => {
   const [u, v] = ring[(i + 1) % ring.length];
@@ -191,8 +202,8 @@ const drawPointed = () => {
   const marks = (points, kind) => (points ?? []).map(([cx, cy]) => s("circle", { class: kind, cx, cy, r }));
   layer("options").replaceChildren(
     ...found(),
-    ...app.pointed.flatMap(({ prompt, outline }) => [
-      s("path", { class: outline.sound ? "pointed" : "pointed doubted", d: path(outline.rings) }),
+    ...app.pointed.flatMap(({ prompt, outline, off }) => [
+      s("path", { class: `pointed${outline.sound ? "" : " doubted"}${off ? " kept-off" : ""}`, d: path(outline.rings) }),
       ...marks(prompt.points, "plus"), ...marks(prompt.negative, "minus"),
     ]),
     ...asked().map(option),

@@ -178,6 +178,13 @@ def test_what_is_pointed_at_answers_which(session: Session) -> None:
     assert moved.report.robots == tuple(str(i) for i in range(1, 9))
 
 
+def test_what_is_kept_off_with_the_first_words_is(picture: Picture) -> None:
+    made = Agent().start(picture, pointed=[TargetPrompt(box=RED)], settings=Settings(robots=8))
+    run = made.say("Surround it", keep_out=[TargetPrompt(id="t2", box=BLUE)])
+    assert run.report.contract is not None
+    assert run.report.contract.keep_out == ("k1",)
+
+
 def test_it_works_inside_a_running_event_loop(session: Session) -> None:
     async def notebook() -> Run:
         return session.say("a bit further out")

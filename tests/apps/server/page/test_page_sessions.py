@@ -98,6 +98,23 @@ def test_the_ways_are_shown_before_anything_moves(server: Any, visit: Any) -> No
             assert abs(seen[0] - wanted[0]) < 0.2 and abs(seen[1] - wanted[1]) < 0.2
 
 
+def test_robots_are_kept_off_what_is_pointed_at_for_that(server: Any, visit: Any) -> None:
+    here = visit(server.url)
+    here.begin()
+    here.page.click("[data-tool=point]")
+    for thing in ("c1", "c4"):
+        here.page.locator(f'.thing[data-id="{thing}"]').press("Enter", timeout=LONG)
+        expect(here.page.locator("#pointed .chip")).to_have_count(
+            1 if thing == "c1" else 2, timeout=LONG
+        )
+    here.page.get_by_label("keep off").nth(1).check()
+    here.say("Surround it, 40 px from it")
+    scene = server.client.get(f"{here.session}/scene").json()
+    assert len(scene["targets"]) == len(scene["keep_out"]) == 1
+    expect(here.page.locator("#scene path.off")).to_have_count(1)
+    expect(here.page.locator("#pointed .chip")).to_have_count(0)
+
+
 def test_sessions_are_found_renamed_and_deleted(server: Any, visit: Any) -> None:
     here = visit(server.url)
     here.begin()
