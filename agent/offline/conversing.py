@@ -18,6 +18,7 @@ from .choosing import Step, agrees, calls_in, chosen_candidates, declines, promp
 from .finding import found_thing, known_thing, measured_at
 from .followup_things import UNNAMED, pointing_at
 from .followups import Followup, commands, read_followup
+from .pointed import heeded
 from .sharing import shared
 from .standing import Standing
 
@@ -65,6 +66,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
             return Reply(text="Nothing was changed.")
         words = _words_meant(words, followup, answer, standing)
         followup = read_followup(words, standing)
+    followup = heeded(task, followup) if new else followup
     if followup.kind == "instruction":
         fresh = words != task.instruction
         said = followup.text if standing else words

@@ -38,9 +38,18 @@ def way(slots: Slots, said: Said) -> tuple[float, float] | None:
     return sum(x for x, _ in vectors) * length, sum(y for _, y in vectors) * length
 
 
+BESIDE = re.compile(
+    r"\b(?:to|on) the (?:left|right|top|bottom)(?:[- ]hand)?(?: side)? of\b|\b(?:to|on) its\b|"
+    r"\b(?:[0-9]+|[a-z]+) (?:(?:of the|more) )?(?:robots|bots|drones|rovers)\b"
+    r"(?<!the robots)(?<!all robots)(?<!these robots)[^,;.]*\bto the (?:left|right)\b",
+    re.IGNORECASE,
+)
+"""What says where robots stand, or how many go: "to the left of it", "5 robots to the left"."""
+
+
 def shift(slots: Slots, said: Said) -> Effects:
     """All of it left, right, up or down; after a word about one robot, that one."""
-    by = way(slots, said)
+    by = None if BESIDE.search(said.words) else way(slots, said)
     if by is None:
         return None
     placed = [e["robot"] for e in said.last if e["kind"] == "place"]

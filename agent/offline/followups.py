@@ -301,10 +301,11 @@ def _not_framed(line: Line) -> Followup:
     left = (reading.stops, reading.unread, reading.language, reading.unscaled, reading.background)
     kinds = {kind for c in line.chunks for kind in c.kinds}
     settled = not any(left) and reading.sure and reading.relation not in ("ask", "several")
-    if not settled or "relation" not in kinds or "neg" in kinds:
+    beside = reading.relation == "along" and reading.robots is not None
+    if not settled or not ("relation" in kinds or beside) or "neg" in kinds:
         return _not_understood(line)
     shown = "there" in kinds and bool(line.standing.pointed)
-    if "thing" in kinds or (reading.robots and (reading.things or shown)):
+    if "thing" in kinds or beside or (reading.robots and (reading.things or shown)):
         return Followup("instruction", text=text)
     drawn = text[slice(*form_in(text)[1])].lower()
     known = {*rules()["common"], *rules()["void"], "relation"}

@@ -1,5 +1,6 @@
 """Which of several things that were pointed at an instruction is about: "the upper coin", "t1"."""
 
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,10 +10,12 @@ import numpy as np
 
 from ..first_message import Task
 from ..messages import History
+from .accounting import read_instruction
 from .choosing import Step
 from .finding import one_at
 from .followup_things import UNNAMED, resolved
 from .followup_words import Chunk, chunks_of
+from .followups import Followup
 from .references import Reference, described
 from .standing import Standing
 
@@ -46,6 +49,25 @@ BARE = re.compile(r"left|right|upper|lower|top|bottom|first|second|third|last", 
 POLITE = re.compile(r"[ ,]*(?:please|thanks|thank you)?[ .!]*$", re.IGNORECASE)
 THE_THING = "the thing"
 """Stands in the instruction for the one that is chosen."""
+
+
+def heeded(task: Task, followup: Followup) -> Followup:
+    """A follow-up in which what is newly pointed at has a part; else an instruction about that.
+
+    It is refused where its words are no instruction.
+    """
+    named = json.dumps(followup.edits)
+    new = [str(p["id"]) for p in task.pointed if p["id"] not in task.targets]
+    if not followup.edits or any(json.dumps(name) in named for name in new):
+        return followup
+    reading = read_instruction(task.instruction, task.metres_per_pixel)
+    if reading.sure and reading.relation != "ask" and not (reading.stops or reading.unread):
+        return Followup("instruction", text=task.instruction)
+    text = (
+        f'Nothing was changed: "{task.instruction}" does not say what to do about what was pointed '
+        "at with it. Say that, or say it again without pointing."
+    )
+    return Followup("refuse", text=text)
 
 
 def narrowed(task: Task, history: History) -> Task | Step:

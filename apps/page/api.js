@@ -53,7 +53,7 @@ export const newKey = () =>
   [...crypto.getRandomValues(new Uint8Array(16))].map((n) => n.toString(16).padStart(2, "0")).join("");
 
 // Events of a session from its first one; `connected` is told whenever that changes.
-export const follow = (session, { event, connected }) => {
+export const follow = (session, { event, connected, gone }) => {
   const ending = new AbortController();
   let last = null, failed = 0;
 
@@ -91,7 +91,8 @@ export const follow = (session, { event, connected }) => {
       try {
         await read();
       } catch (problem) {
-        if (ending.signal.aborted || problem.status === 401 || problem.status === 404) return;
+        if (ending.signal.aborted) return;
+        if (problem.status === 401 || problem.status === 404) return gone(problem);
       }
       if (ending.signal.aborted) return;
       connected(false);

@@ -17,6 +17,8 @@ export const app = {
   poses: [],
 };
 
+const NARROW = 860; // px: below, the picture is above the conversation
+
 const listeners = new Map();
 export const on = (name, listener) => listeners.set(name, [...(listeners.get(name) ?? []), listener]);
 export const tell = (name, value) => listeners.get(name)?.forEach((listener) => listener(value));
@@ -58,13 +60,14 @@ const loadPicture = async () => {
 
 // A turn, whatever asks for it: the page waits for its end, which the events tell as well.
 export const turn = async (place, path, json, { method = "POST", key, ...more } = {}) => {
-  clear(place);
+  ["problem", "stage-problem", "plan-problem"].forEach(clear);
   app.busy = true;
   tell("busy");
   try {
     const state = await call(method, at(path), { json, key: key ?? newKey(), ...more });
     app.looking = null;
     await refresh();
+    if (innerWidth <= NARROW) byId("stage").scrollIntoView({ block: "nearest" });
     return state;
   } catch (problem) {
     fail(place, problem);

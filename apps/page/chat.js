@@ -1,6 +1,6 @@
 // What was said, step by step, from the session's events; and where the next words are written.
 import { app, on, tell, turn } from "./app.js";
-import { announce, byId, h } from "./dom.js";
+import { announce, byId, h, readable } from "./dom.js";
 import { asked } from "./pointing.js";
 
 const log = byId("log"), words = byId("words");
@@ -9,12 +9,6 @@ const STEPS = {
   propose_formation: "Placing and certifying", edit_formation: "Changing the plan", undo: "Going back",
   deploy: "Moving the robots", measure: "Measuring", ask_user: "Asking", look: "Looking",
 };
-// What a person did without words, as the log has it, and how it reads.
-const COMMANDS = [
-  [/^\/undo first$/, "Back to the first plan"], [/^\/undo (p-.*)$/, "Back to an earlier plan"], [/^\/undo.*$/, "Undo"],
-  [/^\/redo.*$/, "Redo"], [/^\/go/, "Move the robots"], [/^\/edit.*$/, "Change"], [/^\/image (.*)$/, "Another picture: $1"],
-  [/^\/stop/, "Stop"],
-];
 const EDITS = {
   place: ({ robot, stays }) => `Robot ${robot} moved${stays ? "" : ", by itself"}`,
   distance: ({ px }) => `Distance ${px} px`,
@@ -27,11 +21,6 @@ const bottom = () => (log.scrollTop = log.scrollHeight);
 const said = (who, text, kind = "") => h(
   "p", { className: `said ${kind}` }, h("span", { className: "who" }, who), text,
 );
-
-const readable = (text) => {
-  const known = COMMANDS.find(([pattern]) => pattern.test(text));
-  return known ? text.replace(known[0], known[1]) : text;
-};
 
 // Arguments of a call; those of a person's own edits say what was done.
 const called = (text) => {
@@ -106,7 +95,7 @@ export const say = async (text) => {
     const problem = `${doubted.prompt.id} is not outlined surely enough: draw around it, correct it, or forget it.`;
     byId("problem").textContent = problem;
     byId("problem").hidden = false;
-    return;
+    return void (words.value ||= text);
   }
   const done = await turn("problem", "/messages", { words: text, pointed: those(false), keep_out: those(true) });
   if (!done) return void (words.value ||= text);

@@ -46,3 +46,15 @@ export const latest = (work) => {
     if (!running) run();
   };
 };
+
+// What a person did without words, as the log has it, and how it reads.
+const COMMANDS = [
+  [/^\/undo first$/, "Back to the first plan"], [/^\/undo (p-.*)$/, "Back to an earlier plan"], [/^\/undo.*$/, "Undo"],
+  [/^\/redo.*$/, "Redo"], [/^\/go/, "Move the robots"], [/^\/edit.*$/, "Change"], [/^\/image (.*)$/, "Another picture: $1"],
+  [/^\/stop/, "Stop"],
+];
+
+export const readable = (text) => {
+  const known = COMMANDS.find(([pattern]) => pattern.test(text));
+  return known ? text.replace(known[0], known[1]) : text;
+};

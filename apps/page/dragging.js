@@ -1,11 +1,11 @@
 // Robots under a hand, by mouse, touch or arrow keys: each place is certified as it comes, and what
 // is let go of becomes an edit like any other.
 import { call } from "./api.js";
-import { app, at, clear, fail, tell, turn } from "./app.js";
+import { app, at, clear, fail, on, tell, turn } from "./app.js";
 import { announce, byId, latest } from "./dom.js";
 import { draw, layer, place, placed, pressed, unit } from "./picture.js";
 
-const REST = 700; // ms after the last arrow key
+const REST = 1200; // ms after the last arrow key
 const STEP = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 // What is tried: edits of the plan that stands, and what their certificate would say.
@@ -51,7 +51,11 @@ export const commit = latest(async (wanted) => {
   else announce(state.message);
 });
 
-const free = ([edit]) => [{ kind: edit.kind, robot: edit.robot, to: edit.to }];
+// As it was shown last, without its group.
+const free = ([{ kind, robot, to }], { robots }) => {
+  const shown = robots.find((one) => one.number === robot);
+  return [{ kind, robot, to: shown ? [shown.x, shown.y] : to }];
+};
 
 const usable = () => app.scene.plan && !app.reading && !app.looking && !app.busy && !app.scene.plan.void;
 
@@ -77,7 +81,21 @@ export const pressedRobot = (down) => {
 };
 
 // Where the contract no longer holds, the robot stands by itself, and the plan says so.
-const settle = (wanted, last) => commit(last && !last.certified ? free(wanted) : wanted);
+const settle = (wanted, last) => {
+  if (trial !== wanted) return drop();
+  return commit(last && !last.certified ? free(wanted, last) : wanted);
+};
+
+// A plan that another page has changed meanwhile is not dragged on.
+let planned = null;
+on("scene", () => {
+  const now = app.scene.plan?.id ?? null;
+  if (trial && now !== planned) {
+    trial = null;
+    announce("The plan was changed elsewhere; nothing was moved here.");
+  }
+  planned = now;
+});
 
 let resting = null, keyed = null;
 layer("robots").addEventListener("keydown", (event) => {

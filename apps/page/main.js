@@ -1,8 +1,8 @@
 // The page as a whole: which session is open, what its events mean, keys, light and dark.
-import { call, fetched, follow, lookWith } from "./api.js";
+import { Problem, call, fetched, follow, lookWith } from "./api.js";
 import { app, at, clear, fail, on, refresh, stop, tell, turn } from "./app.js";
 import { drafted, reset, told } from "./chat.js";
-import { announce, byId, h } from "./dom.js";
+import { announce, byId, h, readable } from "./dom.js";
 import { choose, drawingKey, toolKeys } from "./pointing.js";
 import "./plan.js";
 import { received, start } from "./start.js";
@@ -21,16 +21,25 @@ const open = async ({ id: session, words, pointed }) => {
   try {
     await refresh();
   } catch (problem) {
-    fail("problem", problem);
-    if (problem.status === 401) await start();
-    return;
+    return gone(problem);
   }
-  byId("name").textContent = session;
-  leave = follow(session, { event: happened, connected });
+  leave = follow(session, { event: happened, connected, gone });
   const begun = { words: "", pointed: [], ...kept, ...(words ? { words, pointed } : {}) };
   byId("words").value = begun.words;
   byId("words").focus();
   begun.pointed.forEach((prompt) => tell("point", prompt));
+};
+
+// A session that is not there, or may not be seen, leads back to the start, which says so.
+const gone = async (problem) => {
+  leave?.();
+  Object.assign(app, { session: null, scene: null, state: null });
+  history.replaceState(null, "", "/");
+  for (const name of ["share", "export", "stop"]) byId(name).hidden = true;
+  byId("connection").textContent = "";
+  await start();
+  const missing = new Problem(404, { message: "That session is not here: it was deleted, or its address is wrong." });
+  if (problem.status !== 401) fail("start-problem", problem.status === 404 ? missing : problem);
 };
 
 // Events up to the one that the page was opened at tell what was; later ones what happens now.
@@ -67,6 +76,7 @@ const moving = (now) => {
 let lost = false;
 const connected = (now) => {
   byId("connection").textContent = now ? "" : "Connection lost; trying again …";
+  if (now) ["problem", "plan-problem"].forEach((place) => lost && clear(place));
   if (now && lost) settled();
   if (now !== !lost) announce(now ? "Connected again." : "Connection lost.");
   lost = !now;
@@ -77,7 +87,11 @@ on("file", (file) => {
   if (!app.session || byId("view").hidden) return received(file);
   turn("problem", `/picture?name=${encodeURIComponent(file.name)}`, undefined, { method: "PUT", body: file, type: file.type });
 });
-on("scene", () => (document.title = `${app.state.last?.instruction ?? "formup"} – formup`));
+on("scene", () => {
+  const name = readable(app.state.last?.instruction ?? "");
+  byId("name").textContent = name;
+  document.title = name ? `${name} – formup` : "formup";
+});
 
 byId("stop").onclick = stop;
 byId("export").onclick = async () => {

@@ -16,7 +16,7 @@ svg.append(...Object.values(layers));
 export const layer = (name) => layers[name];
 
 // What of the picture is seen: left, top, width, height, px of the picture.
-let seen = null;
+let seen = null, fitted = true;
 const size = () => [app.scene.picture.width, app.scene.picture.height];
 
 export const unit = () => (seen ? seen[2] / Math.max(svg.clientWidth, 1) : 1);
@@ -32,10 +32,11 @@ const fit = () => {
   const wide = Math.max(svg.clientWidth, 1) / Math.max(svg.clientHeight, 1);
   const across = Math.max(width, height * wide), down = across / wide;
   look([(width - across) / 2, (height - down) / 2, across, down]);
+  fitted = true;
 };
 
 const look = (rectangle) => {
-  seen = rectangle;
+  [seen, fitted] = [rectangle, false];
   svg.setAttribute("viewBox", seen.join(" "));
   draw();
 };
@@ -147,8 +148,12 @@ export const drawMotion = () => {
     for (const trail of trails.values()) trail.forEach(([x, y], i) => (i ? ink.lineTo(x, y) : ink.moveTo(x, y)));
   }
   ink.stroke();
+  // One that stands at its place is seen there: its number stays legible.
+  const places = new Map((app.moving ? [] : app.scene.plan?.robots ?? []).map((robot) => [robot.id, robot]));
   ink.beginPath();
-  for (const { x, y } of robots) {
+  for (const { id, x, y } of robots) {
+    const goal = places.get(id);
+    if (goal && Math.hypot(goal.x - x, goal.y - y) < radius) continue;
     ink.moveTo(x + radius, y);
     ink.arc(x, y, radius, 0, 7);
   }
@@ -187,7 +192,13 @@ on("picture", () => {
   trails.clear();
   fit();
 });
-new ResizeObserver(() => app.scene && fit()).observe(svg);
+// A view that shows the whole picture goes on doing so; another keeps its middle.
+new ResizeObserver(() => {
+  if (!app.scene || !seen) return;
+  if (fitted) return fit();
+  const tall = (seen[2] * svg.clientHeight) / Math.max(svg.clientWidth, 1);
+  look([seen[0], seen[1] + (seen[3] - tall) / 2, seen[2], tall]);
+}).observe(svg);
 
 // Looking around: the wheel, two fingers, and dragging where nothing else is.
 svg.addEventListener("wheel", (event) => {

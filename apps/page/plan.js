@@ -2,7 +2,7 @@
 import { call, newKey } from "./api.js";
 import { app, at, clear, fail, on, refresh, tell, turn } from "./app.js";
 import { begin, commit } from "./dragging.js";
-import { announce, byId, h, s } from "./dom.js";
+import { announce, byId, h, readable, s } from "./dom.js";
 import { MOST_DRAGGED } from "./picture.js";
 
 const certificate = byId("certificate"), sliders = byId("sliders"), strip = byId("strip");
@@ -13,12 +13,20 @@ const lines = (texts, kind) => texts.map((text) => h("p", { className: kind }, t
 
 const seconds = (value) => (value < 90 ? `${value.toFixed(0)} s` : `${(value / 60).toFixed(1)} min`);
 
+const metres = () => app.scene.metres_per_pixel;
+const length = (px) => (metres() ? `${(px * metres()).toFixed(2)} m` : `${px.toFixed(0)} px`);
+
 const way = ({ motion }) => motion && motion.makespan_s > 0
-  ? `The longest way is ${motion.longest_px.toFixed(0)} px, ${seconds(motion.makespan_s)}.` : "";
+  ? `The longest way is ${length(motion.longest_px)}, ${seconds(motion.makespan_s)}.` : "";
 
 const told = (found) => {
   const { plan } = app.scene, shown = found ?? plan;
-  const badge = shown.partial ? ["partial", "partial"] : shown.certified ? ["certified", "certified"] : ["wrong", "not certified"];
+  const badge = plan.void ? ["wrong", "void"] : shown.partial ? ["partial", "partial"]
+    : shown.certified ? ["certified", "certified"] : ["wrong", "not certified"];
+  if (plan.void) {
+    const why = "The picture, or what the plan is about, has changed since. Say what to do now.";
+    return certificate.replaceChildren(h("p", {}, h("strong", { className: "badge wrong" }, "void"), ` ${why}`));
+  }
   const worst = plan.worst && !found ? [`nearest is robot ${plan.worst.robot}, ${plan.worst.text}`] : [];
   certificate.replaceChildren(
     h("p", {}, h("strong", { className: `badge ${badge[0]}` }, badge[1]), " ",
@@ -62,9 +70,10 @@ const slidersOf = (group, number) => {
   const name = among ? ` of group ${number}` : "", more = among ? { group: number } : {};
   const found = [];
   if (group.nearest_px !== undefined && !group.radius) {
-    found.push(slider(`Distance${name}, px`, {
-      value: group.nearest_px, least: 0, most: Math.round(Math.max(width, height) / 5), step: 0.5,
-      edit: (px) => ({ kind: "distance", px, ...more }),
+    const scale = metres() ?? 1, rounded = (px) => +(px * scale).toPrecision(3);
+    found.push(slider(`Distance${name}, ${metres() ? "m" : "px"}`, {
+      value: rounded(group.nearest_px), least: rounded(1), most: rounded(Math.max(width, height) / 5), step: rounded(metres() ? 1 : 0.5),
+      edit: (value) => ({ kind: "distance", px: value / scale, ...more }),
     }));
   }
   if (group.relation !== "at") {
@@ -79,15 +88,15 @@ const slidersOf = (group, number) => {
 const thumbnail = (plan) => {
   const { width, height } = app.scene.picture, r = Math.max(width, height) / 45;
   return s("svg", { viewBox: `0 0 ${width} ${height}`, "aria-hidden": true },
-    s("image", { href: app.picture, width, height }),
+    plan.void ? null : s("image", { href: app.picture, width, height }),
     ...plan.points.slice(0, MOST_DRAGGED).map(([cx, cy]) => s("circle", { cx, cy, r })));
 };
 
 const drawStrip = () => strip.replaceChildren(...app.scene.plans.map((plan) => {
   const here = plan.id === (app.looking ?? app.scene.current);
   return h("li", {}, h("button", {
-    type: "button", className: here ? "here" : "", title: plan.words, ariaCurrent: here ? "true" : "false",
-    ariaLabel: `Plan ${plan.id}: ${plan.words}${plan.certified ? "" : ", not certified"}`,
+    type: "button", className: here ? "here" : "", title: readable(plan.words), ariaCurrent: here ? "true" : "false",
+    ariaLabel: `Plan ${plan.id}: ${readable(plan.words)}${plan.void ? ", void" : plan.certified ? "" : ", not certified"}`,
     onclick: () => lookAt(plan.id),
   }, thumbnail(plan)));
 }));
@@ -131,10 +140,11 @@ on("scene", () => {
 });
 
 const usable = () => {
-  const ready = app.scene?.plan && !app.busy && !app.looking;
+  const ready = app.scene?.plan && !app.busy && !app.looking && !app.moving;
   byId("go").disabled = !ready || app.scene.plan.void || !app.scene.plan.certified;
   byId("go").textContent = app.state?.waits ? "Approve …" : "Move the robots …";
-  for (const name of ["undo", "redo"]) byId(name).disabled = app.busy;
+  for (const name of ["undo", "redo"]) byId(name).disabled = app.busy || app.moving;
+  for (const input of sliders.querySelectorAll("input")) input.disabled = app.moving;
 };
 on("busy", usable);
 

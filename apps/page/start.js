@@ -1,7 +1,7 @@
 // Where a session begins: a picture of one's own, a photo, an example, or a session from before.
 import { call, token } from "./api.js";
 import { clear, fail, tell } from "./app.js";
-import { byId, h } from "./dom.js";
+import { byId, h, readable } from "./dom.js";
 
 const NEEDS = {
   offline: "Rules that come with formup: no network, no key. They know many wordings, not all.",
@@ -59,9 +59,9 @@ const example = ({ name, words, robots, pointed }) => h("li", {}, h("button", {
 }, h("img", { src: `/page/examples/${name}`, alt: "", loading: "lazy" }), h("span", {}, `“${words}”`)));
 
 const row = (facts) => {
-  const label = facts.name || facts.words || facts.id;
+  const said = readable(facts.words), label = facts.name || said || facts.id;
   return h("li", {}, h("button", { type: "button", className: "link", onclick: () => tell("open", facts) },
-    h("strong", {}, label), h("span", { className: "soft" }, ` ${facts.words && facts.words !== label ? facts.words : ""} · ${facts.turns} turns · ${new Date(facts.created).toLocaleString()}`)),
+    h("strong", {}, label), h("span", { className: "soft" }, ` ${said === label ? "" : said} · ${facts.turns === 1 ? "1 turn" : `${facts.turns} turns`} · ${new Date(facts.created).toLocaleString()}`)),
   h("button", { type: "button", ariaLabel: `Rename ${label}`, onclick: () => renamed(facts) }, "Rename"),
   h("button", { type: "button", ariaLabel: `Delete ${label}`, onclick: () => deleted(facts, label) }, "Delete"));
 };

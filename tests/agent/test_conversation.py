@@ -178,6 +178,42 @@ def test_what_is_pointed_at_answers_which(session: Session) -> None:
     assert moved.report.robots == tuple(str(i) for i in range(1, 9))
 
 
+@pytest.mark.parametrize(
+    ("words", "relation", "robots"),
+    [
+        ("9 robots around it", "around", 9),
+        ("5 robots around it", "around", 5),
+        ("line up four robots along it", "along", 4),
+        ("put 3 robots to the left of it", "along", 3),
+        ("4 robots at its corners", "corners", 4),
+    ],
+)
+def test_later_words_are_about_what_is_pointed_at_with_them(
+    session: Session, words: str, relation: str, robots: int
+) -> None:
+    report = session.say(words, pointed=[TargetPrompt(id="t2", box=BLUE)]).report
+    assert report.contract is not None
+    (group,) = [group for group in report.contract.groups if group.targets == ("t2",)]
+    assert (group.relation, group.robots) == (relation, robots)
+
+
+def test_what_is_pointed_at_is_never_left_out(session: Session) -> None:
+    assert session.run is not None
+    before = session.run.world.current
+    told = session.say("a bit further out", pointed=[TargetPrompt(id="t2", box=BLUE)])
+    assert "does not say what to do about what was pointed at" in told.report.message
+    assert told.world.current == before
+    moved = session.say("a bit further out")
+    assert moved.report.status == "planned" and moved.world.current != before
+
+
+def test_a_number_of_robots_is_no_length(session: Session) -> None:
+    report = session.say("put 5 robots to the left of it").report
+    assert report.contract is not None
+    (group,) = report.contract.groups
+    assert (group.relation, group.side, group.robots) == ("along", "left", 5)
+
+
 def test_what_is_kept_off_with_the_first_words_is(picture: Picture) -> None:
     made = Agent().start(picture, pointed=[TargetPrompt(box=RED)], settings=Settings(robots=8))
     run = made.say("Surround it", keep_out=[TargetPrompt(id="t2", box=BLUE)])

@@ -15,7 +15,6 @@ from ..formation.checking.allowed import allowed_area
 from ..formation.checking.verdict import parts_of
 from ..formation.contract import OUTSIDE
 from ..formation.editing.draft import numbers_of
-from ..formation.encounters import notes_of
 from ..formation.plan import Plan
 from ..formation.units import length_text
 from ..geometry.outline import Outline, distances
@@ -144,7 +143,6 @@ def _plan_data(world: World, node: PlanNode) -> dict[str, Any]:
     data: dict[str, Any] = {"id": plan.id, "parent": node.parent, "words": node.words}
     data |= {"void": world.is_void(plan), "radius": plan.formation.contract.robot_radius}
     data |= verdict_data(plan) | {"robots": robot_data(plan, before and before.plan)}
-    data["notes"] += notes_of(node.encounters)
     if data["void"]:
         return data | {"areas": [], "groups": [], "measures": [], "worst": None}
     contract, site = plan.formation.contract, world.site(plan.formation.contract)

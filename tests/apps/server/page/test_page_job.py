@@ -269,6 +269,7 @@ def test_a_shared_link_shows_what_happens_and_lets_nothing_be_done(server: Any, 
     here.begin()
     here.say("Surround the largest coin")
     here.page.click("#share")
+    expect(here.page.locator("#shared")).to_be_visible(timeout=LONG)
     other.page.goto(here.page.input_value("#link"))
     here.page.keyboard.press("Escape")
     expect(other.page.locator(".robot")).to_have_count(8, timeout=LONG)

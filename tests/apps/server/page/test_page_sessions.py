@@ -76,6 +76,7 @@ def test_another_picture_is_dropped_on_a_session(server: Any, visit: Any) -> Non
     scene = server.client.get(f"{here.session}/scene").json()
     assert (scene["picture"]["width"], scene["picture"]["height"]) == (768, 432)
     assert scene["plan"]["void"]
+    expect(here.page.locator("#certificate .badge")).to_have_text("void")
     expect(here.page.locator("#go")).to_be_disabled()
 
 
@@ -113,6 +114,33 @@ def test_robots_are_kept_off_what_is_pointed_at_for_that(server: Any, visit: Any
     assert len(scene["targets"]) == len(scene["keep_out"]) == 1
     expect(here.page.locator("#scene path.off")).to_have_count(1)
     expect(here.page.locator("#pointed .chip")).to_have_count(0)
+
+
+def test_a_session_that_is_not_there_leads_to_the_start(server: Any, visit: Any) -> None:
+    here = visit(server.url)
+    here.begin()
+    here.say("Surround the largest coin")
+    session = here.session
+    here.page.evaluate("location.hash = 'nosuchsession'")
+    expect(here.page.locator("#start-problem")).to_contain_text("not here", timeout=LONG)
+    expect(here.page.locator("#go")).to_be_hidden()
+    here.page.locator("#sessions button.link").click()
+    expect(here.page.locator(".robot")).to_have_count(8, timeout=LONG)
+    server.client.delete(session)
+    expect(here.page.locator("#start-problem")).to_contain_text("deleted", timeout=LONG)
+
+
+def test_words_are_about_what_was_just_pointed_at(server: Any, visit: Any) -> None:
+    here = visit(server.url)
+    here.begin()
+    here.say("Surround the largest coin")
+    here.page.click("[data-tool=point]")
+    here.page.locator('.thing[data-id="c2"]').press("Enter", timeout=LONG)
+    expect(here.page.locator("#pointed .chip")).to_have_count(1, timeout=LONG)
+    here.say("9 robots around it")
+    scene = server.client.get(f"{here.session}/scene").json()
+    (group,) = scene["plan"]["groups"]
+    assert (group["targets"], group["robots"]) == (["t2"], 9)
 
 
 def test_sessions_are_found_renamed_and_deleted(server: Any, visit: Any) -> None:
