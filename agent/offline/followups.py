@@ -301,7 +301,8 @@ def _not_framed(line: Line) -> Followup:
     left = (reading.stops, reading.unread, reading.language, reading.unscaled, reading.background)
     kinds = {kind for c in line.chunks for kind in c.kinds}
     settled = not any(left) and reading.sure and reading.relation not in ("ask", "several")
-    beside = reading.relation == "along" and reading.robots is not None
+    counted = re.search(r"\b(?:robots?|bots?|drones?|rovers?)\b", text, re.IGNORECASE)
+    beside = reading.relation == "along" and reading.robots is not None and counted
     if not settled or not ("relation" in kinds or beside) or "neg" in kinds:
         return _not_understood(line)
     shown = "there" in kinds and bool(line.standing.pointed)
