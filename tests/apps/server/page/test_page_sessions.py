@@ -1,9 +1,10 @@
 """What a page keeps and where it leads: drafts, forks, other pictures, paths before a motion."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import expect
+from playwright.sync_api import Dialog, expect
 
 PHOTOS = Path(__file__).parents[4] / "evals/photos/images"
 LONG = 20_000
@@ -143,6 +144,13 @@ def test_words_are_about_what_was_just_pointed_at(server: Any, visit: Any) -> No
     assert (group["targets"], group["robots"]) == (["t2"], 9)
 
 
+def accepting(text: str) -> Callable[[Dialog], None]:
+    def accept(dialog: Dialog) -> None:
+        dialog.accept(text)
+
+    return accept
+
+
 def test_sessions_are_found_renamed_and_deleted(server: Any, visit: Any) -> None:
     here = visit(server.url)
     here.begin()
@@ -150,13 +158,13 @@ def test_sessions_are_found_renamed_and_deleted(server: Any, visit: Any) -> None
     here.page.click("#home")
     rows = here.page.locator("#sessions li")
     expect(rows).to_have_count(1, timeout=LONG)
-    here.page.once("dialog", lambda dialog: dialog.accept("my coins"))
+    here.page.once("dialog", accepting("my coins"))
     rows.get_by_role("button", name="Rename").click()
     expect(rows).to_contain_text("my coins", timeout=LONG)
     here.page.fill("#search", "no such words")
     expect(rows).to_have_text("None.", timeout=LONG)
     here.page.fill("#search", "coins")
-    here.page.once("dialog", lambda dialog: dialog.accept())
+    here.page.once("dialog", accepting(""))
     rows.get_by_role("button", name="Delete").click()
     expect(rows).to_have_text("None.", timeout=LONG)
     assert server.client.get("/api/sessions").json() == []
