@@ -17,7 +17,7 @@ export const app = {
   poses: [],
 };
 
-const NARROW = 860; // px: below, the picture is above the conversation
+export const NARROW = 860; // px: below, the picture is above the conversation
 
 const listeners = new Map();
 export const on = (name, listener) => listeners.set(name, [...(listeners.get(name) ?? []), listener]);

@@ -1,6 +1,6 @@
 // The page as a whole: which session is open, what its events mean, keys, light and dark.
 import { Problem, call, fetched, follow, lookWith } from "./api.js";
-import { app, at, clear, fail, on, refresh, stop, tell, turn } from "./app.js";
+import { NARROW, app, at, clear, fail, on, refresh, stop, tell, turn } from "./app.js";
 import { drafted, reset, told } from "./chat.js";
 import { announce, byId, h, readable } from "./dom.js";
 import { choose, drawingKey, toolKeys } from "./pointing.js";
@@ -26,7 +26,7 @@ const open = async ({ id: session, words, pointed }) => {
   leave = follow(session, { event: happened, connected, gone });
   const begun = { words: "", pointed: [], ...kept, ...(words ? { words, pointed } : {}) };
   byId("words").value = begun.words;
-  byId("words").focus();
+  if (innerWidth > NARROW) byId("words").focus(); // on a phone the picture would be scrolled away
   begun.pointed.forEach((prompt) => tell("point", prompt));
 };
 
