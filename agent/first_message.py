@@ -206,13 +206,10 @@ def _where_it_was(target: Target, size: tuple[int, int]) -> TargetPrompt:
 def pointed_at(pointed: Sequence[TargetPrompt], world: World) -> list[TargetPrompt]:
     """What is pointed at in a later turn: other things than the targets there are.
 
-    What was pointed at before and is not measured yet is still meant while no plan stands and
-    nothing else is pointed at.
+    What was pointed at before and is not measured yet is still meant.
     """
     used = {target.id for target in world.targets}
-    stands = world.current is not None and not world.is_void(world.plans[world.current].plan)
-    still = not pointed and not stands
-    numbered = [prompt for prompt in world.pointed if still and prompt.id not in used]
+    numbered = [prompt for prompt in world.pointed if prompt.id not in used]
     used.update(prompt.id for prompt in numbered)
     for prompt in pointed:
         name = prompt.id

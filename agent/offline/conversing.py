@@ -18,7 +18,7 @@ from .choosing import Step, agrees, calls_in, chosen_candidates, declines, promp
 from .finding import found_thing, known_thing, measured_at
 from .followup_things import UNNAMED, pointing_at
 from .followups import Followup, commands, read_followup
-from .pointed import heeded
+from .pointed import heeded, shown_now
 from .sharing import shared
 from .standing import Standing
 
@@ -52,6 +52,8 @@ LEAST_WAY = 0.02
 
 def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task, History]:
     """The next step of a turn, or the task and messages of a whole new instruction."""
+    shown = shown_now(task, before) if task.standing else ()
+    task = replace(task, pointed=shown) if shown else task
     standing = _standing(task, before)
     new = standing is not None and any(p["id"] not in task.targets for p in task.pointed)
     words, messages = pointing_at(task.instruction) if new else task.instruction, turn[1:]
@@ -66,7 +68,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
             return Reply(text="Nothing was changed.")
         words = _words_meant(words, followup, answer, standing)
         followup = read_followup(words, standing)
-    followup = heeded(task, followup) if new else followup
+    followup = heeded(task, followup) if shown else followup
     if followup.kind == "instruction":
         fresh = words != task.instruction
         said = followup.text if standing else words

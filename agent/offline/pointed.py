@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..first_message import Task
-from ..messages import History
+from ..first_message import Task, read_task
+from ..messages import History, User
 from .accounting import read_instruction
 from .choosing import Step
 from .finding import one_at
@@ -51,14 +51,19 @@ THE_THING = "the thing"
 """Stands in the instruction for the one that is chosen."""
 
 
+def shown_now(task: Task, before: History) -> tuple[dict[str, Any], ...]:
+    """What is pointed at with these words; what was with earlier ones is in their messages."""
+    old = {p["id"] for m in before if isinstance(m, User) for p in read_task(m.text).pointed}
+    return tuple(p for p in task.pointed if p["id"] not in {*old, *task.targets})
+
+
 def heeded(task: Task, followup: Followup) -> Followup:
     """A follow-up in which what is newly pointed at has a part; else an instruction about that.
 
     It is refused where its words are no instruction.
     """
     named = json.dumps(followup.edits)
-    new = [str(p["id"]) for p in task.pointed if p["id"] not in task.targets]
-    if not followup.edits or any(json.dumps(name) in named for name in new):
+    if not followup.edits or any(json.dumps(p["id"]) in named for p in task.pointed):
         return followup
     reading = read_instruction(task.instruction, task.metres_per_pixel)
     if reading.sure and reading.relation != "ask" and not (reading.stops or reading.unread):
