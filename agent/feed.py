@@ -15,8 +15,8 @@ from typing import Any
 from ..tools.context import Context, Shown
 from ..tools.errors import StorageError
 from ..tools.fleet.follow import Rigid
+from ..tools.fleet.pace import pace_of
 from ..tools.fleet.protocol import Fleet, Pose
-from ..tools.fleet.simulated import SimulatedFleet
 from ..tools.formation.plan import Plan
 from .store.protocol import Event, EventKind, EventLog, StoredSession
 from .turns import Turn
@@ -104,9 +104,15 @@ class Feed:
     @contextmanager
     def view(self, context: Context, plan: Plan, fleet: Fleet) -> Generator[Shown]:
         """Simulated robots drive in real time while anybody watches; see `Services.view`."""
-        if self.watching and isinstance(fleet, SimulatedFleet):
-            fleet.pace.speed = fleet.pace.speed or 1.0
-        yield _shown_by_fleet
+        pace = pace_of(fleet) if self.watching else None
+        if pace is None or pace.speed is not None:
+            yield _shown_by_fleet
+            return
+        pace.speed = 1.0
+        try:
+            yield _shown_by_fleet
+        finally:
+            pace.speed = None
 
     async def subscribe(
         self, after: int = 0, *, watching: bool = False

@@ -22,7 +22,7 @@ from ..tools.draw.canvas import ALLOWED, FINDING, IDLE, INK, MUTED, PAPER, ROBOT
 from ..tools.draw.live import BAR, EDGE, HEAD, PANEL, Course, Ground, body, words
 from ..tools.errors import FleetError, InputError
 from ..tools.fleet.follow import Rigid
-from ..tools.fleet.pace import Pace
+from ..tools.fleet.pace import Pace, pace_of
 from ..tools.fleet.protocol import Fleet, Pose
 from ..tools.formation.plan import Plan
 from .terminal import say
@@ -68,8 +68,7 @@ class Window:
         self._ground = Ground(context.picture, world, plan, title, radius)
         self._course, self._fleet = Course(plan, world.picture.size, radius), fleet
         self._scale, self._changed = world.metres_per_pixel, True
-        pace = getattr(fleet, "pace", None)
-        self._pace = pace if isinstance(pace, Pace) else None
+        self._pace = pace_of(fleet)
         if self._pace is not None:
             self._pace.speed = SPEEDS[self._speed]
         if not self._open:

@@ -100,18 +100,20 @@ const thing = (found, kind, name) => s(
 
 export const draw = () => {
   if (!app.scene || !seen) return;
-  const { plan, targets, keep_out: off, met } = app.scene;
+  const { plan, targets, keep_out: kept, met } = app.scene;
   layers.areas.replaceChildren(...(plan?.areas ?? []).map((rings) => s("path", { class: "area", d: path(rings) })));
   layers.things.replaceChildren(
-    ...off.map((found) => thing(found, "off")),
+    ...kept.map((found) => thing(found, "off")),
     ...met.map((found) => thing(found, "met", `${found.label}: robots stand on it or drive over it`)),
     ...targets.map((found) => thing(found, "target", `${found.id}: ${found.label}, confidence ${found.confidence}`)),
   );
-  const robots = plan?.robots ?? [], radius = radiusOf(robots), single = robots.length <= MOST_DRAGGED;
+  // A disc does not reach onto what its robot keeps off.
+  const off = Math.min(...(plan?.groups ?? []).map((group) => group.nearest_px ?? Infinity));
+  const robots = plan?.robots ?? [], radius = Math.min(radiusOf(robots), Math.max(0.9 * off, 2.5 * unit())), single = robots.length <= MOST_DRAGGED;
   const body = plan?.radius ?? 0;
   layers.arrows.replaceChildren(
     ...(body ? robots.map((robot) => s("circle", { class: "body", cx: robot.x, cy: robot.y, r: body })) : []),
-    ...(app.moving ? [] : robots.filter((robot) => robot.from).map((robot) => arrow(robot, radius))).filter(Boolean),
+    ...(app.moving || plan?.arrival ? [] : robots.filter((robot) => robot.from).map((robot) => arrow(robot, radius))).filter(Boolean),
   );
   const focused = document.activeElement?.closest?.(".robot")?.dataset.number;
   layers.robots.replaceChildren(...(single

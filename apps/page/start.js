@@ -1,5 +1,5 @@
 // Where a session begins: a picture of one's own, a photo, an example, or a session from before.
-import { call, token } from "./api.js";
+import { Problem, call, token } from "./api.js";
 import { clear, fail, tell } from "./app.js";
 import { byId, h, readable } from "./dom.js";
 
@@ -49,12 +49,9 @@ export const received = (file) => began(file, file.name);
 const example = ({ name, words, robots, pointed }) => h("li", {}, h("button", {
   type: "button",
   onclick: async () => {
-    try {
-      const response = await fetch(`/page/examples/${name}`);
-      began(await response.blob(), name, { robots, words, pointed });
-    } catch (problem) {
-      fail("start-problem", problem);
-    }
+    const response = await fetch(`/page/examples/${name}`).catch(() => null);
+    if (!response?.ok) return fail("start-problem", new Problem(0, { message: "The example could not be fetched; try it again." }));
+    return began(await response.blob(), name, { robots, words, pointed });
   },
 }, h("img", { src: `/page/examples/${name}`, alt: "", loading: "lazy" }), h("span", {}, `“${words}”`)));
 

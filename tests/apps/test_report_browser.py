@@ -1,7 +1,6 @@
 """The report in a browser, on a desk and on a phone: it works, runs nothing else, loads nothing."""
 
 import io
-import shutil
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -13,23 +12,15 @@ from formup.apps.cli import app
 from PIL import Image
 from playwright.sync_api import Browser, Dialog, Page, Request, expect, sync_playwright
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "evals"))
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "evals")]
+chromium = import_module("chromium")
 hostile = import_module("hostile")
 write_run: Callable[..., Path] = hostile.write_run
 TASKS: int = hostile.TASKS
-CHROMIUM = shutil.which("chromium")
-FLAGS = [
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 SIZES = {"desk": (1280, 900), "phone": (390, 844)}
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium to look with")
+pytestmark = pytest.mark.skipif(
+    chromium.CHROMIUM is None, reason="there is no chromium to look with"
+)
 
 
 @dataclass
@@ -54,7 +45,7 @@ def browser(pages: Path) -> Iterator[Browser]:
     """Begun after the pages are made: while it is there an event loop runs, as in no other test."""
     assert pages
     with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        found = playwright.chromium.launch(executable_path=chromium.CHROMIUM, args=chromium.FLAGS)
         yield found
         found.close()
 

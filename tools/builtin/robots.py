@@ -102,6 +102,9 @@ def _notes(found: Going, poses: tuple[Pose, ...]) -> list[str]:
             "Which robot takes which place is approximate: another assignment could save "
             f"{found.gap:.2%} of the summed squared ways at most."
         )
+    if found.verdict is not None and not found.verdict.certified:
+        told = " ".join(finding.sentence for finding in found.verdict.findings)
+        notes.append(f"No robot can be driven there as they stand: {told}")
     idle = [pose.id for pose in poses if pose.id not in set(found.robots)]
     if idle:
         counted = "1 robot" if len(idle) == 1 else f"{len(idle)} robots"

@@ -4,6 +4,8 @@ import asyncio
 import time
 from dataclasses import dataclass
 
+from .protocol import Fleet
+
 PAUSE = 0.02
 """Seconds between looks at whether a pause has ended."""
 
@@ -34,3 +36,9 @@ class Pace:
         now = time.monotonic()
         self._due = max(self._due + seconds / self.speed, now)
         await asyncio.sleep(self._due - now)
+
+
+def pace_of(fleet: Fleet) -> Pace | None:
+    """The clock of a fleet whose time is simulated; None for others."""
+    pace = getattr(fleet, "pace", None)
+    return pace if isinstance(pace, Pace) else None

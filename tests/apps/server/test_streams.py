@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from formup.apps.server.tokens import Tokens
+from formup.tools.fleet.pace import pace_of
 
 from .conftest import Running, Serve
 
@@ -134,3 +135,22 @@ def test_a_stream_ends_with_its_token(serve: Serve, tmp_path: Path) -> None:
             pass  # to its end, which is a whole one
         assert server.client.get("/metrics", headers=bob).text.count("formup_event_streams 1.0")
         assert next(stays.iter_raw())
+
+
+def test_simulated_robots_drive_in_real_time_only_while_somebody_watches(server: Running) -> None:
+    session = server.begin()
+    plan = server.say(session, "Surround the largest coin")["report"]["plan_id"]
+    held = server.service.session(session.rpartition("/")[2])
+    assert held.services is not None
+    headers = {"Idempotency-Key": "one"}
+    with server.client.stream("GET", f"{session}/events?watching=true") as response:
+        lines = response.iter_lines()
+        next(lines)
+        deployment = {"plan_id": plan}
+        server.client.post(f"{session}/deployments", headers=headers, json=deployment)
+        assert any('"name": "poses"' in line for line in lines)
+        (fleet,) = held.services.fleets.values()
+        pace = pace_of(fleet)
+        assert pace is not None and pace.speed == 1.0
+        assert any('"RUN_FINISHED"' in line for line in lines)
+    assert pace.speed is None

@@ -47,7 +47,15 @@ def _offset(part: Part, edit: Offset) -> Part:
         )
     least, greatest = (round(max(bound + by, 0.0), DECIMALS) for bound in group.clearance)
     if group.clearance[1] >= MAX_LENGTH:
-        greatest = MAX_LENGTH
+        stated, greatest = group.clearance[0], MAX_LENGTH
+        if by < 0 and clearance + by >= stated:  # "at least so far" holds on
+            least = stated
+        elif by < 0 and edit.px is None:
+            raise ToolError(
+                f"Robots' edges were to be at least {part.site.length(stated)} from "
+                f"{group.targets[0]}, and are {part.site.length(clearance)} from it: say how far "
+                "they are to be now."
+            )
     if group.radius is not None:
         return _resized(part, (group.radius + by) / group.radius, (least, greatest))
     moved = part.to(_beyond(part, here, by, (least, greatest)), clearance=(least, greatest))

@@ -87,7 +87,8 @@ class _Slides:
         self._left = min(MOST_TRIED, TRIED_TOGETHER // plan.formation.contract.robots)
         contract = plan.formation.contract
         regions = [thing.region for thing in site.others if thing.sure]
-        regions += [site.solid(name, contract) for name in contract.keep_out]
+        # Robots that are points to the contract have bodies to a fleet.
+        regions += [site.solid(name, contract).buffer(TOUCHING) for name in contract.keep_out]
         self._solid: BaseGeometry = shapely.union_all(regions)
         self._floor, self._near = contract.spacing_floor, contract.robot_radius + TOUCHING
 

@@ -51,7 +51,7 @@ def off_others(plan: Plan, site: Site) -> Plan:
     kinds = {finding.kind for finding in plan.verdict.findings}
     contract = plan.formation.contract
     costly = contract.robots > MOST_ROBOTS or any(map(escape_proof, contract.groups))
-    if kinds - {"keep_out"} or not (site.others or kinds) or costly:
+    if kinds - {"keep_out"} or not (site.others or kinds or contract.keep_out) or costly:
         return plan
     search, first = _Search(plan, site), 0
     for group in contract.groups:
@@ -70,6 +70,8 @@ class _Search:
         self._left = min(MOST_TRIED, TRIED_TOGETHER // self._contract.robots)
         hard = [site.solid(name, self._contract) for name in self._contract.keep_out]
         sure, faint = ([t.region for t in site.others if t.sure is yes] for yes in (True, False))
+        # Robots that are points to the contract have bodies to a fleet.
+        sure += [region.buffer(TOUCHING) for region in hard]
         self._regions = [shapely.union_all(regions) for regions in (hard, sure, faint)]
 
     def _bad(self, points: FloatArray) -> NDArray[np.bool_]:

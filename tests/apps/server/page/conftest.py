@@ -1,6 +1,5 @@
 """A real browser on a real server: what must not happen while a page is open is looked for."""
 
-import shutil
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -11,19 +10,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Request, expect, sync_playwright
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-served = import_module("conftest")
-CHROMIUM = shutil.which("chromium")
-FLAGS = [
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+sys.path.insert(0, str(Path(__file__).parents[2]))
+chromium = import_module("chromium")
 LONG = 20_000
 """Longest, ms, that a turn may take on a machine that is busy."""
 
@@ -87,10 +75,10 @@ Visits = Callable[..., Visit]
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    if CHROMIUM is None:
+    if chromium.CHROMIUM is None:
         pytest.skip("there is no chromium to look with")
     with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        found = playwright.chromium.launch(executable_path=chromium.CHROMIUM, args=chromium.FLAGS)
         yield found
         found.close()
 

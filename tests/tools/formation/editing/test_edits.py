@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from formup.tools.errors import ToolError
-from formup.tools.formation.contract import Contract, Group
+from formup.tools.formation.contract import MAX_LENGTH, Contract, Group
 from formup.tools.formation.editing.edit_kinds import (
     Add,
     Edit,
@@ -96,6 +96,18 @@ def added(found: Edited) -> tuple[int, ...]:
 def group_of(found: Plan | Edited) -> Group:
     plan = found.plan if isinstance(found, Edited) else found
     return plan.formation.contract.groups[0]
+
+
+def test_at_least_so_far_holds_on_when_robots_come_closer() -> None:
+    group = Group(relation="around", targets=("t3",), robots=6, clearance=(20, MAX_LENGTH))
+    places = DISC.filled.centroid.buffer(70 + 4 + 40).exterior
+    points = [places.interpolate(k / 6, normalized=True).coords[0] for k in range(6)]
+    plan = make_plan(Contract(groups=(group,), robot_radius=4), SITE, "s", points)
+    nearer = after(plan, Offset(kind="in", px=10)).plan
+    assert group_of(nearer).clearance == (20, MAX_LENGTH)
+    assert nearer.verdict.certified
+    with pytest.raises(ToolError, match=r"at least 20\.0 px"):
+        after(plan, Offset(kind="in", factor=4))
 
 
 @each

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from formup.tools.formation.checking.check import certify
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.encounters import room_of
+from formup.tools.formation.encounters import TOUCHING, room_of
 from formup.tools.formation.headings import headings_of
 from formup.tools.formation.placement.avoidance import off_others
 from formup.tools.formation.plan import Plan, make_plan
@@ -169,6 +169,19 @@ def test_a_plan_that_fails_on_a_keep_out_is_mended_where_it_can_be() -> None:
     stuck = make_plan(contract, where, "s", bare.formation.points)
     assert {f.kind for f in stuck.verdict.findings} == {"keep_out"}
     assert off_others(stuck, where).verdict.certified
+
+
+def test_what_is_kept_off_is_not_touched_where_there_is_room() -> None:
+    bare, _ = planned(site())
+    beside = shapely.Point(bare.formation.points[0] + (0, 9)).buffer(8)  # 1 px from the robot
+    where = Site({"t1": DISC, "k1": outline_of(beside)}, 640, 480)
+    group = Group(relation="around", targets=("t1",), robots=6)
+    contract = Contract(groups=(group,), keep_out=("k1",))
+    near = make_plan(contract, where, "s", bare.formation.points)
+    assert near.verdict.certified
+    after = off_others(near, where)
+    assert after.verdict.certified
+    assert distances(beside, after.formation.points).min() > TOUCHING
 
 
 def test_a_thing_nearby_is_given_room_where_that_costs_nothing() -> None:
