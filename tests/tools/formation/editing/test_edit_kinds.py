@@ -56,3 +56,23 @@ def test_every_kind_has_a_rule() -> None:
 def test_what_is_no_edit_is_refused(edit: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
         ADAPTER.validate_python(edit)
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        {"kind": "out"},
+        {"kind": "in", "px": 3, "factor": 2},
+        {"kind": "out", "px": -1},
+        {"kind": "remove"},
+        {"kind": "remove", "n": 1, "robots": [2]},
+        {"kind": "skip", "robots": []},
+        {"kind": "rotate", "degrees": float("nan")},
+        {"kind": "scale", "factor": 0},
+        {"kind": "wiggle"},
+    ],
+    ids=str,
+)
+def test_what_is_no_edit_is_refused_where_it_comes_in(edit: dict[str, object]) -> None:
+    with pytest.raises(ValidationError):
+        ADAPTER.validate_python(edit)

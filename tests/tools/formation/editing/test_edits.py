@@ -23,7 +23,7 @@ from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.outline import FloatArray, distances, make_outline
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 ELL = make_outline([(250, 220), (330, 220), (330, 340), (460, 340), (460, 420), (250, 420)])
 POST = make_outline([(700, 250), (760, 250), (760, 430), (700, 430)])
@@ -390,23 +390,3 @@ def test_with_several_groups_it_has_to_be_said_which_is_meant() -> None:
     for edit in (Add(n=1), Remove(n=1), SideOnly(side="left")):
         with pytest.raises(ToolError, match="Say which of the groups 1 to 2"):
             after(standing("ring", "shape"), edit)
-
-
-@pytest.mark.parametrize(
-    "edit",
-    [
-        {"kind": "out"},
-        {"kind": "in", "px": 3, "factor": 2},
-        {"kind": "out", "px": -1},
-        {"kind": "remove"},
-        {"kind": "remove", "n": 1, "robots": [2]},
-        {"kind": "skip", "robots": []},
-        {"kind": "rotate", "degrees": float("nan")},
-        {"kind": "scale", "factor": 0},
-        {"kind": "wiggle"},
-    ],
-    ids=str,
-)
-def test_what_is_no_edit_is_refused_where_it_comes_in(edit: dict[str, object]) -> None:
-    with pytest.raises(ValidationError):
-        TypeAdapter(Edit).validate_python(edit)
