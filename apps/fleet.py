@@ -1,26 +1,35 @@
 """`formup fleet`: look at a fleet before it is driven, or stand in for its robots."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from ..tools.fleet.described import mqtt_fleet
-from ..tools.fleet.mqtt.checkup import checked
-from ..tools.fleet.mqtt.stand_in import StandIns
+from ..tools.fleet.described import wire_settings
+from ..tools.fleet.mqtt.checkup import checked as mqtt_checked
+from ..tools.fleet.mqtt.settings import MqttSettings
+from ..tools.fleet.mqtt.stand_in import MqttStandIns
+from ..tools.fleet.wire.settings import WireSettings
 from .terminal import say
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 File = Annotated[Path, typer.Argument(help="A fleet's YAML file.", show_default=False)]
-
-
 Seconds = Annotated[float, typer.Option("--seconds", help="To listen for.", min=0.1, max=3600)]
+
+CHECKUPS: Mapping[type[WireSettings], Callable[[Any, float], tuple[list[str], bool]]] = {
+    MqttSettings: mqtt_checked
+}
+STAND_INS: Mapping[type[WireSettings], Callable[[Any, Callable[[str], None]], Any]] = {
+    MqttSettings: MqttStandIns
+}
 
 
 @app.command()
 def check(file: File, seconds: Seconds = 3.0) -> None:
     """Say who is there and what is wrong; nothing is moved. Ends with 4 where all is not well."""
-    told, fit = checked(mqtt_fleet(file), seconds)
+    settings = wire_settings(file)
+    told, fit = CHECKUPS[type(settings)](settings, seconds)
     say("\n".join(told))
     raise typer.Exit(0 if fit else 4)
 
@@ -28,9 +37,9 @@ def check(file: File, seconds: Seconds = 3.0) -> None:
 @app.command()
 def simulate(file: File) -> None:
     """Stand in for the robots of a file on the same wire, until Ctrl-C."""
-    settings = mqtt_fleet(file)
-    robots = StandIns(settings, lambda text: say(f"formup: {text}"))
-    say(f"formup: standing in for {len(settings.robots)} robots at {settings.broker}.")
+    settings = wire_settings(file)
+    robots = STAND_INS[type(settings)](settings, lambda text: say(f"formup: {text}"))
+    say(f"formup: standing in for {len(settings.robots)} robots at {settings.where}.")
     try:
         robots.run()
     finally:

@@ -25,7 +25,7 @@ import numpy as np
 from ..tools.errors import FleetError
 from ..tools.fleet.mqtt.fleet import MqttFleet
 from ..tools.fleet.mqtt.settings import MqttSettings
-from ..tools.fleet.mqtt.stand_in import StandIns
+from ..tools.fleet.mqtt.stand_in import MqttStandIns
 from ..tools.fleet.protocol import Pose, points_of
 from ..tools.motion.motion import Motion
 
@@ -54,15 +54,15 @@ class Counted:
         return came, wanted - came
 
 
-class Robots(StandIns):
+class Robots(MqttStandIns):
     """Stand-ins that say when they speak, and count what they hear."""
 
     def __init__(self, settings: MqttSettings) -> None:
         self.counted = Counted()
         super().__init__(settings, lambda text: None)
 
-    def _message(self, i: int) -> dict[str, object] | None:
-        message = super()._message(i)
+    def _message(self, robot: str, place: tuple[float, float]) -> dict[str, Any] | None:
+        message = super()._message(robot, place)
         return message and message | {"sent": time.monotonic()}
 
     def _heard(self, topic: str, payload: bytes) -> None:

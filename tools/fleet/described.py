@@ -15,8 +15,12 @@ from .mqtt.settings import MqttSettings
 from .physics import Physics
 from .protocol import Fleet, FleetFactory, FleetRequest
 from .registry import FLEETS
+from .wire.settings import WireSettings
 
 Model = TypeVar("Model", bound=Value)
+Elsewhere = TypeVar("Elsewhere", bound=WireSettings)
+WIRES: Mapping[str, type[WireSettings]] = {"mqtt": MqttSettings}
+"""What a file says of robots that are elsewhere, by its `fleet`."""
 SUFFIXES = (".yaml", ".yml")
 MOST_BYTES = 1_000_000
 
@@ -51,8 +55,8 @@ def fleet_named(name: str) -> FleetFactory:
     """
     path = Path(name)
     if path.suffix.lower() not in SUFFIXES:
-        if name == "mqtt":
-            raise InputError("Robots on MQTT are described by a file: --fleet FILE.yaml.")
+        if name in WIRES:
+            raise InputError(f"Robots on {name} are described by a file: --fleet FILE.yaml.")
         return FLEETS.load(name)
     kind = _content(path).get("fleet")
     if not isinstance(kind, str):
@@ -60,8 +64,8 @@ def fleet_named(name: str) -> FleetFactory:
     load: Callable[[FleetRequest], Fleet] = FLEETS.load(kind)
     if kind == "simulated":
         described(path).physics({"speed": 1.0, "acceleration": 1.0})
-    if kind == "mqtt":
-        mqtt_fleet(path)
+    if kind in WIRES:
+        wire_settings(path)
     return lambda request: load(replace(request, config=path))
 
 
@@ -79,16 +83,26 @@ def described(path: Path) -> Described:
     return Described(path, content, pace)
 
 
-def mqtt_fleet(path: Path) -> MqttSettings:
-    """The robots on MQTT of a file.
+def wire_settings(path: Path) -> WireSettings:
+    """What a file says of robots that are elsewhere.
 
     Raises:
         InputError: it cannot be read, or does not describe such; names every mistake.
     """
     content = _content(path)
-    if content.pop("fleet", None) != "mqtt":
-        raise InputError(f"{path} describes no robots on MQTT; begin it with `fleet: mqtt`.")
-    return _validated(path, MqttSettings, content)
+    found = WIRES.get(str(content.pop("fleet", None)))
+    if found is None:
+        kinds = " or ".join(f"`fleet: {kind}`" for kind in WIRES)
+        raise InputError(f"{path} describes no robots elsewhere; begin it with {kinds}.")
+    return _validated(path, found, content)
+
+
+def described_as(kind: type[Elsewhere], path: Path) -> Elsewhere:
+    """What a file says of robots of one kind; raises as `wire_settings` does."""
+    found = wire_settings(path)
+    if not isinstance(found, kind):
+        raise InputError(f"{path} describes robots of another kind.")
+    return found
 
 
 def schema() -> dict[str, Any]:
@@ -96,12 +110,12 @@ def schema() -> dict[str, Any]:
     pace = {"pace": {"enum": ["fast", "real"], "default": "fast"}}
     usual = "speed", "acceleration"  # depend on the picture where a file leaves them out
     simulated = _file_of("simulated", Physics, pace, usual)
-    mqtt = _file_of("mqtt", MqttSettings)
-    shared = simulated.pop("$defs") | mqtt.pop("$defs")
+    files = [simulated, *(_file_of(kind, model) for kind, model in WIRES.items())]
+    shared = {name: value for file in files for name, value in file.pop("$defs").items()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A fleet",
-        "oneOf": [simulated, mqtt],
+        "oneOf": files,
         "$defs": shared,
     }
 

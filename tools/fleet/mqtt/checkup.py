@@ -1,15 +1,13 @@
-"""Looks at robots on MQTT without telling them anything: who is there, and what is wrong."""
+"""Looks at robots that speak plain JSON over MQTT, without telling them anything."""
 
 import os
 import time
 
+from ..wire.checkup import checkup
+from ..wire.poses import Poses
 from .link import Link
-from .poses import Poses, Track
+from .messages import pose_message
 from .settings import MqttSettings
-
-CALMLY = 0.02
-OFTEN = 3
-"""So many messages of a robot have to come within `pose_timeout`: one may be lost."""
 
 
 def checked(settings: MqttSettings, seconds: float) -> tuple[list[str], bool]:
@@ -18,77 +16,23 @@ def checked(settings: MqttSettings, seconds: float) -> tuple[list[str], bool]:
     Raises:
         InputError: as of `Link`.
     """
-    poses, others = Poses(settings), set[str]()
-    topics, (host, port, secure) = settings.topics, settings.address
+    poses, others, topics = Poses(settings), set[str](), settings.topics
 
     def heard(topic: str, payload: bytes) -> None:
         robot = settings.robot_of(topic, topics.pose)
         if robot is None:
             others.add(settings.robot_of(topic, topics.goal) or "")
         else:
-            poses.heard(robot, payload, time.monotonic())
+            poses.heard(robot, pose_message(payload), time.monotonic())
 
     listened = [pattern.replace("{robot}", "+") for pattern in (topics.pose, topics.goal)]
-    link = Link(settings.address, listened, heard)
-    try:
-        ends = time.monotonic() + seconds
-        while not link.connected and time.monotonic() < ends:
-            time.sleep(CALMLY)
-        begun = time.monotonic()
-        while link.connected and time.monotonic() < begun + seconds:
-            time.sleep(CALMLY)
-        if not link.connected or link.trouble:
-            return [f"The broker {host}:{port} is of no use: {link.trouble}."], False
-    finally:
-        link.close()
-    now = time.monotonic()
-    told = [f"The broker {host}:{port} is reachable{_guarded(secure)}."]
-    robots = [_robot_told(settings, poses, robot, now, begun) for robot in settings.robots]
-    told += [sentence for sentence, _ in robots]
-    if poses.unknown:
-        told.append(f"Robots that are not in the file speak too: {_few(poses.unknown)}.")
-    if others:
-        told.append(f"Another program is sending goals to robot {_few(others)}.")
-    told.append(
-        f"Robots have to hold by themselves when no goal has come for {settings.watchdog:g} s; "
-        "that cannot be seen from here: try it out on each of them."
-    )
-    good = sum(fit for _, fit in robots)
-    told.append(f"{good} of {len(robots)} robots can be driven.")
-    return told, good == len(robots) and not others
+    link, guard = Link(settings.address, listened, heard), guarded(settings.address[2])
+    return checkup(settings, link, poses, others, seconds, guard)
 
 
-def _guarded(secure: bool) -> str:
+def guarded(secure: bool) -> str:
+    """How a link to a broker is guarded, in words."""
     if not secure:
         return ", in the clear: whoever is on the way can read and steer"
     named = "with" if os.environ.get("FORMUP_MQTT_USERNAME") else "without"
     return f" over TLS, {named} a name to log in"
-
-
-def _robot_told(
-    settings: MqttSettings, poses: Poses, robot: str, now: float, begun: float
-) -> tuple[str, bool]:
-    """What is to be told of a robot, and whether it could be driven."""
-    track, old = poses.tracks[robot], poses.old(now, settings.pose_timeout)
-    refused = _not_believed(track)
-    if robot in old or track.pose is None:
-        return f"{old.get(robot, '')}{refused}", False
-    if track.fault:
-        return f"Robot {robot} cannot drive: {track.fault!r}.{refused}", False
-    x, y = settings.frame.to_robots(track.pose.x, track.pose.y)
-    rate, least = track.heard / max(now - begun, CALMLY), OFTEN / settings.pose_timeout
-    seldom = f" That is too seldom: {least:.0f} times are needed." if rate < least else ""
-    return (
-        f"Robot {robot} was seen {poses.age(robot, now):.2f} s ago at ({x:.3f}, {y:.3f}), and "
-        f"speaks {rate:.0f} times a second.{seldom}{refused}",
-        not seldom,
-    )
-
-
-def _not_believed(track: Track) -> str:
-    why = ", ".join(f"{n} {what}" for what, n in track.refused.most_common())
-    return f" Of its {track.heard} messages some were refused: {why}." if why else ""
-
-
-def _few(robots: set[str]) -> str:
-    return ", ".join(sorted(robots)[:10])

@@ -1,53 +1,15 @@
-"""The fleet of robots on MQTT: a little of the way is released at a time, on fresh poses alone.
+"""The fleet of robots that speak plain JSON over MQTT."""
 
-Robots are sent goals just ahead of them, again and again; where these end, robots hold by
-themselves. So whatever fails, here or on the way, ends with robots that stand.
-"""
-
-import asyncio
 import json
-import math
 import time
-import uuid
-from collections.abc import AsyncGenerator
-from typing import Literal
+from collections.abc import Mapping
 
-import numpy as np
-
-from ...geometry.outline import FloatArray
-from ...motion.following import Following
-from ...motion.motion import Motion
-from ..described import mqtt_fleet
-from ..protocol import (
-    FleetBusyError,
-    FleetClosedError,
-    FleetRequest,
-    FleetStoppedError,
-    FleetUnreachableError,
-    Pose,
-    RobotsFailedError,
-    StalePosesError,
-    points_of,
-)
+from ..described import described_as
+from ..protocol import FleetRequest
+from ..wire.fleet import Point, Reason, WireFleet
 from .link import Link
-from .poses import Poses
+from .messages import pose_message
 from .settings import MqttSettings
-
-WAIT = 3.0
-"""Seconds for which robots are waited for that have not been seen since the broker was found."""
-AHEAD = 0.5
-"""Robots are sent as far ahead as they drive in so many seconds at most."""
-SETTLED = 0.25
-"""A robot has come to its end within so many px,"""
-CALM = 0.5
-"""or when it has stood, within its tracking error of it, for so many seconds."""
-HOLDING = 1.0
-"""Seconds in which robots that were told to hold have to stand."""
-OTHERS = 2.0
-"""Seconds after which another program that sent goals is taken to have ended."""
-MOST_TOLD = 5
-"""Robots that an error speaks of at length; it names all."""
-Reason = Literal["stop", "end", "gone"]
 
 
 def _holding(reason: Reason) -> dict[str, str]:
@@ -58,210 +20,38 @@ OF_PROGRAMS = [json.dumps(_holding(reason)).encode() for reason in ("end", "gone
 """Messages to hold that no person sent: a drive of another program ended."""
 
 
-class MqttFleet:
+class MqttFleet(WireFleet):
     """Robots on MQTT, as a file describes them."""
 
-    name, real, turns = "mqtt", True, False
+    name = "mqtt"
 
     def __init__(self, settings: MqttSettings) -> None:
-        self.settings, topics = settings, settings.topics
-        self.radius, self.speed = settings.pixels(settings.radius), settings.pixels(settings.speed)
-        self.tracking_error = settings.pixels(settings.tracking_error)
-        self.stopped, self._stops = False, 0
-        self._driving = self._closed = False
-        self._others = -OTHERS
-        self.poses = Poses(settings)
-        patterns = (topics.pose, topics.goal)
-        listened = [*(p.replace("{robot}", "+") for p in patterns), topics.hold]
-        will = topics.hold, _holding("gone")
-        self._link = Link(
+        super().__init__(settings)
+        self._topics, self._robot_of = settings.topics, settings.robot_of
+        patterns = (self._topics.pose, self._topics.goal)
+        listened = [*(p.replace("{robot}", "+") for p in patterns), self._topics.hold]
+        will = self._topics.hold, _holding("gone")
+        self.link = self._link = Link(
             settings.address, listened, self._heard, will=will, left=self.poses.forget
         )
 
-    async def observe(self, *, max_age: float | None = None) -> tuple[Pose, ...]:
-        """Poses as they were seen last; robots are waited for a while when none were yet."""
-        self._check_open()
-        ends = time.monotonic() + WAIT
-        while len(self.poses.seen()) < len(self.settings.robots) and time.monotonic() < ends:
-            await asyncio.sleep(self.settings.period)
-        self._check_link(self._link.joined)
-        self._check_seen(math.inf if max_age is None else max_age)
-        return self.poses.seen()
+    def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
+        """Tell robots where to go; see `WireFleet.send`."""
+        for robot, (x, y) in goals.items():
+            message = {"drive": drive, "seq": seq, "x": round(x, 6), "y": round(y, 6)}
+            self._link.say(self._topics.goal.replace("{robot}", robot), message)
 
-    async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
-        """Release the paths a little at a time, in their order of passage; poses as they come."""
-        self._check_drive(motion)
-        if not motion.paths:
-            return
-        self._driving, stops, begun = True, self._stops, False
-        try:
-            await self.observe()
-            if moving := await self._until_still():
-                raise RobotsFailedError(
-                    f"Robot {', '.join(moving)} moves, though it is not driven: hold it by hand, "
-                    "and look at its watchdog.",
-                    moving,
-                )
-            joined, release = self._link.joined, Release(motion, self)
-            due = time.monotonic()
-            while True:
-                poses = self.poses.seen()
-                self._check_going(motion, stops, joined)
-                begun = True
-                for robot, message in release.goals(poses).items():
-                    self._link.say(self.settings.topics.goal.replace("{robot}", robot), message)
-                yield poses
-                if release.there:
-                    return
-                due = max(due + self.settings.period, time.monotonic())
-                await asyncio.sleep(due - time.monotonic())
-        finally:
-            if begun:
-                self._hold("end")
-                await self._until_still()
-            self._driving = False
-
-    async def stop(self) -> None:
-        """Tell all robots to hold, at once, until `release`."""
-        self._latch()
-        self._hold("stop")
-
-    async def release(self) -> None:
-        """Lift the stop."""
-        self.stopped = False
-
-    async def close(self) -> None:
-        """Hold the robots if they are driven, and let go of the broker."""
-        if self._driving:
-            self._hold("end")
-        self._closed = True
-        await asyncio.to_thread(self._link.close)
+    def hold(self, reason: Reason) -> None:
+        """Tell all robots to hold; see `WireFleet.hold`."""
+        self._link.say(self._topics.hold, _holding(reason), surely=True)
 
     def _heard(self, topic: str, payload: bytes) -> None:
-        topics, now = self.settings.topics, time.monotonic()
-        if (robot := self.settings.robot_of(topic, topics.pose)) is not None:
-            self.poses.heard(robot, payload, now)
-        elif topic != topics.hold or payload in OF_PROGRAMS:
-            self._others = now
+        if (robot := self._robot_of(topic, self._topics.pose)) is not None:
+            self.poses.heard(robot, pose_message(payload), time.monotonic())
+        elif topic != self._topics.hold or payload in OF_PROGRAMS:
+            self.saw_others()
         else:  # a person stopped the robots elsewhere
-            self._latch()
-
-    def _latch(self) -> None:
-        self.stopped = True
-        self._stops += 1
-
-    def _hold(self, reason: Reason) -> None:
-        self._link.say(self.settings.topics.hold, _holding(reason), surely=True)
-
-    async def _until_still(self) -> tuple[str, ...]:
-        """Wait until all robots stand, a while at most; return those that move on."""
-        pause = max(3 * self.settings.period, HOLDING / 10)
-        slow, before, since = 0.1 * self.speed * pause, self.poses.seen(), time.monotonic()
-        middle = before
-        while self._link.connected and time.monotonic() < since + HOLDING:
-            await asyncio.sleep(pause)
-            now = self.poses.seen()
-            if any(a.seen == b.seen for a, b in zip(before, now, strict=False)):
-                continue
-            if not _seen_moving(before, now, max(SETTLED, slow)):
-                return ()
-            before = now
-            if time.monotonic() < since + HOLDING / 2:
-                middle = now
-        return _seen_moving(middle, before, self.tracking_error)
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise FleetClosedError("The mqtt fleet is closed; open it again.")
-
-    def _check_drive(self, motion: Motion) -> None:
-        self._check_open()
-        if self.stopped:
-            raise FleetStoppedError("The mqtt fleet is stopped; release it to drive.")
-        if self._driving:
-            raise FleetBusyError("The mqtt fleet is driving already; wait, or stop it.")
-        unknown = sorted(set(motion.paths) - set(self.settings.robots))
-        if unknown:
-            raise RobotsFailedError(f"Robot {', '.join(unknown)} is not in the file.", unknown)
-
-    def _check_link(self, joined: int) -> None:
-        link = self._link
-        if not link.connected or link.joined != joined:
-            host, port, _ = self.settings.address
-            why = link.trouble or "the connection was lost and is back"
-            raise FleetUnreachableError(
-                f"The broker {host}:{port} is out of reach: {why}. Robots hold by themselves; "
-                "`formup fleet check FILE` looks for the cause."
-            )
-
-    def _check_going(self, motion: Motion, stops: int, joined: int) -> None:
-        """Refuse to go on where anything is not as it has to be."""
-        self._check_open()
-        if self._stops != stops:
-            raise FleetStoppedError("The mqtt fleet was stopped on the way.")
-        self._check_link(joined)
-        if time.monotonic() - self._others < OTHERS:
-            raise FleetBusyError("Another program drives these robots; end it, and drive again.")
-        self._check_seen(self.settings.pose_timeout)
-        faults = {r: self.poses.tracks[r].fault for r in motion.paths}
-        failed = {robot: fault for robot, fault in faults.items() if fault}
-        if failed:
-            told = [f"Robot {robot} cannot drive: {fault!r}." for robot, fault in failed.items()]
-            raise RobotsFailedError(" ".join(told[:MOST_TOLD]), tuple(failed))
-
-    def _check_seen(self, limit: float) -> None:
-        old = self.poses.old(time.monotonic(), limit)
-        if old:
-            told = " ".join([*old.values()][:MOST_TOLD])
-            raise StalePosesError(
-                f"{told} Nothing is driven while a robot is not seen: see to it ({len(old)} of "
-                f"{len(self.settings.robots)}), or take those that are away out of the file.",
-                tuple(old),
-            )
-
-
-class Release:
-    """How far robots of one drive may go by now.
-
-    Attributes:
-        there: whether all have come to their ends.
-    """
-
-    def __init__(self, motion: Motion, fleet: MqttFleet) -> None:
-        self._following, self._fleet = Following(motion), fleet
-        self._off_path = fleet.tracking_error / 2
-        self._progress = np.zeros(len(self._following.ids))
-        self._ends = self._following.at(self._following.lengths)
-        bends = np.sin(np.minimum(self._following.turns, np.pi / 2))
-        self._stops = self._following.stops(self._off_path / np.maximum(bends, 1e-9))
-        self._drive, self._seq = uuid.uuid4().hex[:12], 0
-        self._stood, self._since = np.full_like(self._ends, np.inf), 0.0
-        self.there = False
-
-    def goals(self, poses: tuple[Pose, ...]) -> dict[str, dict[str, object]]:
-        """What each robot is told next; where it is to turn it is sent no further than there."""
-        at, following = {pose.id: pose for pose in poses}, self._following
-        points = points_of([at[robot] for robot in following.ids])
-        self._progress = done = following.advance(points, self._progress, self._off_path)
-        ahead = np.minimum(following.room(done, self._stops), AHEAD * self._fleet.speed)
-        places = following.at(np.minimum(following.limits(done), done + ahead))
-        self._look(points)
-        self._seq += 1
-        frame = self._fleet.settings.frame
-        spoken = [frame.to_robots(x, y) for x, y in places.tolist()]
-        return {
-            robot: {"drive": self._drive, "seq": self._seq, "x": round(x, 6), "y": round(y, 6)}
-            for robot, (x, y) in zip(following.ids, spoken, strict=True)
-        }
-
-    def _look(self, points: FloatArray) -> None:
-        """Note whether robots are there, or as near as they can come."""
-        off = np.linalg.norm(points - self._ends, axis=1).max()
-        now = time.monotonic()
-        if np.linalg.norm(points - self._stood, axis=1).max() > SETTLED:
-            self._stood, self._since = points, now
-        calm = now - self._since >= CALM and off <= self._fleet.tracking_error
-        self.there = bool(calm or off <= SETTLED)
+            self.latch()
 
 
 def open_fleet(request: FleetRequest) -> MqttFleet:
@@ -271,16 +61,4 @@ def open_fleet(request: FleetRequest) -> MqttFleet:
         InputError: it does not describe robots on MQTT.
     """
     assert request.config is not None  # see `fleet_named`
-    return MqttFleet(mqtt_fleet(request.config))
-
-
-def _seen_moving(
-    before: tuple[Pose, ...], after: tuple[Pose, ...], limit: float
-) -> tuple[str, ...]:
-    """Robots that were seen further away than so many px."""
-    was = {pose.id: (pose.x, pose.y) for pose in before}
-    return tuple(
-        pose.id
-        for pose in after
-        if np.hypot(*np.subtract((pose.x, pose.y), was.get(pose.id, (pose.x, pose.y)))) > limit
-    )
+    return MqttFleet(described_as(MqttSettings, request.config))

@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 import yaml
-from formup.tools.fleet.described import mqtt_fleet
+from formup.tools.fleet.described import described_as
 from formup.tools.fleet.mqtt.fleet import MqttFleet
 from formup.tools.fleet.mqtt.link import Link
 from formup.tools.fleet.mqtt.settings import MqttSettings
-from formup.tools.fleet.mqtt.stand_in import StandIns
+from formup.tools.fleet.mqtt.stand_in import MqttStandIns
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
 PATIENCE = 10.0
@@ -93,14 +93,14 @@ def shared(brokers: Callable[..., Broker]) -> Broker:
     return brokers()
 
 
-class Faulty(StandIns):
+class Faulty(MqttStandIns):
     """Stand-ins of which some do what they should not, from when their ids are put in here."""
 
     def __init__(self, settings: MqttSettings, told: Callable[[str], None]) -> None:
         self.faults: dict[str, Callable[[dict[str, Any], int], dict[str, Any] | None]] = {}
         self.runaway = set[str]()
         super().__init__(settings, told)
-        self._seq = 1_000
+        self.seq = 1_000
 
     def step(self) -> None:
         for i, robot in enumerate(self.robots):
@@ -108,13 +108,13 @@ class Faulty(StandIns):
         super().step()
 
     def reboot(self) -> None:
-        self._seq = 0
+        self.seq = 0
 
-    def _message(self, i: int) -> dict[str, Any] | None:
-        message, robot = super()._message(i), self._settings.robots[i]
+    def _message(self, robot: str, place: tuple[float, float]) -> dict[str, Any] | None:
+        message = super()._message(robot, place)
         if message is None or robot not in self.faults:
             return message
-        return self.faults[robot](message, self._seq)
+        return self.faults[robot](message, self.seq)
 
 
 class Lab:
@@ -130,7 +130,7 @@ class Lab:
         given = {**USUAL, "broker": broker.url, "topics": topics, **more}
         path.write_text(yaml.safe_dump(given))
         self.path, self.told = path, list[str]()
-        self.settings: MqttSettings = mqtt_fleet(path)
+        self.settings: MqttSettings = described_as(MqttSettings, path)
         self._done = threading.Event()
         self._robots: Faulty | None = None
         self._thread: threading.Thread | None = None

@@ -14,7 +14,6 @@ from formup.tools.fleet import getting_on
 from formup.tools.fleet.arrival import Arrival
 from formup.tools.fleet.assigning import assign_robots
 from formup.tools.fleet.deploy import deploy
-from formup.tools.fleet.mqtt import fleet as fleet_module
 from formup.tools.fleet.protocol import (
     Fleet,
     FleetStoppedError,
@@ -23,6 +22,7 @@ from formup.tools.fleet.protocol import (
     Pose,
     StalePosesError,
 )
+from formup.tools.fleet.wire import fleet as fleet_module
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import make_plan
 from formup.tools.formation.site import Site

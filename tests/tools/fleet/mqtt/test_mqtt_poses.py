@@ -6,8 +6,9 @@ from collections.abc import Iterable
 from typing import Any
 
 import pytest
-from formup.tools.fleet.mqtt.poses import MOST_BYTES, Poses
+from formup.tools.fleet.mqtt.messages import MOST_BYTES, pose_message
 from formup.tools.fleet.mqtt.settings import MqttSettings
+from formup.tools.fleet.wire.poses import PoseMessage, Poses
 
 SETTINGS = MqttSettings(
     broker="mqtt://h", robots=("a",), speed=100, radius=5, tracking_error=2, pose_timeout=0.5
@@ -18,7 +19,7 @@ def heard(*messages: tuple[float, dict[str, Any] | bytes], robot: str = "a") -> 
     poses = Poses(SETTINGS)
     for now, message in messages:
         said = message if isinstance(message, bytes) else json.dumps(message).encode()
-        poses.heard(robot, said, now)
+        poses.heard(robot, pose_message(said), now)
     return poses
 
 
@@ -67,7 +68,7 @@ def test_what_is_not_believed_changes_nothing_but_is_counted(message: Any, why: 
     assert (pose.x, pose.seen) == (12, 1.1)
     track = poses.tracks["a"]
     assert (track.why, track.refused, track.heard) == (why, {why: 1}, 3)
-    poses.heard("a", json.dumps(at(0, 4, 13)[1]).encode(), 1.25)
+    poses.heard("a", PoseMessage(seq=4, x=13, y=0), 1.25)
     assert where(poses) == [13]
 
 
@@ -90,7 +91,7 @@ def test_messages_of_nobody_are_kept_apart() -> None:
     poses = heard(at(1, 1, 10), at(1.1, 2, 12), robot="z")
     assert (poses.unknown, where(poses)) == ({"z"}, [])
     for i in range(100):
-        poses.heard(str(i), b"", 1.0)
+        poses.heard(str(i), None, 1.0)
     assert len(poses.unknown) < 30
 
 

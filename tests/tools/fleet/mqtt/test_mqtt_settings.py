@@ -9,8 +9,9 @@ import jsonschema
 import pytest
 import yaml
 from formup.tools.errors import InputError
-from formup.tools.fleet.described import fleet_named, mqtt_fleet, schema
-from formup.tools.fleet.mqtt.settings import RobotFrame
+from formup.tools.fleet.described import described_as, fleet_named, schema
+from formup.tools.fleet.mqtt.settings import MqttSettings
+from formup.tools.fleet.wire.settings import RobotFrame
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -34,11 +35,15 @@ def written(folder: Path, **more: Any) -> Path:
 
 
 def test_what_a_file_leaves_out_is_usual(tmp_path: Path) -> None:
-    found = mqtt_fleet(written(tmp_path))
+    found = described_as(MqttSettings, written(tmp_path))
     assert found.robots == ("a", "2")
     assert found.address == ("localhost", 1883, False)
     assert found.frame.to_picture(3, 4) == (3, 4)
-    assert mqtt_fleet(written(tmp_path, broker="mqtts://h:99")).address == ("h", 99, True)
+    assert described_as(MqttSettings, written(tmp_path, broker="mqtts://h:99")).address == (
+        "h",
+        99,
+        True,
+    )
 
 
 @pytest.mark.parametrize(
@@ -79,7 +84,7 @@ def test_a_name_alone_and_a_file_of_another_fleet_do_not_do() -> None:
     with pytest.raises(InputError, match=r"described by a file: --fleet FILE\.yaml"):
         fleet_named("mqtt")
     with pytest.raises(InputError, match="begin it with `fleet: mqtt`"):
-        mqtt_fleet(ROOT / "examples/hamsters.yaml")
+        described_as(MqttSettings, ROOT / "examples/hamsters.yaml")
 
 
 @given(

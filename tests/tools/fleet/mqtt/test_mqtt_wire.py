@@ -17,12 +17,13 @@ DRIVE = """
 import asyncio, sys
 from pathlib import Path
 import numpy as np
-from formup.tools.fleet.described import mqtt_fleet
+from formup.tools.fleet.described import described_as
 from formup.tools.fleet.mqtt.fleet import MqttFleet
+from formup.tools.fleet.mqtt.settings import MqttSettings
 from formup.tools.fleet.protocol import Motion
 
 async def go():
-    fleet = MqttFleet(mqtt_fleet(Path(sys.argv[1])))
+    fleet = MqttFleet(described_as(MqttSettings, Path(sys.argv[1])))
     ways = {p.id: np.array([(p.x, p.y), (p.x + 5000, p.y)]) for p in await fleet.observe()}
     async for _ in fleet.drive(Motion(ways)):
         print("driving", flush=True)

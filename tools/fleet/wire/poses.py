@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from ..protocol import Pose
-from .settings import MqttSettings
+from .settings import WireSettings
 
 JUMP_FACTOR = 2.0
 """A robot has not come further than its greatest speed would take it, times this, in the time
@@ -23,7 +23,6 @@ JITTER = 0.2
 """so many seconds more, as messages come in bursts."""
 MOST_JUMPS = 3
 """A robot that jumps so often within `pose_timeout` may be two of one name: it is not believed."""
-MOST_BYTES = 4_096
 MOST_UNKNOWN = 20
 Refused = Literal["malformed", "out of order", "jumped"]
 
@@ -74,7 +73,7 @@ class Poses:
         unknown: robots that spoke and are none of the fleet's, a few of them.
     """
 
-    def __init__(self, settings: MqttSettings) -> None:
+    def __init__(self, settings: WireSettings) -> None:
         self._settings = settings
         self._reach = JUMP_FACTOR * settings.pixels(settings.speed)
         self._tracks = {robot: Track() for robot in settings.robots}
@@ -89,19 +88,15 @@ class Poses:
         """Know nothing: what is seen next counts."""
         self._tracks = {robot: Track() for robot in self._tracks}
 
-    def heard(self, robot: str, payload: bytes, now: float) -> None:
-        """Take in a message that came at a time on this computer's clock."""
+    def heard(self, robot: str, said: PoseMessage | None, now: float) -> None:
+        """Take in a message, None if it cannot be read, that came at a time on our own clock."""
         track = self._tracks.get(robot)
         if track is None:
             if len(self.unknown) < MOST_UNKNOWN:
                 self.unknown.add(robot)
             return
         track.heard += 1
-        try:
-            if len(payload) > MOST_BYTES:
-                raise ValueError
-            said = PoseMessage.model_validate_json(payload)
-        except (ValidationError, ValueError):
+        if said is None:
             self._refuse(track, "malformed", now)
             return
         frame = self._settings.frame

@@ -1,0 +1,293 @@
+"""Fleets of robots elsewhere: a little of the way is released at a time, on fresh poses alone.
+
+Robots are sent goals just ahead of them, again and again; where these end, robots hold by
+themselves. So whatever fails, here or on the way, ends with robots that stand.
+"""
+
+import asyncio
+import math
+import time
+import uuid
+from abc import ABC, abstractmethod
+from collections.abc import AsyncGenerator, Mapping
+from typing import Literal, Protocol
+
+import numpy as np
+
+from ...geometry.outline import FloatArray
+from ...motion.following import Following
+from ...motion.motion import Motion
+from ..protocol import (
+    FleetBusyError,
+    FleetClosedError,
+    FleetStoppedError,
+    FleetUnreachableError,
+    Pose,
+    RobotsFailedError,
+    StalePosesError,
+    points_of,
+)
+from .poses import Poses
+from .settings import WireSettings
+
+WAIT = 3.0
+"""Seconds for which robots are waited for that have not been seen since the broker was found."""
+AHEAD = 0.5
+"""Robots are sent as far ahead as they drive in so many seconds at most."""
+SETTLED = 0.25
+"""A robot has come to its end within so many px,"""
+CALM = 0.5
+"""or when it has stood, within its tracking error of it, for so many seconds."""
+HOLDING = 1.0
+"""Seconds in which robots that were told to hold have to stand."""
+OTHERS = 2.0
+"""Seconds after which another program that sent goals is taken to have ended."""
+MOST_TOLD = 5
+"""Robots that an error speaks of at length; it names all."""
+Reason = Literal["stop", "end", "gone"]
+
+
+Point = tuple[float, float]
+
+
+class Connection(Protocol):
+    """What a fleet has to know of what connects it.
+
+    Attributes:
+        joined: how often it has been connected.
+        connected: whether it is now.
+        trouble: why not, in words.
+    """
+
+    joined: int
+    connected: bool
+    trouble: str
+
+    def close(self) -> None:
+        """Say goodbye; what was said before still goes out."""
+        ...
+
+
+class WireFleet(ABC):
+    """Robots elsewhere, as a file describes them; what they are told is up to who derives from it.
+
+    Attributes:
+        poses: what is believed of where they are; to be fed with what they say.
+        link: what connects them; to be set before the fleet is used.
+    """
+
+    real, turns = True, False
+    name: str
+    link: Connection
+
+    def __init__(self, settings: WireSettings) -> None:
+        self.settings = settings
+        self.radius, self.speed = settings.pixels(settings.radius), settings.pixels(settings.speed)
+        self.tracking_error = settings.pixels(settings.tracking_error)
+        self.stopped, self._stops = False, 0
+        self._driving = self._closed = False
+        self._others = -OTHERS
+        self.poses = Poses(settings)
+
+    @abstractmethod
+    def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
+        """Tell robots, by id, a point to drive straight to, in their frame.
+
+        Args:
+            drive: another one in each drive; robots disregard goals of one that was held.
+            seq: rises within a drive, one for each call.
+        """
+
+    @abstractmethod
+    def hold(self, reason: Reason) -> None:
+        """Tell all robots to hold, at once; later, surely, where they cannot be told now."""
+
+    async def observe(self, *, max_age: float | None = None) -> tuple[Pose, ...]:
+        """Poses as they were seen last; robots are waited for a while when none were yet."""
+        self._check_open()
+        ends = time.monotonic() + WAIT
+        while len(self.poses.seen()) < len(self.settings.robots) and time.monotonic() < ends:
+            await asyncio.sleep(self.settings.period)
+        self._check_link(self.link.joined)
+        self._check_seen(math.inf if max_age is None else max_age)
+        return self.poses.seen()
+
+    async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Release the paths a little at a time, in their order of passage; poses as they come."""
+        self._check_drive(motion)
+        if not motion.paths:
+            return
+        self._driving, stops, begun = True, self._stops, False
+        try:
+            await self.observe()
+            if moving := await self._until_still():
+                raise RobotsFailedError(
+                    f"Robot {', '.join(moving)} moves, though it is not driven: hold it by hand, "
+                    "and look at its watchdog.",
+                    moving,
+                )
+            joined, release = self.link.joined, Release(motion, self)
+            due = time.monotonic()
+            while True:
+                poses = self.poses.seen()
+                self._check_going(motion, stops, joined)
+                begun = True
+                self.send(release.drive, *release.goals(poses))
+                yield poses
+                if release.there:
+                    return
+                due = max(due + self.settings.period, time.monotonic())
+                await asyncio.sleep(due - time.monotonic())
+        finally:
+            if begun:
+                self.hold("end")
+                await self._until_still()
+            self._driving = False
+
+    async def stop(self) -> None:
+        """Tell all robots to hold, at once, until `release`."""
+        self.latch()
+        self.hold("stop")
+
+    async def release(self) -> None:
+        """Lift the stop."""
+        self.stopped = False
+
+    async def close(self) -> None:
+        """Hold the robots if they are driven, and let go of the broker."""
+        if self._driving:
+            self.hold("end")
+        self._closed = True
+        await asyncio.to_thread(self.link.close)
+
+    def saw_others(self) -> None:
+        """Note that another program has just driven these robots."""
+        self._others = time.monotonic()
+
+    def latch(self) -> None:
+        """Note that a person stopped the robots, here or elsewhere."""
+        self.stopped = True
+        self._stops += 1
+
+    async def _until_still(self) -> tuple[str, ...]:
+        """Wait until all robots stand, a while at most; return those that move on."""
+        pause = max(3 * self.settings.period, HOLDING / 10)
+        slow, before, since = 0.1 * self.speed * pause, self.poses.seen(), time.monotonic()
+        middle = before
+        while self.link.connected and time.monotonic() < since + HOLDING:
+            await asyncio.sleep(pause)
+            now = self.poses.seen()
+            if any(a.seen == b.seen for a, b in zip(before, now, strict=False)):
+                continue
+            if not _seen_moving(before, now, max(SETTLED, slow)):
+                return ()
+            before = now
+            if time.monotonic() < since + HOLDING / 2:
+                middle = now
+        return _seen_moving(middle, before, self.tracking_error)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise FleetClosedError(f"The {self.name} fleet is closed; open it again.")
+
+    def _check_drive(self, motion: Motion) -> None:
+        self._check_open()
+        if self.stopped:
+            raise FleetStoppedError(f"The {self.name} fleet is stopped; release it to drive.")
+        if self._driving:
+            raise FleetBusyError(f"The {self.name} fleet is driving already; wait, or stop it.")
+        unknown = sorted(set(motion.paths) - set(self.settings.robots))
+        if unknown:
+            raise RobotsFailedError(f"Robot {', '.join(unknown)} is not in the file.", unknown)
+
+    def _check_link(self, joined: int) -> None:
+        link = self.link
+        if not link.connected or link.joined != joined:
+            why = link.trouble or "the connection was lost and is back"
+            where = self.settings.where
+            raise FleetUnreachableError(
+                f"{where[0].upper()}{where[1:]} is out of reach: {why}. Robots hold by themselves; "
+                "`formup fleet check FILE` looks for the cause."
+            )
+
+    def _check_going(self, motion: Motion, stops: int, joined: int) -> None:
+        """Refuse to go on where anything is not as it has to be."""
+        self._check_open()
+        if self._stops != stops:
+            raise FleetStoppedError(f"The {self.name} fleet was stopped on the way.")
+        self._check_link(joined)
+        if time.monotonic() - self._others < OTHERS:
+            raise FleetBusyError("Another program drives these robots; end it, and drive again.")
+        self._check_seen(self.settings.pose_timeout)
+        faults = {r: self.poses.tracks[r].fault for r in motion.paths}
+        failed = {robot: fault for robot, fault in faults.items() if fault}
+        if failed:
+            told = [f"Robot {robot} cannot drive: {fault!r}." for robot, fault in failed.items()]
+            raise RobotsFailedError(" ".join(told[:MOST_TOLD]), tuple(failed))
+
+    def _check_seen(self, limit: float) -> None:
+        old = self.poses.old(time.monotonic(), limit)
+        if old:
+            told = " ".join([*old.values()][:MOST_TOLD])
+            raise StalePosesError(
+                f"{told} Nothing is driven while a robot is not seen: see to it ({len(old)} of "
+                f"{len(self.settings.robots)}), or take those that are away out of the file.",
+                tuple(old),
+            )
+
+
+class Release:
+    """How far robots of one drive may go by now.
+
+    Attributes:
+        drive: names it.
+        there: whether all have come to their ends.
+    """
+
+    def __init__(self, motion: Motion, fleet: WireFleet) -> None:
+        self._following, self._fleet = Following(motion), fleet
+        self._off_path = fleet.tracking_error / 2
+        self._progress = np.zeros(len(self._following.ids))
+        self._ends = self._following.at(self._following.lengths)
+        bends = np.sin(np.minimum(self._following.turns, np.pi / 2))
+        self._stops = self._following.stops(self._off_path / np.maximum(bends, 1e-9))
+        self.drive, self._seq = uuid.uuid4().hex[:12], 0
+        self._stood, self._since = np.full_like(self._ends, np.inf), 0.0
+        self.there = False
+
+    def goals(self, poses: tuple[Pose, ...]) -> tuple[int, dict[str, Point]]:
+        """A number, and what each robot is told next, in the robots' frame.
+
+        Where it is to turn it is sent no further than there.
+        """
+        at, following = {pose.id: pose for pose in poses}, self._following
+        points = points_of([at[robot] for robot in following.ids])
+        self._progress = done = following.advance(points, self._progress, self._off_path)
+        ahead = np.minimum(following.room(done, self._stops), AHEAD * self._fleet.speed)
+        places = following.at(np.minimum(following.limits(done), done + ahead))
+        self._look(points)
+        self._seq += 1
+        frame = self._fleet.settings.frame
+        spoken = [frame.to_robots(x, y) for x, y in places.tolist()]
+        return self._seq, dict(zip(following.ids, spoken, strict=True))
+
+    def _look(self, points: FloatArray) -> None:
+        """Note whether robots are there, or as near as they can come."""
+        off = np.linalg.norm(points - self._ends, axis=1).max()
+        now = time.monotonic()
+        if np.linalg.norm(points - self._stood, axis=1).max() > SETTLED:
+            self._stood, self._since = points, now
+        calm = now - self._since >= CALM and off <= self._fleet.tracking_error
+        self.there = bool(calm or off <= SETTLED)
+
+
+def _seen_moving(
+    before: tuple[Pose, ...], after: tuple[Pose, ...], limit: float
+) -> tuple[str, ...]:
+    """Robots that were seen further away than so many px."""
+    was = {pose.id: (pose.x, pose.y) for pose in before}
+    return tuple(
+        pose.id
+        for pose in after
+        if np.hypot(*np.subtract((pose.x, pose.y), was.get(pose.id, (pose.x, pose.y)))) > limit
+    )
