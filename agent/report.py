@@ -73,6 +73,7 @@ class Report(BaseModel):
     image: dict[str, Any] | None = None
     targets: tuple[dict[str, Any], ...] = ()
     candidates: tuple[dict[str, Any], ...] | None = None
+    options: tuple[str, ...] | None = None
     contract: Contract | None = None
     plan_id: str | None = None
     parent: str | None = None
@@ -185,6 +186,7 @@ def make_report(
         image=world.picture.model_dump() | ({"notes": notes} if notes else {}),
         targets=tuple(target_data(t) for t in world.targets),
         candidates=_candidates(outcome, context),
+        options=_options(outcome),
         contract=suggested(outcome) or (plan.formation.contract if plan else None),
         plan_id=plan.id if plan else None,
         parent=world.plans[plan.id].parent if plan else None,
@@ -309,6 +311,13 @@ def _candidates(outcome: Outcome, context: Context) -> tuple[dict[str, object], 
     if any(n not in known for n in named):
         known |= {c.id: candidate_choice(c) for c in context.candidates()}
     return tuple(known[n] for n in named if n in known)
+
+
+def _options(outcome: Outcome) -> tuple[str, ...] | None:
+    """Words that would answer a question, where it says some."""
+    if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
+        return None
+    return tuple(map(str, outcome.call.arguments.get("options", ()))) or None
 
 
 def _totals(messages: Sequence[Message], seconds: float) -> Totals:

@@ -63,7 +63,8 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
     while followup.kind == "ask" or _goes_on(messages, standing):
         answer, messages = _answer_to(messages)
         if answer is None:
-            return _calling("ask_user", {"question": _question(followup)})
+            offered = {"options": list(followup.options)} if followup.options else {}
+            return _calling("ask_user", {"question": _question(followup), **offered})
         if declines(answer):
             return Reply(text="Nothing was changed.")
         words = _words_meant(words, followup, answer, standing)
@@ -145,7 +146,7 @@ def _words_meant(words: str, followup: Followup, answer: str, standing: Standing
         return followup.options[int(number[1]) - 1]
     if len(followup.options) == 1 and agrees(answer):
         return followup.options[0]
-    if standing and commands(answer, standing):
+    if answer in followup.options or (standing and commands(answer, standing)):
         return answer
     answer = BESIDES.sub("", answer) or answer
     said = set(re.findall(r"\w+", answer.lower()))

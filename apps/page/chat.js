@@ -134,9 +134,12 @@ on("busy", () => {
   byId("talk").toggleAttribute("aria-busy", app.busy);
 });
 on("scene", () => {
-  const choices = asked();
-  byId("options").replaceChildren(...choices.map((choice) => h(
-    "button", { type: "button", onclick: () => say(choice.id) }, `${choice.id}: ${choice.label ?? ""}`,
+  const { last } = app.state ?? {}, open = last?.status === "question" ? last.options ?? [] : [];
+  const choices = [
+    ...asked().map((choice) => [choice.id, `${choice.id}: ${choice.label ?? ""}`]), ...open.map((text) => [text, text]),
+  ];
+  byId("options").replaceChildren(...choices.map(([answer, text]) => h(
+    "button", { type: "button", onclick: () => say(answer) }, text,
   )));
   words.placeholder = app.scene.plan ? "A bit further out; robot 3 to the left; go" : "Surround the largest coin with 8 robots";
 });

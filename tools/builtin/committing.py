@@ -273,6 +273,7 @@ def ask_user(
     question: str,
     candidates: tuple[str, ...] = (),
     contract: SkipJsonSchema[Contract | None] = None,
+    options: SkipJsonSchema[tuple[str, ...]] = (),
 ) -> ToolResult:
     """Ask the person what is left open; ends the turn.
 
@@ -280,6 +281,7 @@ def ask_user(
         question: one, clear.
         candidates: to choose from (c3, t1).
         contract: that would do, shown to the person; the offline planner's, in no schema.
+        options: words that would answer it; likewise.
     """
     found = {c: context.candidate(c) for c in candidates if c.startswith("c")}
     listed = [

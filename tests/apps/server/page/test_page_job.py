@@ -172,6 +172,21 @@ def test_a_question_is_answered_on_the_picture(server: Any, visit: Any) -> None:
     expect(here.page.locator(".option")).to_have_count(0)
 
 
+def test_words_that_would_answer_a_question_are_buttons(server: Any, visit: Any) -> None:
+    here = visit(server.url)
+    here.begin()
+    here.say("Surround the largest coin")
+    here.say("Make it wigglier")
+    assert here.status() == "question"
+    offered = here.page.locator("#options button").all_inner_texts()
+    assert offered == ["a bit further out", "turn it 30 degrees"]
+    here.page.click("#options button >> nth=1")
+    here.rest()
+    expect(here.page.locator("#log > li").last).to_contain_text("degrees")
+    assert here.status() == "planned"
+    expect(here.page.locator("#options button")).to_have_count(0)
+
+
 def test_a_dragged_robot_that_breaks_the_contract_stands_by_itself(server: Any, visit: Any) -> None:
     here = visit(server.url)
     here.begin()
