@@ -168,3 +168,37 @@ def test_sessions_are_found_renamed_and_deleted(server: Any, visit: Any) -> None
     rows.get_by_role("button", name="Delete").click()
     expect(rows).to_have_text("None.", timeout=LONG)
     assert server.client.get("/api/sessions").json() == []
+
+
+def test_fingers_drag_a_robot_and_pinch_the_picture(server: Any, visit: Any) -> None:
+    here = visit(server.url, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    here.begin()
+    here.say("Surround the largest coin")
+    here.page.locator("#scene").scroll_into_view_if_needed()
+    fingers = here.page.context.new_cdp_session(here.page)
+
+    def touch(kind: str, *points: tuple[float, float]) -> None:
+        at = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
+
+    box = here.robot(3).locator(".disc").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    touch("touchStart", (x, y))
+    for step in range(1, 6):
+        touch("touchMove", (x + 3 * step, y + 2 * step))
+    expect(here.page.locator("#certificate .badge")).to_be_visible()
+    touch("touchEnd")
+    expect(here.page.locator("#log > li[data-status]")).to_have_count(2, timeout=LONG)
+    expect(here.page.locator("#log > li").last).to_contain_text("Robot 3 moved")
+    here.rest()
+    scene = here.page.locator("#scene").bounding_box()
+    middle = scene["x"] + scene["width"] / 2, scene["y"] + 30
+    width = here.page.evaluate("document.querySelector('#scene').viewBox.baseVal.width")
+    touch("touchStart", (middle[0] - 20, middle[1]), (middle[0] + 20, middle[1]))
+    for step in range(1, 6):
+        away = 20 + 12 * step
+        touch("touchMove", (middle[0] - away, middle[1]), (middle[0] + away, middle[1]))
+    touch("touchEnd")
+    now = here.page.evaluate("document.querySelector('#scene').viewBox.baseVal.width")
+    assert now < width / 2
+    expect(here.page.locator("#log > li[data-status]")).to_have_count(2)
