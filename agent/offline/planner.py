@@ -5,7 +5,6 @@ asks when the words do not settle what to do. It is no language model: it sees m
 """
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -24,11 +23,13 @@ from .escorting import following
 from .pointed import chosen_by_answer, narrowed
 from .reading import Reading
 from .references import described
+from .restated import LEFT_OUT, Restated, is_question, restated
 from .sequences import in_stages
-from .several import about_several, shares
-from .spelling import instructed, spelled
+from .several import about_several
+from .spelling import spelled
 
 MAX_LABEL = 100
+NOTHING_YET = "Nothing stands yet, so there is nothing to tell of it. "
 USUAL_CORNERS = 4
 READING = "The rules account for every word; the rest of them says which thing is meant."
 """Answers a doubt, which comes of single words."""
@@ -105,15 +106,18 @@ def _asks_of_outline(messages: Sequence[Message]) -> bool:
 
 def _begin(task: Task, history: History, before: History) -> Reply:
     """Propose a formation, or find and ask what is missing."""
-    chosen = _narrowed(task, history)
+    still_open, chosen = _stated(task, history).open, _narrowed(task, history)
     if isinstance(chosen, Reply):
         return chosen
     shown, task = task.pointed, chosen
     reading = read_instruction(task.instruction, task.metres_per_pixel)
+    reading = replace(reading, unread=[*still_open, *reading.unread])
     robots = _robot_count(task, reading, history)
     question = question_of(task, reading, robots)
     if question or robots is None:
-        asked: dict[str, Any] = {"question": question or "How many robots?"}
+        back = [answer for _, answer in _answered(history)[-1:]]
+        untold = NOTHING_YET if any(is_question(a, task.metres_per_pixel) for a in back) else ""
+        asked: dict[str, Any] = {"question": f"{untold}{question or 'How many robots?'}"}
         ids = _target_ids(task)
         if robots and ids and would_do(task, reading):
             asked["contract"] = _in_unit(task, contract_of(reading, robots, ids, []))
@@ -161,7 +165,7 @@ def _narrowed(task: Task, history: History) -> Task | Reply:
     if agreed is not None:
         return agreed
     task, answers = _told_which(task, history)
-    task = replace(task, instruction=_said(task, answers))
+    task = replace(task, instruction=restated(task, answers).text)
     several = about_several(task, task.robots or _number_answered(history), history)
     if several is not None:
         if several.name == "propose_formation" and _was_doubted(history):
@@ -175,7 +179,7 @@ def _told_which(task: Task, history: History) -> tuple[Task, list[str]]:
     """The task about what answers have chosen of what is pointed at, and the other answers."""
     left: list[str] = []
     for question, answer in _answered(history):
-        reading = read_instruction(_said(task, left), task.metres_per_pixel)
+        reading = read_instruction(restated(task, left).text, task.metres_per_pixel)
         which = which_things(task, reading)
         asked = which is not None and question.endswith(which)
         chosen = chosen_by_answer(task, answer, history) if asked else None
@@ -198,7 +202,7 @@ def _agreed(task: Task, history: History) -> Reply | None:
         return None
     if declines(answer.text):
         return _call("report_impossible", {"reason": "Nothing was placed, as you said no."})
-    if not agrees(answer.text):
+    if not agrees(answer.text) and LEFT_OUT.fullmatch(answer.text) is None:
         return None
     contract: dict[str, Any] = asked[-1].arguments["contract"]
     if _was_doubted(history):
@@ -233,23 +237,9 @@ def _left_off(result: Result, history: History) -> str:
     return f"{wording} {result.text}"
 
 
-def _said(task: Task, said: Sequence[str]) -> str:
-    """The instruction with the answers to questions about it, which stand for what was unread."""
-    text = instructed(task.instruction)
-    for k, answer in enumerate(said):
-        if answer.isdecimal():
-            continue  # how many robots
-        alone = read_instruction(answer, task.metres_per_pixel)
-        read = alone.robots or alone.group or alone.things or alone.sure
-        if alone.unread and not read and k < len(said) - 1:
-            continue  # nothing of it was understood, and it was said in another way since
-        odd = alone.unscaled or [q for q in alone.unread if re.search("[0-9]", q)]
-        unread = read_instruction(text, task.metres_per_pixel).unread
-        kept = odd or shares(text)  # else an answer that is wholly read counts for it
-        for quote in () if kept else unread:
-            text = text.replace(quote, " ", 1)
-        text = f"{text} . {answer}"
-    return text
+def _stated(task: Task, history: History) -> Restated:
+    """What the instruction and the answers to questions about it say together."""
+    return restated(*_told_which(task, history))
 
 
 def _answered(history: History) -> list[tuple[str, str]]:
@@ -353,16 +343,19 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
 def _planned(task: Task, plan: dict[str, Any], history: History) -> str:
     noun = "robot has a certified place" if plan["robots"] == 1 else "robots have certified places"
     placed = f"{plan['robots']} {noun} (plan {plan['plan_id']})."
-    return " ".join([*_taken(history), placed, *plan["notes"], *_left_aside(task)])
+    return " ".join([*_taken(history), placed, *plan["notes"], *_left_aside(task, history)])
 
 
-def _left_aside(task: Task) -> list[str]:
-    """The words that only said which thing, and those that changed nothing."""
-    reading = read_instruction(task.instruction, task.metres_per_pixel)
-    said = [f"Read as background, which changes nothing: {_quoted(reading.background)}."]
-    if _target_ids(task) and reading.things:
-        said = [f"Read as words for what was pointed at: {_quoted(reading.things)}.", *said]
-    return said if reading.background else said[:-1]
+def _left_aside(task: Task, history: History) -> list[str]:
+    """The words that only said which thing, those that changed nothing, and those left out."""
+    stated = _stated(task, history)
+    reading = read_instruction(stated.text, task.metres_per_pixel)
+    told = {
+        "Read as words for what was pointed at": reading.things if _target_ids(task) else [],
+        "Read as background, which changes nothing": reading.background,
+        "Not understood and left out, for what was answered": [*stated.left_out],
+    }
+    return [f"{what}: {_quoted(words)}." for what, words in told.items() if words]
 
 
 def _quoted(words: list[str]) -> str:
