@@ -36,6 +36,8 @@ OF_OTHERS = frozenset(("keep_out", "faced", "left_alone", "rings_of"))
 """Demands in which a phrase for a thing is for another one than the arrangement is about."""
 LONGEST_CALL = 3
 """Words of an exclamation that only calls somebody: "Ball boys!"."""
+LINES = frozenset(("file", "line", "row", "column", "arc", "circle", "ring", "square", "grid"))
+"""What robots may stand in; "a" such thing is never said beside the matter."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
 """What these can do for a demand that is carried out demands nothing more."""
 STATING = frozenset(
@@ -303,8 +305,11 @@ class _Reader:
                 self._account_unread(first, last)
                 continue
             aside = [k for k in range(first, last) if kinds[k] == "background"]
-            if any(self.items[k].symbol not in fillers() | REASONS for k in aside):
-                self.reading.background.append(self._quote(aside[0], aside[-1] + 1))
+            said = {self.items[k].symbol for k in aside}
+            if said - fillers() - REASONS:
+                reading = self.reading
+                sort = reading.unread if said & LINES and "a" in said else reading.background
+                sort.append(self._quote(aside[0], aside[-1] + 1))
 
     def _account_unread(self, first: int, last: int) -> None:
         """A reason changes nothing; what stands after "around the" is the thing, if no other is."""

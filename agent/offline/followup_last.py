@@ -222,9 +222,12 @@ def toofar(slots: Slots, said: Said) -> Effects:
         back = {"left": "right", "right": "left", "up": "down", "down": "up"}[slots["dir"][0]]
         return shift(Slots({"dir": [back], "much": ["bit"]}), said)
     last = next((e for e in reversed(said.last) if e["kind"] in RELATIVE), None)
-    way = {"far": "out", "near": "in"}[slots["toofar"][0]]
+    _, denied, side = str(slots["toofar"][0]).rpartition("not ")
+    way = {"far": "out", "near": "in"}[side]
     if last is not None and (
-        last["kind"] == way or (way == "out" and last["kind"] in ("rotate", "shift", "place"))
+        last["kind"] == way
+        or (way == "out" and not denied and last["kind"] in ("rotate", "shift", "place"))
     ):
         return less(slots, said)
-    return [{"kind": {"out": "in", "in": "out"}[way], "factor": FACTOR["bit"]}]
+    factor = rounded(factor_of(slots)) if denied else FACTOR["bit"]
+    return [{"kind": {"out": "in", "in": "out"}[way], "factor": factor}]

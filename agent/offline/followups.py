@@ -193,6 +193,12 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
     same = [c for c in clauses if c.frame == "again" and "same" in line.words_of(c.chunks).lower()]
     kept = [c for c in clauses if c not in same] or clauses  # "same again, closer"
     kept = _without_moot(line, kept)
+    complaints = [c for c in kept if c.frame == "toofar"]
+    remedies = [c for c in kept if c not in complaints and _edits(c)]
+    if complaints and remedies:  # how it should be is said beside what is wrong
+        plain = _gathered(line, [c for c in kept if c not in complaints])
+        told = (*plain.background, *(line.words_of(c.chunks) for c in complaints))
+        return replace(plain, background=told)
     effects = [e for c in kept for e in c.effects]
     unsettled = next((e for e in effects if e["kind"] in ("ask", "refuse")), None)
     if unsettled is not None and unsettled["kind"] == "ask":
@@ -216,6 +222,11 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
             undo = sum(e.get("steps", 0) for e in made if e["kind"] == "undo")
             edits = [e for e in made if e["kind"] != "undo"]
     return _settled(line, effects, edits, undo)
+
+
+def _edits(clause: Clause) -> bool:
+    """Whether a clause changes something."""
+    return any(e["kind"] not in (*NO_EDITS, "ask", "refuse", "undo") for e in clause.effects)
 
 
 def _once(edits: list[Effect]) -> list[Effect]:
