@@ -309,7 +309,7 @@ class _Steps:
         """Whether an edit moves all robots to the thing they stand about."""
         assert self.standing is not None
         alone = len(self.standing.groups) == 1 and "robots" not in edit
-        return alone and edit["kind"] == "target" and edit["to"] in self.standing.targets
+        return alone and edit["kind"] == "target" and [edit["to"]] == self.standing.targets
 
     def _failed(self, failed: Result, *, taken_back: bool) -> Reply:
         """Nothing is changed: what was taken back for it is made again."""
