@@ -4,6 +4,7 @@ There is no last will: a broker has one message for each connection, and a vehic
 of its own. Vehicles end at the last node that was released to them, half a second ahead at most.
 """
 
+import asyncio
 import threading
 import time
 import uuid
@@ -14,13 +15,13 @@ from typing import Any
 from ..described import described_as
 from ..mqtt.link import Link
 from ..protocol import FleetRequest
-from ..wire.fleet import Point, Reason, WireFleet
+from ..wire.fleet import HOLDING, Point, Reason, WireFleet
 from .hearing import KINDS, Hearing
 from .messages import Writer, action
 from .orders import AGAIN, TAKEN, Order
 from .settings import Vda5050Settings
 
-CANCEL = "cancelOrder"
+PAUSE, GO_ON, CANCEL = "startPause", "stopPause", "cancelOrder"
 ENDED = ("FINISHED", "FAILED")
 
 
@@ -71,26 +72,35 @@ class Vda5050Fleet(WireFleet):
                     self._say(robot, "order", message)
 
     def hold(self, reason: Reason) -> None:
-        """Cancel the orders of robots; where a person says stop, have all pause at once too."""
+        """Cancel the orders of robots; those that a person stops pause before, to stand at once.
+
+        The pause is lifted when there is no order left: it would outlast this process.
+        """
         with self._lock:
             for robot, vehicle in self._hearing.vehicles.items():
                 order, state = self._orders.pop(robot, None), vehicle.state or {}
                 vehicle.order = None
-                of_others = reason == "stop" and state.get("nodeStates")
-                kinds = ["startPause"] if reason == "stop" else []
-                if of_others or (order is not None and not (state and order.done(state))):
-                    kinds.append(CANCEL)
-                self._tell(robot, [action(kind, uuid.uuid4().hex) for kind in kinds])
+                stopped = reason == "stop" and (not state or bool(state["nodeStates"]))
+                if stopped or (order is not None and not (state and order.done(state))):
+                    kinds = (*((PAUSE,) if reason == "stop" else ()), CANCEL)
+                    self._tell(robot, [action(kind, uuid.uuid4().hex) for kind in kinds])
 
     async def release(self) -> None:
-        """Lift the stop, and the pause of robots; orders stay cancelled."""
+        """Lift the stop, and pauses that are left; orders stay cancelled."""
         await super().release()
         with self._lock:
             for robot, vehicle in self._hearing.vehicles.items():
                 told = self._instant.get(robot)
                 if told or (vehicle.state or {}).get("paused"):
                     left = [a for a in (told.actions if told else []) if a["actionType"] == CANCEL]
-                    self._tell(robot, [*left, action("stopPause", uuid.uuid4().hex)])
+                    self._tell(robot, [*left, action(GO_ON, uuid.uuid4().hex)])
+
+    async def close(self) -> None:
+        """Let go of the broker, when robots have done what they were told at once."""
+        ends = time.monotonic() + HOLDING
+        while self._instant and self.link.connected and time.monotonic() < ends:
+            await asyncio.sleep(self.settings.period)
+        await super().close()
 
     def _tell(self, robot: str, actions: list[dict[str, Any]]) -> None:
         """Have a vehicle do actions at once; it is told again until it says that it heard."""
@@ -109,7 +119,9 @@ class Vda5050Fleet(WireFleet):
         ids = [act["actionId"] for act in told.actions]
         if now > told.begun + TAKEN or all(said.get(name) in ENDED for name in ids):
             del self._instant[robot]
-            return False
+            if any(act["actionType"] == PAUSE for act in told.actions):
+                self._tell(robot, [action(GO_ON, uuid.uuid4().hex)])
+            return robot in self._instant
         if now >= told.due and not set(ids) <= set(said):
             told.due = now + AGAIN
             self._say(robot, "instantActions", {"actions": told.actions})

@@ -74,12 +74,17 @@ class Order:
     def hindrance(self, state: Mapping[str, Any], now: float) -> str | None:
         """Take in a state, and say why the order cannot be gone on with; None if it can."""
         number, its_own = state["orderUpdateId"], state["orderId"] == self.name
+        dialect, errors = self._settings.dialect, state["errors"]
+        grave = [error for error in errors if error["errorLevel"] in dialect.grave]
         if its_own and number == self._number:
-            self._taken, self._known, self._before = True, True, state["errors"]
-        refused = self._settings.dialect.refused
-        new = [e for e in state["errors"] if e not in self._before and e["errorType"] in refused]
-        if new and not self._taken:
-            return f"refused order {self.name}/{self._number}: {error_told(new[0])}"
+            self._taken = self._known = True
+            self._before = [
+                error for error in errors if error not in grave or error in self._before
+            ]
+        new = [e for e in (grave if self._taken else errors) if e not in self._before]
+        refused = [error_told(error) for error in new if error["errorType"] in dialect.refused]
+        if refused:
+            return f"refused order {self.name}/{self._number}: {refused[0]}"
         if self._known and not its_own:
             return f"its order {self.name} is gone: it has {state['orderId']!r}"
         cut = state["lastNodeSequenceId"] < 2 * number + 2

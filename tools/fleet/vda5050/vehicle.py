@@ -91,6 +91,8 @@ class Vehicle:
         """Note where one is and whether one moves; where to go now, None to stand."""
         self.place, self.driving = place, driving
         while self.base and self.cancelling is None and self._near(self.base[0][0]):
+            if len(self.base) == 1 and driving:
+                break  # it comes as near to its last node as it can
             self.last = _name(self.base.pop(0)[0])
         if self.cancelling is not None and not driving:
             self.cancelling["actionStatus"] = "FINISHED"

@@ -56,7 +56,7 @@ def test_no_message_goes_out_that_has_a_mistyped_field(version: Any) -> None:
     ):
         with pytest.raises(RuntimeError, match="instantActions is not valid: "):
             writer.message("a", "instantActions", wrong)
-    typo = {**sent, "acts": []}
+    typo: dict[str, Any] = {**sent, "acts": []}
     assert mistake(version, "instantActions", typo)
     assert read(version, "instantActions", json.dumps(typo).encode()) == typo
 
