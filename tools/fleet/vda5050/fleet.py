@@ -82,18 +82,17 @@ class Vda5050Fleet(WireFleet):
                 vehicle.order = None
                 stopped = reason == "stop" and (not state or bool(state["nodeStates"]))
                 if stopped or (order is not None and not (state and order.done(state))):
-                    kinds = (*((PAUSE,) if reason == "stop" else ()), CANCEL)
-                    self._tell(robot, [action(kind, uuid.uuid4().hex) for kind in kinds])
+                    self._tell(robot, [PAUSE, CANCEL] if reason == "stop" else [CANCEL])
 
     async def release(self) -> None:
         """Lift the stop, and pauses that are left; orders stay cancelled."""
         await super().release()
         with self._lock:
             for robot, vehicle in self._hearing.vehicles.items():
-                told = self._instant.get(robot)
-                if told or (vehicle.state or {}).get("paused"):
-                    left = [a for a in (told.actions if told else []) if a["actionType"] == CANCEL]
-                    self._tell(robot, [*left, action(GO_ON, uuid.uuid4().hex)])
+                told, state = robot in self._instant, vehicle.state or {}
+                if told or state.get("paused"):
+                    has_order = told or state.get("nodeStates")
+                    self._tell(robot, [CANCEL, GO_ON] if has_order else [GO_ON])
 
     async def close(self) -> None:
         """Let go of the broker, when robots have done what they were told at once."""
@@ -102,30 +101,33 @@ class Vda5050Fleet(WireFleet):
             await asyncio.sleep(self.settings.period)
         await super().close()
 
-    def _tell(self, robot: str, actions: list[dict[str, Any]]) -> None:
+    def _tell(self, robot: str, kinds: list[str]) -> None:
         """Have a vehicle do actions at once; it is told again until it says that it heard."""
-        if actions:
-            now = time.monotonic()
-            self._instant[robot] = Instant(actions, now, now + AGAIN)
-            self._say(robot, "instantActions", {"actions": actions})
+        now = time.monotonic()
+        actions = [action(kind, uuid.uuid4().hex) for kind in kinds]
+        self._instant[robot] = Instant(actions, now, now + AGAIN)
+        self._say(robot, "instantActions", {"actions": actions})
 
     def _still_busy(self, robot: str, now: float) -> bool:
         """Whether a vehicle has not done yet what it was told at once: no order is due before."""
         told, state = self._instant.get(robot), self._hearing.vehicles[robot].state or {}
         if told is None:
             return False
-        told_of = state.get(self._settings.dialect.instant, [])
-        said = {act["actionId"]: act["actionStatus"] for act in told_of}
-        ids = [act["actionId"] for act in told.actions]
-        if now > told.begun + TAKEN or all(said.get(name) in ENDED for name in ids):
+        said = {
+            act["actionId"]: act["actionStatus"]
+            for act in state.get(self._settings.dialect.instant, [])
+        }
+        answers = [said.get(act["actionId"]) for act in told.actions]
+        if all(answer in ENDED for answer in answers):
             del self._instant[robot]
-            if any(act["actionType"] == PAUSE for act in told.actions):
-                self._tell(robot, [action(GO_ON, uuid.uuid4().hex)])
-            return robot in self._instant
-        if now >= told.due and not set(ids) <= set(said):
+            if told.actions[0]["actionType"] == PAUSE:
+                self._tell(robot, [GO_ON])
+        elif now > told.begun + TAKEN:
+            del self._instant[robot]
+        elif None in answers and now >= told.due:
             told.due = now + AGAIN
             self._say(robot, "instantActions", {"actions": told.actions})
-        return True
+        return robot in self._instant
 
     def _heard(self, topic: str, payload: bytes) -> None:
         now = time.monotonic()

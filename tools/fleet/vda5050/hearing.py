@@ -78,9 +78,12 @@ class Hearing:
         """Take in a message; the robot, where it is believed."""
         now, kind = time.monotonic(), topic.rpartition("/")[2]
         robot = self.robot_of(topic)
+        if robot is None:
+            self._poses.heard("/".join(topic.split("/")[-3:-1]), None, now)
+            return None
         message = read(self._settings.version, kind, payload)
-        if robot is None or message is None or not self._its_own(robot, message):
-            self._poses.heard(robot or "/".join(topic.split("/")[-3:-1]), None, now)
+        if message is None or not self._its_own(robot, message):
+            self._poses.heard(robot, None, now)
             return None
         vehicle = self.vehicles[robot]
         if kind == "connection":

@@ -119,7 +119,7 @@ class Vehicle:
             "driving": self.driving,
             "paused": self.paused,
             "actionStates": [],
-            dialect.power: dialect.power_state(80.0),
+            dialect.power: {dialect.charge: 80.0, "charging": False},
             "operatingMode": self.mode,
             "errors": self.errors,
             "safetyState": {dialect.emergency: self.emergency, "fieldViolation": self.violated},
