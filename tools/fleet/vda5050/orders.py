@@ -5,7 +5,6 @@ is seen to have taken the one before, and that one is sent again until then: ord
 """
 
 import math
-import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -37,7 +36,7 @@ class Order:
         self, settings: Vda5050Settings, name: str, start: Point, state: Mapping[str, Any]
     ) -> None:
         self._settings, self.name = settings, name
-        self._points, self._goal, self._since = [start], start, time.monotonic()
+        self._points, self._goal, self._since = [start], start, math.inf
         self._before: list[Any] = state.get("errors", [])
         self._taken, self._begun, self._known = True, 0.0, False
         self._due, self._pause = math.inf, AGAIN

@@ -51,7 +51,7 @@ class Vehicle:
         """Take an order, None if it could not be read, or say why not."""
         refusal = "malformed" if message is None else self._refusal(message)
         if refusal:
-            self.complain(self.settings.dialect.refusals[refusal], message or {})
+            self.complain(self.settings.dialect.refusals[refusal])
             return
         assert message is not None
         if (message["orderId"], message["orderUpdateId"]) == (self.order, self.update):
@@ -77,15 +77,12 @@ class Vehicle:
         elif kind != "stateRequest":
             done["actionStatus"] = "FAILED"
             if kind == "cancelOrder":
-                self.complain(self.settings.dialect.idle, {})
+                self.complain(self.settings.dialect.idle)
 
-    def complain(self, kind: str, message: Json, level: str = "WARNING") -> None:
+    def complain(self, kind: str, level: str = "WARNING") -> None:
         """Say that there is an error, until a new order is taken."""
-        about = {"orderId", "orderUpdateId"} & set(message)
-        refers = [{"referenceKey": k, "referenceValue": str(message[k])} for k in sorted(about)]
-        error = {"errorType": kind, "errorLevel": level, "errorReferences": refers}
-        if error not in self.errors:
-            self.errors = [*self.errors, error]
+        error = {"errorType": kind, "errorLevel": level}
+        self.errors = [*(known for known in self.errors if known != error), error]
 
     def go_on(self, place: Point, driving: bool) -> Point | None:
         """Note where one is and whether one moves; where to go now, None to stand."""

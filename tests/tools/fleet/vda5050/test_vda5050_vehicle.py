@@ -76,7 +76,7 @@ def test_it_says_what_is_valid(vehicle: Vehicle) -> None:
     version: Version = vehicle.settings.version
     vehicle.take(order(vehicle, 0, 0, 1, 2))
     vehicle.act(action("cancelOrder", "1"))
-    vehicle.complain("x", {"orderId": "o", "orderUpdateId": 3})
+    vehicle.complain("x")
     state = Writer(vehicle.settings).message("a", "state", vehicle.state() | vehicle.position())
     assert mistake(version, "state", state) is None
 

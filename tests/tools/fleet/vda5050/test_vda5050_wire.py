@@ -134,6 +134,37 @@ def test_what_was_told_at_once_is_told_again_until_it_was_heard(hall: Halls) -> 
     assert len(done) == 3 and all(heard.count(name) == 2 for name in done)
 
 
+def test_a_pause_that_is_left_is_lifted_when_a_person_says_go_and_what_was_left_is_not_driven(
+    hall: Halls,
+) -> None:
+    there = hall().simulate()
+    vehicle, act = there.robots.vehicles["a"], there.robots.vehicles["a"].act
+
+    def pausing_only(action: Json) -> None:
+        if action["actionType"] == "startPause":
+            act(action)
+
+    vehicle.act = pausing_only
+    with pytest.raises(FleetStoppedError):
+        drive(there, [(800, 50)], stop_after=8)
+    assert vehicle.paused and vehicle.base
+    held = there.robots.points.copy()
+    time.sleep(4.5)  # longer than it has to answer
+    assert vehicle.paused, "an order may be left"
+    vehicle.act = act
+
+    async def go() -> None:
+        fleet = there.fleet()
+        await fleet.observe()
+        await fleet.release()
+        await fleet.close()
+
+    asyncio.run(go())
+    until(lambda: not vehicle.paused)
+    assert vehicle.cancelled
+    assert abs(there.robots.points - held).max() < 0.5
+
+
 def test_vehicles_end_at_the_last_node_when_the_process_that_drives_them_is_killed(
     hall: Halls,
 ) -> None:
@@ -199,7 +230,7 @@ def test_a_look_says_who_is_there_and_what_is_wrong(hall: Halls) -> None:
     faults["b"] = lambda kind, message: None
     vehicles["c"].mode = "MANUAL"
     vehicles["d"].localised = False
-    vehicles["a"].complain("maintenance", {})
+    vehicles["a"].complain("maintenance")
     before = there.robots.points.copy()
     told, fit = checked(there.settings, 1.5)
     said = "\n".join(told)
