@@ -103,14 +103,10 @@ class Hearing:
 
     def judge(self, robot: str) -> str | None:
         """Note anew, and say, why a vehicle cannot drive; None if it can."""
-        vehicle, dialect = self.vehicles[robot], self._settings.dialect
+        vehicle = self.vehicles[robot]
         words = [] if vehicle.link == "ONLINE" else [f"connection {vehicle.link}"]
-        words += hindrances(dialect, vehicle.state or {})
-        if vehicle.position is not None:
-            if not vehicle.position[dialect.located]:
-                words.append(f"not localised ({dialect.located} is false)")
-            if (where := vehicle.position["mapId"]) != self._settings.map:
-                words.append(f"on the map {where!r}, not {self._settings.map!r}")
+        words += hindrances(self._settings.dialect, vehicle.state or {})
+        words += self._doubts(vehicle.position) if vehicle.position else []
         words += [vehicle.order] if vehicle.order else []
         found = "; ".join(words)[:MOST_WORDS] or None
         self._poses.tracks[robot].fault = found
@@ -136,7 +132,7 @@ class Hearing:
         vehicle = self.vehicles[robot]
         vehicle.position = position or vehicle.position
         fault = self.judge(robot)
-        if position is None or not self._trusted(position):
+        if position is None or self._doubts(position):
             return
         vehicle.believed += 1
         x, y, heading = position["x"], position["y"], position["theta"]
@@ -147,9 +143,14 @@ class Hearing:
         else:
             self._poses.heard(robot, said, now)
 
-    def _trusted(self, position: Mapping[str, Any]) -> bool:
-        """Whether a place is one in the robots' frame: else it is no news of where a robot is."""
-        return position[self._settings.dialect.located] and position["mapId"] == self._settings.map
+    def _doubts(self, position: Mapping[str, Any]) -> list[str]:
+        """Why a place is none in the robots' frame, and so no news of where a robot is."""
+        located, words = self._settings.dialect.located, list[str]()
+        if not position[located]:
+            words.append(f"not localised ({located} is false)")
+        if (where := position["mapId"]) != self._settings.map:
+            words.append(f"on the map {where!r}, not {self._settings.map!r}")
+        return words
 
 
 def hindrances(dialect: Dialect, state: Mapping[str, Any]) -> list[str]:

@@ -61,7 +61,7 @@ class Order:
         nodes = [self._node(2 * number, begin), self._node(2 * number + 2, end)]
         dialect = self._settings.dialect
         edge: dict[str, Any] = {
-            "edgeId": f"e{2 * number + 1}",
+            "edgeId": f"{self.name}-{2 * number + 1}",
             "sequenceId": 2 * number + 1,
             "released": True,
             **dialect.ends(nodes[0]["nodeId"], nodes[1]["nodeId"]),
@@ -110,7 +110,7 @@ class Order:
             "allowedDeviationXY": settings.dialect.deviation(settings.tracking_error),
         }
         return {
-            "nodeId": f"n{number}",
+            "nodeId": f"{self.name}-{number}",
             "sequenceId": number,
             "released": True,
             "nodePosition": position,
