@@ -10,6 +10,9 @@ from ..tools.fleet.described import wire_settings
 from ..tools.fleet.mqtt.checkup import checked as mqtt_checked
 from ..tools.fleet.mqtt.settings import MqttSettings
 from ..tools.fleet.mqtt.stand_in import MqttStandIns
+from ..tools.fleet.vda5050.checkup import checked as vda5050_checked
+from ..tools.fleet.vda5050.settings import Vda5050Settings
+from ..tools.fleet.vda5050.stand_in import Vda5050StandIns
 from ..tools.fleet.wire.settings import WireSettings
 from .terminal import say
 
@@ -18,10 +21,12 @@ File = Annotated[Path, typer.Argument(help="A fleet's YAML file.", show_default=
 Seconds = Annotated[float, typer.Option("--seconds", help="To listen for.", min=0.1, max=3600)]
 
 CHECKUPS: Mapping[type[WireSettings], Callable[[Any, float], tuple[list[str], bool]]] = {
-    MqttSettings: mqtt_checked
+    MqttSettings: mqtt_checked,
+    Vda5050Settings: vda5050_checked,
 }
 STAND_INS: Mapping[type[WireSettings], Callable[[Any, Callable[[str], None]], Any]] = {
-    MqttSettings: MqttStandIns
+    MqttSettings: MqttStandIns,
+    Vda5050Settings: Vda5050StandIns,
 }
 
 

@@ -32,6 +32,7 @@ ELSEWHERE = {
     "fleets.md": "tests/tools/fleet/mqtt/test_fleets_page.py",
     "prompts.md": "tests/apps/test_prompts.py",
     "serving.md": "tests/apps/server/test_docs.py",
+    "warehouse.md": "tests/tools/fleet/vda5050/test_warehouse_page.py",
 }
 """Pages whose commands other tests run: servers do not end by themselves."""
 COMMANDS = [

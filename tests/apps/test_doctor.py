@@ -128,7 +128,7 @@ def test_plugins_that_are_broken_are_named_and_print_nothing_on_stdout(home: Pat
     )
     fleets = told(home)["fleet"]
     assert fleets.pop("wheels") == "of an installed package"
-    assert {fleets.pop(name) for name in ("simulated", "mqtt")} == {"built in"}
+    assert {fleets.pop(name) for name in ("simulated", "mqtt", "vda5050")} == {"built in"}
     assert fleets == {
         "absent": "broken: InputError: The fleet 'absent' (nowhere:open_fleet) cannot be "
         "imported: No module named 'nowhere'.",

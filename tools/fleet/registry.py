@@ -9,5 +9,6 @@ FLEETS = Registry[FleetFactory](
     {
         "simulated": "formup.tools.fleet.simulated:open_fleet",
         "mqtt": "formup.tools.fleet.mqtt.fleet:open_fleet",
+        "vda5050": "formup.tools.fleet.vda5050.fleet:open_fleet",
     },
 )

@@ -30,7 +30,7 @@ class MqttFleet(WireFleet):
         self._topics, self._robot_of = settings.topics, settings.robot_of
         patterns = (self._topics.pose, self._topics.goal)
         listened = [*(p.replace("{robot}", "+") for p in patterns), self._topics.hold]
-        will = self._topics.hold, _holding("gone")
+        will = self._topics.hold, _holding("gone"), False
         self.link = self._link = Link(
             settings.address, listened, self._heard, will=will, left=self.poses.forget
         )

@@ -38,7 +38,8 @@ class Link:
         address: host, port, whether TLS is spoken; who logs in is in the environment.
         topics: what to listen to.
         heard: is given topic and payload of every message.
-        will: topic and message that the broker says when this connection breaks.
+        will: topic and message that the broker says when this connection breaks, and whether it
+            keeps it for those who come later.
         left: is called when the connection is lost.
 
     Attributes:
@@ -56,7 +57,7 @@ class Link:
         topics: Iterable[str],
         heard: Heard,
         *,
-        will: tuple[str, Mapping[str, Any]] | None = None,
+        will: tuple[str, Mapping[str, Any], bool] | None = None,
         left: Callable[[], None] = lambda: None,
     ) -> None:
         self._address, self._topics, self._will = address, tuple(topics), will
@@ -68,13 +69,21 @@ class Link:
         self._thread = threading.Thread(target=self._keep, daemon=True)
         self._thread.start()
 
-    def say(self, topic: str, message: Mapping[str, Any], *, surely: bool = False) -> None:
-        """Send a message; one that is to arrive surely is sent later where it cannot be now."""
+    def say(
+        self, topic: str, message: Mapping[str, Any], *, surely: bool = False, kept: bool = False
+    ) -> None:
+        """Send a message.
+
+        Args:
+            surely: it is sent later where it cannot be now.
+            kept: the broker keeps it for those who come later.
+        """
         if not self.connected:
             self._unsaid = (topic, message) if surely else self._unsaid
             return
         text = json.dumps(message, allow_nan=False)
-        self._client.publish(topic, text, int(surely), properties=self._expiring)
+        expiring = None if kept else self._expiring
+        self._client.publish(topic, text, int(surely), kept, expiring)
 
     def close(self) -> None:
         """Say goodbye; what was said before still goes out."""
@@ -124,7 +133,8 @@ class Link:
                     f"files: {getattr(error, 'strerror', None) or error}."
                 ) from None
         if self._will is not None:
-            client.will_set(self._will[0], json.dumps(self._will[1]), qos=1)
+            topic, message, kept = self._will
+            client.will_set(topic, json.dumps(message), 1, kept)
         client.on_connect, client.on_disconnect = self._came, self._went
         client.on_subscribe, client.on_message = self._listens, self._told
         client.on_socket_open = _undelayed

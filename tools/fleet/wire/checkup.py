@@ -47,7 +47,7 @@ def checkup(
     if others:
         told.append(f"Another program is sending goals to robot {_few(others)}.")
     told.append(
-        f"Robots have to hold by themselves when no goal has come for {settings.watchdog:g} s; "
+        f"{settings.alone[0].upper()}{settings.alone[1:]}; "
         "that cannot be seen from here: try it out on each of them."
     )
     good = sum(fit for _, fit in robots)

@@ -204,10 +204,10 @@ class WireFleet(ABC):
         link = self.link
         if not link.connected or link.joined != joined:
             why = link.trouble or "the connection was lost and is back"
-            where = self.settings.where
+            where, alone = self.settings.where, self.settings.alone
             raise FleetUnreachableError(
-                f"{where[0].upper()}{where[1:]} is out of reach: {why}. Robots hold by themselves; "
-                "`formup fleet check FILE` looks for the cause."
+                f"{where[0].upper()}{where[1:]} is out of reach: {why}. {alone[0].upper()}"
+                f"{alone[1:]}; `formup fleet check FILE` looks for the cause."
             )
 
     def _check_going(self, motion: Motion, stops: int, joined: int) -> None:

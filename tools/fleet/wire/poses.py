@@ -88,16 +88,19 @@ class Poses:
         """Know nothing: what is seen next counts."""
         self._tracks = {robot: Track() for robot in self._tracks}
 
-    def heard(self, robot: str, said: PoseMessage | None, now: float) -> None:
-        """Take in a message, None if it cannot be read, that came at a time on our own clock."""
+    def heard(self, robot: str, said: PoseMessage | Refused | None, now: float) -> None:
+        """Take in a message that came at a time on our own clock.
+
+        One that is not to be believed is given as the reason, None if it cannot be read.
+        """
         track = self._tracks.get(robot)
         if track is None:
             if len(self.unknown) < MOST_UNKNOWN:
                 self.unknown.add(robot)
             return
         track.heard += 1
-        if said is None:
-            self._refuse(track, "malformed", now)
+        if not isinstance(said, PoseMessage):
+            self._refuse(track, said or "malformed", now)
             return
         frame = self._settings.frame
         looks = None if said.heading is None else frame.turned(said.heading)
@@ -157,4 +160,5 @@ class Poses:
         if math.isinf(age) and track.pose is not None:
             return f"Robot {robot} is said to be in two places: do two robots use its id?"
         why = f"; its last message was {track.why}" if track.why else ""
+        why += f"; it cannot drive: {track.fault!r}" if track.fault else ""
         return f"Robot {robot} {seen}{why}."

@@ -120,3 +120,8 @@ class WireSettings(Value):
     def where(self) -> str:
         """What they are reached through, in words: "the broker localhost:1883"."""
         raise NotImplementedError
+
+    @property
+    def alone(self) -> str:
+        """What robots do that hear nothing more, in words."""
+        return f"robots have to hold by themselves when no goal has come for {self.watchdog:g} s"

@@ -1,10 +1,6 @@
-"""A real broker on a free port, robots that are simulated on its wire, and files of both."""
+"""Robots that are simulated on the wire of a real broker, and files of both."""
 
-import contextlib
 import json
-import shutil
-import socket
-import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -19,7 +15,6 @@ from formup.tools.fleet.mqtt.link import Link
 from formup.tools.fleet.mqtt.settings import MqttSettings
 from formup.tools.fleet.mqtt.stand_in import MqttStandIns
 
-MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
 PATIENCE = 10.0
 USUAL: dict[str, Any] = {
     "fleet": "mqtt",
@@ -36,61 +31,6 @@ def wait_for(what: Callable[[], object]) -> None:
     while not what():
         assert time.monotonic() < ends, "it has not come about"
         time.sleep(0.01)
-
-
-class Broker:
-    """mosquitto, which can be killed and started again on the same port."""
-
-    def __init__(self, folder: Path, more: str = "allow_anonymous true\n") -> None:
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.port: int = free.getsockname()[1]
-        self.url = f"mqtt://127.0.0.1:{self.port}"
-        self._config = folder / f"mosquitto-{self.port}.conf"
-        # As the user who runs the tests: else it could not read their files.
-        mine = f"user root\nlistener {self.port} 127.0.0.1\nset_tcp_nodelay true\n"
-        self._config.write_text(mine + more)
-        self._process: subprocess.Popen[bytes] | None = None
-
-    def start(self) -> None:
-        assert MOSQUITTO is not None
-        command = [MOSQUITTO, "-c", str(self._config)]
-        self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-        wait_for(self._answers)
-
-    def kill(self) -> None:
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-
-    def _answers(self) -> bool:
-        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1):
-            return True
-        return False
-
-
-@pytest.fixture(scope="session")
-def brokers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Broker]]:
-    """Starts brokers, with more lines of configuration if wanted."""
-    if MOSQUITTO is None:
-        pytest.skip("mosquitto is not installed (apt-get install mosquitto)")
-    pytest.importorskip("paho.mqtt.client", reason="the extra mqtt is not installed")
-    made: list[Broker] = []
-
-    def make(more: str = "allow_anonymous true\n") -> Broker:
-        made.append(Broker(tmp_path_factory.mktemp("broker"), more))
-        made[-1].start()
-        return made[-1]
-
-    yield make
-    for broker in made:
-        broker.kill()
-
-
-@pytest.fixture(scope="session")
-def shared(brokers: Callable[..., Broker]) -> Broker:
-    """One broker for all tests that leave it alone; each has topics of its own."""
-    return brokers()
 
 
 class Faulty(MqttStandIns):
@@ -120,7 +60,7 @@ class Faulty(MqttStandIns):
 class Lab:
     """A fleet's file, its stand-ins in a thread, and whatever speaks beside them."""
 
-    def __init__(self, path: Path, broker: Broker, more: dict[str, Any]) -> None:
+    def __init__(self, path: Path, broker: Any, more: dict[str, Any]) -> None:
         own = path.parent.name
         topics = {
             "pose": f"{own}/{{robot}}/pose",
@@ -178,8 +118,8 @@ def lab(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Callable[...
     """Makes labs; what is given is said in their file."""
     made: list[Lab] = []
 
-    def make(broker: Broker | None = None, **more: Any) -> Lab:
-        found: Broker = broker or request.getfixturevalue("shared")
+    def make(broker: Any = None, **more: Any) -> Lab:
+        found = broker or request.getfixturevalue("shared")
         made.append(Lab(tmp_path / "lab.yaml", found, more))
         return made[-1]
 

@@ -1,0 +1,1 @@
+"""Vehicles that speak VDA 5050 over MQTT."""
