@@ -20,10 +20,19 @@ MAY_IMPORT = {
 }
 WITHIN_TOOLS = {
     "geometry": {"geometry", "errors"},
-    "perception": {"perception", "geometry", "registry", "errors"},
+    "perception": {"perception", "geometry", "registry", "errors", "yaml_files"},
     "formation": {"formation", "geometry", "errors"},
     "motion": {"motion", "formation", "geometry", "errors"},
-    "fleet": {"fleet", "motion", "formation", "geometry", "errors", "registry"},
+    "fleet": {
+        "fleet",
+        "motion",
+        "formation",
+        "perception",
+        "geometry",
+        "errors",
+        "registry",
+        "yaml_files",
+    },
 }
 GEOMETRY_LIBRARIES = {"numpy", "scipy", "shapely"}
 HEAVY = {

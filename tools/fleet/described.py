@@ -3,14 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast
-
-import yaml
-from pydantic import ValidationError
-from pydantic_core import ErrorDetails
+from typing import Any, Literal, TypeVar
 
 from ..errors import InputError
 from ..formation.value import Value
+from ..yaml_files import content_of, validated
 from .mqtt.settings import MqttSettings
 from .physics import Physics
 from .protocol import Fleet, FleetFactory, FleetRequest
@@ -18,12 +15,11 @@ from .registry import FLEETS
 from .vda5050.settings import Vda5050Settings
 from .wire.settings import WireSettings
 
-Model = TypeVar("Model", bound=Value)
 Elsewhere = TypeVar("Elsewhere", bound=WireSettings)
 WIRES: Mapping[str, type[WireSettings]] = {"mqtt": MqttSettings, "vda5050": Vda5050Settings}
 """What a file says of robots that are elsewhere, by its `fleet`."""
 SUFFIXES = (".yaml", ".yml")
-MOST_BYTES = 1_000_000
+BEGIN = "fleet: simulated"
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ class Described:
         Raises:
             InputError: the file says what cannot be; names every mistake.
         """
-        return _validated(self.path, Physics, {**usual, **self.given})
+        return validated(self.path, "a fleet", Physics, {**usual, **self.given})
 
 
 def fleet_named(name: str) -> FleetFactory:
@@ -59,7 +55,7 @@ def fleet_named(name: str) -> FleetFactory:
         if name in WIRES:
             raise InputError(f"Robots on {name} are described by a file: --fleet FILE.yaml.")
         return FLEETS.load(name)
-    kind = _content(path).get("fleet")
+    kind = content_of(path, BEGIN).get("fleet")
     if not isinstance(kind, str):
         raise InputError(f"{path} does not say `fleet`: one of {', '.join(FLEETS.names())}.")
     load: Callable[[FleetRequest], Fleet] = FLEETS.load(kind)
@@ -76,7 +72,7 @@ def described(path: Path) -> Described:
     Raises:
         InputError: it cannot be read, or has another pace than there is.
     """
-    content = _content(path)
+    content = content_of(path, BEGIN)
     content.pop("fleet", None)
     pace = content.pop("pace", "fast")
     if pace not in ("fast", "real"):
@@ -90,12 +86,12 @@ def wire_settings(path: Path) -> WireSettings:
     Raises:
         InputError: it cannot be read, or does not describe such; names every mistake.
     """
-    content = _content(path)
+    content = content_of(path, BEGIN)
     found = WIRES.get(str(content.pop("fleet", None)))
     if found is None:
         kinds = " or ".join(f"`fleet: {kind}`" for kind in WIRES)
         raise InputError(f"{path} describes no robots elsewhere; begin it with {kinds}.")
-    return _validated(path, found, content)
+    return validated(path, "a fleet", found, content)
 
 
 def described_as(kind: type[Elsewhere], path: Path) -> Elsewhere:
@@ -129,46 +125,3 @@ def _file_of(
     made["properties"] = {"fleet": {"const": kind}, **(more or {}), **fields}
     made["required"] = ["fleet", *(name for name in made["required"] if name not in optional)]
     return made
-
-
-def _validated(path: Path, model: type[Model], given: Mapping[str, Any]) -> Model:
-    try:
-        return model.model_validate(given)
-    except ValidationError as error:
-        wrong = "; ".join(_mistake(found) for found in error.errors())
-        raise InputError(f"{path} does not describe a fleet: {wrong}.") from None
-
-
-def _mistake(found: ErrorDetails) -> str:
-    where = ".".join(map(str, found["loc"]))
-    if found["type"] == "extra_forbidden":
-        return f"{where}: no such key"
-    if found["type"] == "value_error":  # a sentence of ours, which says what was given if it may
-        return f"{where}: {found.get('ctx', {})['error']}".removeprefix(": ")
-    return f"{where}: {found['msg'].lower()}, got {found['input']!r}"
-
-
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f"{path} is larger than {MOST_BYTES:,} bytes; describe one fleet.")
-        content: Any = yaml.load(path.read_text(encoding="utf-8"), _Loader)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
-        where = " ".join(str(error).split())
-        raise InputError(f"{path} is not YAML: {where}.") from None
-    if not isinstance(content, dict):
-        raise InputError(f"{path} describes no fleet; begin it with a line `fleet: simulated`.")
-    return {str(key): value for key, value in cast("dict[Any, Any]", content).items()}
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML in which nothing is said twice, as one of the two would go unheard."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [key.value for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise yaml.YAMLError(f"{key!r} is said more than once")
-        return super().construct_mapping(node, deep)

@@ -1,0 +1,73 @@
+"""YAML files that people write: read strictly, as a word that goes unheard may move robots."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from .errors import InputError
+
+Model = TypeVar("Model", bound=BaseModel)
+MOST_BYTES = 1_000_000
+
+
+def content_of(path: Path, begin: str) -> dict[str, Any]:
+    """The mapping that a file holds.
+
+    Args:
+        begin: a line that it may begin with.
+
+    Raises:
+        InputError: it cannot be read, is not YAML, says something twice, or holds no mapping.
+    """
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError(f"{path} is larger than {MOST_BYTES:,} bytes; say less in one file.")
+        content: Any = yaml.load(path.read_text(encoding="utf-8"), _Loader)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from None
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        where = " ".join(str(error).split())
+        raise InputError(f"{path} is not YAML: {where}.") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path} holds no keys and values; begin it with a line `{begin}`.")
+    return {str(key): value for key, value in cast("dict[Any, Any]", content).items()}
+
+
+def validated(path: Path, what: str, model: type[Model], given: Mapping[str, Any]) -> Model:
+    """A file's content as a model.
+
+    Args:
+        what: it describes, with its article.
+
+    Raises:
+        InputError: it does not; names every mistake.
+    """
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        wrong = "; ".join(_mistake(found) for found in error.errors())
+        raise InputError(f"{path} does not describe {what}: {wrong}.") from None
+
+
+def _mistake(found: ErrorDetails) -> str:
+    where = ".".join(map(str, found["loc"]))
+    if found["type"] == "extra_forbidden":
+        return f"{where}: no such key"
+    if found["type"] == "value_error":  # a sentence of ours, which says what was given if it may
+        return f"{where}: {found.get('ctx', {})['error']}".removeprefix(": ")
+    return f"{where}: {found['msg'].lower()}, got {found['input']!r}"
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML in which nothing is said twice, as one of the two would go unheard."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [key.value for key, _ in node.value]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise yaml.YAMLError(f"{key!r} is said more than once")
+        return super().construct_mapping(node, deep)
