@@ -17,7 +17,7 @@ from ..agent.service import Service
 from ..agent.store.places import data_folder, store_at
 from ..tools.context import Context, Settings
 from ..tools.errors import InputError
-from ..tools.perception.image import Picture, load_picture
+from ..tools.perception.image import Picture
 from ..tools.store import read_text
 from . import arguments
 from . import options as o
@@ -27,9 +27,9 @@ from .chat_display import Display
 from .chat_keyboard import ask_plainly, lines_piped
 from .chat_lines import Talk
 from .chat_terminal import converse, run_script
+from .given import picture_given, settings_given
 from .run_display import at_terminal
 from .run_files import Folder
-from .starts import starts as read_starts
 from .terminal import say
 from .terminal_picture import way_of_terminal
 from .window import watching
@@ -81,17 +81,17 @@ def chat(
     fleet: o.FleetName = "simulated",
     starts: o.Starts = None,
     metres_per_pixel: o.MetresPerPixel = None,
+    camera: o.Camera = None,
+    calibration: o.CalibrationFile = None,
     robot_radius: o.Radius = None,
     clearance: o.Clearance = None,
     seed: o.Seed = "0",
 ) -> None:
     """Talk to the team: what it shall do, changes, questions; /help says what else."""
-    picture, lengths = image and load_picture(image), (metres_per_pixel, robot_radius, clearance)
-    fixed = arguments.numbers(robots, *lengths, threshold, seed, picture)
-    fixed |= {"descriptor": arguments.descriptor(descriptor), "starts": read_starts(starts)}
-    fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
+    picture = picture_given(ctx.params)
+    settings = settings_given(ctx.params, picture)
     things = _in_order(ctx, arguments.shown((point, box, outline, target), mask, picture))
-    begin = Beginning(picture, session, things, arguments.kept_out(keep_out), Settings(**fixed))
+    begin = Beginning(picture, session, things, arguments.kept_out(keep_out), settings)
     rules, (lines, display) = _rules(policy, auto, plan_only), _front(script, as_json, plain)
     chosen = partial(_agent, (planner, base_url, prompt, prompts, limit, rules), display, lines)
     with chosen(model) as agent, Folder(out) as home, watching(watch, stays=False) as services:

@@ -12,16 +12,27 @@ from ..agent.outcomes import Answered, Paused
 from ..agent.session import load_run, prompt_name
 from ..agent.store.folder import log_path, read_events
 from ..prompts import PromptLibrary
-from ..tools.context import Settings
 from ..tools.errors import InputError
 from ..tools.perception.image import load_picture
-from . import arguments, chat, deploy, doctor, evaluate, prompts, serve, sessions, tools, trace
+from . import (
+    arguments,
+    calibrate,
+    chat,
+    deploy,
+    doctor,
+    evaluate,
+    prompts,
+    serve,
+    sessions,
+    tools,
+    trace,
+)
 from . import fleet as fleet_commands
 from . import options as o
 from .agents import agent_of, tracer_of_environment
+from .given import picture_and_words, settings_given
 from .mcp.command import mcp
 from .run_files import Folder, write_files
-from .starts import starts as read_starts
 from .stated import decided
 from .terminal import say
 from .terminal_session import TerminalSession
@@ -59,8 +70,9 @@ def formup(
 
 @app.command()
 def run(
-    image: o.Image,
-    instruction: o.Instruction,
+    ctx: typer.Context,
+    image: o.ImageOrWords = None,
+    instruction: o.Instruction = None,
     robots: o.Robots = None,
     point: o.Points = None,
     box: o.Boxes = None,
@@ -90,23 +102,21 @@ def run(
     fleet: o.FleetName = "simulated",
     starts: o.Starts = None,
     metres_per_pixel: o.MetresPerPixel = None,
+    camera: o.Camera = None,
+    calibration: o.CalibrationFile = None,
     robot_radius: o.Radius = None,
     clearance: o.Clearance = None,
     seed: o.Seed = "0",
 ) -> None:
     """Carry out an instruction on a picture."""
-    picture, keep = load_picture(image), arguments.recording(record)
-    lengths = metres_per_pixel, robot_radius, clearance
-    fixed = arguments.numbers(robots, *lengths, threshold, seed, picture)
-    fixed |= {"descriptor": arguments.descriptor(descriptor), "starts": read_starts(starts)}
-    fixed |= {"detector": detector, "segmenter": segmenter, "fleet": fleet, "numbered": numbered}
-    settings = Settings(**fixed, may_deploy=not plan_only)
+    (picture, words), keep = picture_and_words(ctx.params), arguments.recording(record)
+    settings = settings_given(ctx.params, picture, may_deploy=not plan_only)
     given = arguments.shown((point, box, outline, target), mask, picture)
     things = arguments.numbered(given), arguments.kept_out(keep_out), settings
     who, said = decided(contract, *things, model=model, planner=planner, picture=picture)
     decider = agent_of(*who, base_url, prompt, prompts, limit, policy)
     with decider as agent, Folder(out) as home, watching(watch) as services:
-        made = agent.run(picture, instruction, trace=home.trace, services=services, **said)
+        made = agent.run(picture, words, trace=home.trace, services=services, **said)
         raise typer.Exit(TerminalSession(agent, home, as_json, keep, film).serve(made))
 
 
@@ -161,6 +171,7 @@ app.command(name="serve")(serve.serve)
 app.command(name="mcp")(mcp)
 app.add_typer(serve.tokens, name="tokens")
 app.command(name="deploy")(deploy.deploy)
+app.command(name="calibrate")(calibrate.calibrate)
 app.command(name="trace")(trace.show_trace)
 
 

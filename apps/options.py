@@ -7,8 +7,12 @@ import typer
 
 from .run_files import film_file, trajectory_file
 
-Image = Annotated[Path, typer.Argument(help="Picture of the place.", show_default=False)]
-Instruction = Annotated[str, typer.Argument(help="What to do, in your words.")]
+ImageOrWords = Annotated[
+    str | None, typer.Argument(metavar="IMAGE", help="Picture of the place; not with --camera.")
+]
+Instruction = Annotated[
+    str | None, typer.Argument(metavar="INSTRUCTION", help="What to do, in your words.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Robots = Annotated[str | None, typer.Option("-n", "--robots", help="How many, 1 to 10,000.")]
 Points = Annotated[
@@ -166,7 +170,8 @@ ResumeModel = Annotated[
     str | None, typer.Option("--model", help="Another than before, as in formup run.")
 ]
 ChatImage = Annotated[
-    Path | None, typer.Argument(help="Picture of the place; not needed with --session.")
+    Path | None,
+    typer.Argument(help="Picture of the place; not with --camera, nor needed with --session."),
 ]
 Script = Annotated[
     Path | None,
@@ -213,6 +218,14 @@ Starts = Annotated[
 MetresPerPixel = Annotated[
     str | None,
     typer.Option("--metres-per-pixel", help="Scale of a picture taken straight from above."),
+]
+Camera = Annotated[
+    str | None,
+    typer.Option("--camera", help="Takes the picture: the number of a device, a URL or a FILE."),
+]
+CalibrationFile = Annotated[
+    Path | None,
+    typer.Option("--calibration", help="Of the camera, by formup calibrate: shows its floor."),
 ]
 Radius = Annotated[
     str | None, typer.Option("--robot-radius", help="Radius of a robot: px, or such as 20cm.")

@@ -1,0 +1,234 @@
+"""Where on the floor the pixels of a camera are, as `formup calibrate` has measured it.
+
+Once the lens is accounted for, a floor is seen by a homography. What is seen above the floor seems
+further from the camera's foot, by as much as it is high: that takes only where the camera is.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from io import BytesIO
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from PIL import Image
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ...errors import InputError
+from ...geometry.outline import FloatArray
+from ...yaml_files import content_of, validated
+from ..geotiff import Georeference
+from ..image import MAX_PIXELS, MAX_SIDE, MIN_SIDE, Picture, picture_from_bytes
+
+Floats = NDArray[np.floating[Any]]
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+Row = tuple[Number, Number, Number]
+Matrix = tuple[Row, Row, Row]
+Metres = Annotated[float, Field(ge=-10_000, le=10_000)]
+Place = tuple[Metres, Metres]
+Side = Annotated[int, Field(ge=MIN_SIDE, le=MAX_SIDE)]
+PRECISE = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-9)
+BORDER = 40
+"""Points of a side of the floor that have to be in the picture."""
+
+
+class Part(BaseModel):
+    """What files about cameras hold; they take no keys that they do not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Residuals(Part):
+    """How far off known points are, in the picture and on the floor.
+
+    Attributes:
+        corners_mm: by how much the floor's corners would be off, if pixels were by as much as known
+            points are; the more, the less of the floor what is known covers.
+    """
+
+    mean_px: float
+    worst_px: float
+    mean_mm: float
+    worst_mm: float
+    corners_mm: float
+
+
+class Lens(Part):
+    """How a camera's lens bends what it sees; as of OpenCV.
+
+    Attributes:
+        camera_matrix: px.
+        distortion: k1, k2, p1, p2 and so on; none for none.
+    """
+
+    camera_matrix: Matrix
+    distortion: tuple[Number, ...] = Field(default=(), max_length=14)
+
+    def straightened(self, pixels: FloatArray) -> FloatArray:
+        """Where (n, 2) px would be without the distortion."""
+        if not self.distortion or not len(pixels):
+            return pixels
+        matrix, bent = np.array(self.camera_matrix), np.array(self.distortion)
+        found = cv2.undistortImagePoints(pixels.reshape(-1, 1, 2), matrix, bent, arg1=PRECISE)
+        return np.asarray(found, dtype=float).reshape(-1, 2)
+
+    def bent(self, pixels: FloatArray) -> FloatArray:
+        """Where (n, 2) px without distortion are in the picture."""
+        if not self.distortion or not len(pixels):
+            return pixels
+        matrix, none = np.array(self.camera_matrix), np.zeros(3)
+        rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(matrix).T
+        found, _ = cv2.projectPoints(rays, none, none, matrix, np.array(self.distortion))
+        return np.asarray(found, dtype=float).reshape(-1, 2)
+
+
+class Calibration(Part):
+    """A camera above a floor.
+
+    Attributes:
+        picture: its width and height, px.
+        homography: from the picture without distortion, px, to the floor, m.
+        lens: None for one that does not bend anything.
+        camera: where it is, m: on the floor, and how high above it; None where nobody knows.
+        floor: x0, y0, x1, y1 of what the top view shows, m.
+        metres_per_pixel: of the top view.
+        residuals: of the known points it was made from.
+    """
+
+    picture: tuple[Side, Side]
+    homography: Matrix
+    lens: Lens | None = None
+    camera: tuple[Metres, Metres, Annotated[float, Field(gt=0, le=10_000)]] | None = None
+    floor: tuple[Metres, Metres, Metres, Metres]
+    metres_per_pixel: Annotated[float, Field(gt=0, le=1_000)]
+    residuals: Residuals
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        x0, y0, x1, y1 = self.floor
+        if not (x0 < x1 and y0 < y1):
+            raise ValueError(f"floor is x0, y0, x1, y1 with x0 < x1 and y0 < y1, got {self.floor}")
+        width, height = self.size
+        if min(width, height) < MIN_SIDE or width * height > MAX_PIXELS:
+            raise ValueError(f"the floor would be shown in {width} x {height} pixels")
+        if abs(np.linalg.det(np.array(self.homography))) < 1e-15:
+            raise ValueError("homography takes the picture to a line, not to a floor")
+        if not self.sees(_around(self.floor)).all():
+            raise ValueError(
+                f"the floor {x0:g}, {y0:g} to {x1:g}, {y1:g} m is not all in the picture: give one "
+                "that is, as `floor: [x0, y0, x1, y1]`"
+            )
+        return self
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the top view, px."""
+        x0, y0, x1, y1 = self.floor
+        return round((x1 - x0) / self.metres_per_pixel), round((y1 - y0) / self.metres_per_pixel)
+
+    @property
+    def y_up(self) -> bool:
+        """Whether y points up in the top view, which is never a mirror image."""
+        return bool(np.linalg.det(np.array(self.homography)) < 0)
+
+    @cached_property
+    def to_top(self) -> FloatArray:
+        """(3, 3), from the floor, m, to the top view, px."""
+        x0, y0, _, y1 = self.floor
+        m = self.metres_per_pixel
+        down = (0, -1 / m, y1 / m - 0.5) if self.y_up else (0, 1 / m, -y0 / m - 0.5)
+        return np.array([(1 / m, 0, -x0 / m - 0.5), down, (0, 0, 1)])
+
+    def on_floor(self, pixels: FloatArray, height: float = 0.0) -> FloatArray:
+        """(n, 2) m of what is seen at (n, 2) px, and is so high above the floor, m.
+
+        Raises:
+            InputError: it is, and where the camera is is not known.
+        """
+        straight = pixels if self.lens is None else self.lens.straightened(pixels)
+        found = through(np.array(self.homography), straight)
+        if not height:
+            return found
+        if self.camera is None:
+            raise InputError(
+                "What is above the floor cannot be located, as the calibration does not say where "
+                "the camera is; calibrate with `camera: [x, y, height]` or a lens file."
+            )
+        x, y, above = self.camera
+        return found + (np.array([x, y]) - found) * height / above
+
+    def in_picture(self, places: FloatArray) -> FloatArray:
+        """(n, 2) px where (n, 2) m of the floor are seen."""
+        straight = through(np.linalg.inv(np.array(self.homography)), places)
+        return straight if self.lens is None else self.lens.bent(straight)
+
+    def sees(self, places: FloatArray) -> NDArray[np.bool_]:
+        """(n,), whether the camera sees (n, 2) m of the floor."""
+        back = np.linalg.inv(np.array(self.homography))
+        ahead = np.column_stack([places, np.ones(len(places))]) @ back[2] > 0
+        at = self.in_picture(places)
+        inside = ((at > -0.5) & (at < np.array(self.picture) - 0.5)).all(axis=1)
+        # Far out, what a lens model bends comes back into the picture.
+        again = np.abs(self.on_floor(at) - places).max(axis=1) < self.metres_per_pixel
+        return ahead & inside & again
+
+    def top_view(self, picture: Picture, source: str) -> Picture:
+        """The floor from straight above, with its scale.
+
+        Args:
+            source: of the calibration, for the note.
+
+        Raises:
+            InputError: the picture has another size than the camera's.
+        """
+        if picture.size != self.picture:
+            (width, height), (w, h) = self.picture, picture.size
+            raise InputError(
+                f"{picture.name} has {w} x {h} pixels, but {source} is for {width} x {height}; "
+                "take it as the picture for that was taken, or calibrate anew."
+            )
+        columns, rows = np.meshgrid(*(np.arange(side, dtype=float) for side in self.size))
+        to_floor = np.asarray(np.linalg.inv(self.to_top), dtype=float)
+        floor = through(to_floor, np.column_stack([columns.ravel(), rows.ravel()]))
+        at = self.in_picture(floor).astype(np.float32).reshape(*rows.shape, 2)
+        seen = cv2.remap(picture.pixels, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
+        x0, y0, x1, y1 = self.floor
+        note = f"straight from above by {source}: x {x0:g} to {x1:g} m, y {y0:g} to {y1:g} m"
+        place = Georeference(to_floor, False, 0, self.metres_per_pixel, note)
+        file = BytesIO()
+        Image.fromarray(np.asarray(seen, np.uint8)).save(file, "PNG")
+        top = picture_from_bytes(file.getvalue(), f"{Path(picture.name).stem}-top.png")
+        return replace(top, place=place, notes=(note,))
+
+    def to_yaml(self) -> str:
+        """The file's content."""
+        return yaml.safe_dump(
+            self.model_dump(mode="json"), default_flow_style=None, sort_keys=False
+        )
+
+
+def read_calibration(path: Path) -> Calibration:
+    """What `formup calibrate` wrote.
+
+    Raises:
+        InputError: it cannot be read, or is no calibration; names every mistake.
+    """
+    content = content_of(path, "picture: [1280, 720]")
+    return validated(path, "a camera above a floor", Calibration, content)
+
+
+def through(matrix: Floats, points: FloatArray) -> FloatArray:
+    """(n, 2) points through a homography."""
+    found = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    return found[:, :2] / found[:, 2:]
+
+
+def _around(floor: tuple[float, float, float, float]) -> FloatArray:
+    """(n, 2) m on the border of a floor."""
+    x0, y0, x1, y1 = floor
+    x, y = np.linspace(x0, x1, BORDER), np.linspace(y0, y1, BORDER)
+    sides = [(x, np.full(BORDER, y0)), (x, np.full(BORDER, y1)), (np.full(BORDER, x0), y)]
+    return np.vstack([np.column_stack(side) for side in (*sides, (np.full(BORDER, x1), y))])

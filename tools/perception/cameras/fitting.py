@@ -1,0 +1,173 @@
+"""Fits the homography of a floor to points that are known on it; refuses what does not fit."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...geometry.outline import FloatArray
+from ...yaml_files import validated
+from .calibration import Calibration, Lens, Residuals, through
+from .known import Known, read_lens
+
+LARGE = 0.005
+"""Share of the picture's diagonal by which a known point may be off."""
+UNSURE = 0.01
+"""Share of the floor's diagonal by which its corners may be off, with pixels off by"""
+CLICK = 0.1
+"""so many px at least."""
+FLAT = 0.02
+"""Points whose spread across a line is a smaller share of that along it are on the line."""
+
+
+def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibration:
+    """The calibration of the camera that took a picture, (H, W, 3) RGB.
+
+    Args:
+        path: of the file that says what is known, for messages.
+
+    Raises:
+        InputError: too few points, points on a line or off what the others say, or a floor that is
+            not all in the picture; names the points.
+    """
+    size = pixels.shape[1], pixels.shape[0]
+    names, at, floor = known.found(pixels)
+    lens = None if known.lens is None else read_lens(known.lens, size)
+    _check_points(names, at, floor, size)
+    straight = at if lens is None else lens.straightened(at)
+    matrix = _fitted(straight, floor)
+    off = _off(matrix, straight, floor)
+    _check_fit(names, straight, floor, off, LARGE * math.hypot(*size))
+    if not (_depths(matrix, straight) > 0).all():
+        raise InputError(
+            "These points would have the floor beyond the horizon: two of them are given each "
+            "other's place; see which pixel goes with which place."
+        )
+    x0, y0, x1, y1 = rectangle = known.floor or _reach(floor)
+    corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    mm = 1000 * np.linalg.norm(through(matrix, straight) - floor, axis=1)
+    values = {
+        "picture": size,
+        "homography": matrix.tolist(),
+        "lens": lens,
+        "camera": known.camera or (None if lens is None else _camera(matrix, lens)),
+        "floor": rectangle,
+        "metres_per_pixel": _scale(matrix, corners.mean(axis=0)),
+        "residuals": Residuals(
+            mean_px=off.mean(),
+            worst_px=off.max(),
+            mean_mm=mm.mean(),
+            worst_mm=mm.max(),
+            corners_mm=_at_corners(straight, floor, corners, max(float(off.mean()), CLICK)),
+        ),
+    }
+    return validated(path, "a floor that can be used", Calibration, values)
+
+
+def _reach(floor: FloatArray) -> tuple[float, ...]:
+    """x0, y0, x1, y1 of the known places, m."""
+    return tuple(np.concatenate([floor.min(axis=0), floor.max(axis=0)]).tolist())
+
+
+def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, noise: float) -> float:
+    """By how much places, (4, 2) m, are off where pixels are, mm.
+
+    Raises:
+        InputError: by too much.
+    """
+    rng, size = np.random.default_rng(0), float(np.linalg.norm(corners[2] - corners[0]))
+    at = through(np.linalg.inv(_fitted(pixels, floor)), corners)
+    tries = [_fitted(pixels + rng.normal(0, noise, pixels.shape), floor) for _ in range(30)]
+    off = np.linalg.norm([through(matrix, at) - corners for matrix in tries], axis=2)
+    worst = float(off.mean(axis=0).max())
+    if worst > UNSURE * size:
+        raise InputError(
+            f"A corner of the floor may be off by {1000 * worst:.0f} mm, as what is known covers "
+            "too little of it; lay out more points, or a larger board, further apart."
+        )
+    return 1000 * worst
+
+
+def _fitted(pixels: FloatArray, floor: FloatArray) -> FloatArray:
+    """(3, 3) from px to m, with which what is known is in front of the camera."""
+    found, _ = cv2.findHomography(pixels, floor, 0)
+    if np.shape(found) != (3, 3):
+        raise InputError("No view of a floor takes these points to these places; check them.")
+    matrix = np.asarray(found, dtype=float)
+    return matrix * np.sign(np.median(_depths(matrix, pixels)))
+
+
+def _depths(matrix: FloatArray, pixels: FloatArray) -> FloatArray:
+    return np.column_stack([pixels, np.ones(len(pixels))]) @ matrix[2]
+
+
+def _off(matrix: FloatArray, pixels: FloatArray, floor: FloatArray) -> FloatArray:
+    """(n,) px by which points are off."""
+    return np.linalg.norm(through(np.linalg.inv(matrix), floor) - pixels, axis=1)
+
+
+def _check_points(
+    names: Sequence[str], pixels: FloatArray, floor: FloatArray, size: tuple[int, int]
+) -> None:
+    if len(names) < 4:
+        raise InputError(
+            f"{len(names)} points are known, and a floor takes four or more, far apart; five or "
+            "more show whether they are right."
+        )
+    inside = (pixels > -0.5) & (pixels < np.array(size) - 0.5)
+    if not inside.all():
+        named = ", ".join(name for name, both in zip(names, inside, strict=True) if not both.all())
+        raise InputError(
+            f"Point {named} is outside the picture of {size[0]} x {size[1]} pixels; give pixels of "
+            "this picture."
+        )
+    for points, where in ((pixels, "in the picture"), (floor, "on the floor")):
+        rest = (np.delete(points, i, axis=0) for i in range(len(points)))
+        spreads = [np.linalg.svd(p - p.mean(axis=0), compute_uv=False) for p in (points, *rest)]
+        if any(across <= FLAT * along for along, across in spreads):
+            raise InputError(
+                f"All points, or all but one, are on one line {where}; give four of which no three "
+                "are, such as the corners of the floor."
+            )
+
+
+def _check_fit(
+    names: Sequence[str], pixels: FloatArray, floor: FloatArray, off: FloatArray, limit: float
+) -> None:
+    """Refuse points that are off; where one of six or more is to blame, that one is named."""
+    if off.max() <= limit:
+        return
+    worst = [i for i in np.argsort(-off) if off[i] > limit]
+    if len(names) >= 6:
+        for i in range(len(names)):
+            rest = np.delete(pixels, i, axis=0), np.delete(floor, i, axis=0)
+            matrix = _fitted(*rest)
+            if _off(matrix, *rest).max() <= limit:
+                worst, off = [i], _off(matrix, pixels, floor)
+                break
+    told = ", ".join(f"{names[i]} by {off[i]:.1f} px" for i in worst[:10])
+    raise InputError(
+        f"Points do not fit one flat floor: {told}, and {limit:.1f} px are allowed; measure these "
+        "anew, or give a lens file if straight lines are bent in the picture."
+    )
+
+
+def _camera(matrix: FloatArray, lens: Lens) -> tuple[float, float, float]:
+    """Where the camera is above the floor, m."""
+    axes = np.linalg.inv(matrix @ np.array(lens.camera_matrix))
+    axes *= np.sign(axes[2, 2]) * 2 / (np.linalg.norm(axes[:, 0]) + np.linalg.norm(axes[:, 1]))
+    turn = np.column_stack([axes[:, :2], np.cross(axes[:, 0], axes[:, 1])])
+    left, _, right = np.linalg.svd(turn)
+    x, y, z = (-(left @ right).T @ axes[:, 2]).tolist()
+    return x, y, abs(z)
+
+
+def _scale(matrix: FloatArray, middle: FloatArray) -> float:
+    """Metres to a pixel at a place of the floor, (2,) m, to two digits."""
+    at = through(np.linalg.inv(matrix), middle[None])
+    area = abs(np.linalg.det(matrix)) / abs(_depths(matrix, at)[0]) ** 3
+    return float(f"{math.sqrt(area):.2g}")
