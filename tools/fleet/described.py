@@ -91,7 +91,11 @@ def wire_settings(path: Path) -> WireSettings:
     if found is None:
         kinds = " or ".join(f"`fleet: {kind}`" for kind in WIRES)
         raise InputError(f"{path} describes no robots elsewhere; begin it with {kinds}.")
-    return validated(path, "a fleet", found, content)
+    settings = validated(path, "a fleet", found, content)
+    if isinstance(settings, MqttSettings) and settings.camera is not None:
+        camera, frame = settings.camera.beside(path.parent)
+        return settings.model_copy(update={"camera": camera, "frame": frame})
+    return settings
 
 
 def described_as(kind: type[Elsewhere], path: Path) -> Elsewhere:

@@ -5,6 +5,7 @@ import time
 
 from ..wire.checkup import checkup
 from ..wire.poses import Poses
+from ..wire.tagged import TagWatch
 from .link import Link
 from .messages import pose_message
 from .settings import MqttSettings
@@ -22,12 +23,17 @@ def checked(settings: MqttSettings, seconds: float) -> tuple[list[str], bool]:
         robot = settings.robot_of(topic, topics.pose)
         if robot is None:
             others.add(settings.robot_of(topic, topics.goal) or "")
-        else:
+        elif settings.camera is None:
             poses.heard(robot, pose_message(payload), time.monotonic())
 
     listened = [pattern.replace("{robot}", "+") for pattern in (topics.pose, topics.goal)]
     link, guard = Link(settings.address, listened, heard), guarded(settings.address[2])
-    return checkup(settings, link, poses, others, seconds, guard)
+    watch = settings.camera and TagWatch(settings.camera, poses)
+    try:
+        return checkup(settings, link, poses, others, seconds, guard)
+    finally:
+        if watch is not None:
+            watch.close()
 
 
 def guarded(secure: bool) -> str:

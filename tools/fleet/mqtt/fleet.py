@@ -1,5 +1,6 @@
 """The fleet of robots that speak plain JSON over MQTT."""
 
+import asyncio
 import json
 import time
 from collections.abc import Mapping
@@ -7,6 +8,7 @@ from collections.abc import Mapping
 from ..described import described_as
 from ..protocol import FleetRequest
 from ..wire.fleet import Point, Reason, WireFleet
+from ..wire.tagged import TagWatch
 from .link import Link
 from .messages import pose_message
 from .settings import MqttSettings
@@ -29,6 +31,7 @@ class MqttFleet(WireFleet):
         super().__init__(settings)
         self._topics, self._robot_of = settings.topics, settings.robot_of
         patterns = (self._topics.pose, self._topics.goal)
+        self._watch = settings.camera and TagWatch(settings.camera, self.poses)
         listened = [*(p.replace("{robot}", "+") for p in patterns), self._topics.hold]
         will = self._topics.hold, _holding("gone"), False
         self.link = self._link = Link(
@@ -45,9 +48,16 @@ class MqttFleet(WireFleet):
         """Tell all robots to hold; see `WireFleet.hold`."""
         self._link.say(self._topics.hold, _holding(reason), surely=True)
 
+    async def close(self) -> None:
+        """Let go of broker and camera; see `WireFleet.close`."""
+        await super().close()
+        if self._watch is not None:
+            await asyncio.to_thread(self._watch.close)
+
     def _heard(self, topic: str, payload: bytes) -> None:
         if (robot := self._robot_of(topic, self._topics.pose)) is not None:
-            self.poses.heard(robot, pose_message(payload), time.monotonic())
+            if self._watch is None:
+                self.poses.heard(robot, pose_message(payload), time.monotonic())
         elif topic != self._topics.hold or payload in OF_PROGRAMS:
             self.saw_others()
         else:  # a person stopped the robots elsewhere
@@ -58,7 +68,10 @@ def open_fleet(request: FleetRequest) -> MqttFleet:
     """The robots of the file that was given.
 
     Raises:
-        InputError: it does not describe robots on MQTT.
+        InputError: it does not describe robots on MQTT, or its camera has not seen the picture.
     """
     assert request.config is not None  # see `fleet_named`
-    return MqttFleet(described_as(MqttSettings, request.config))
+    settings = described_as(MqttSettings, request.config)
+    if settings.camera is not None:
+        settings.camera.check_seen(request.size)
+    return MqttFleet(settings)

@@ -39,7 +39,7 @@ def checkup(
     finally:
         link.close()
     now = time.monotonic()
-    told = [f"{where} is reachable{guard}."]
+    told = [f"{where} is reachable{guard}.{poses.trouble}"]
     robots = [_robot_told(settings, poses, robot, now, begun) for robot in settings.robots]
     told += [sentence for sentence, _ in robots]
     if poses.unknown:

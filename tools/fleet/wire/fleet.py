@@ -228,7 +228,7 @@ class WireFleet(ABC):
     def _check_seen(self, limit: float) -> None:
         old = self.poses.old(time.monotonic(), limit)
         if old:
-            told = " ".join([*old.values()][:MOST_TOLD])
+            told = " ".join([*old.values()][:MOST_TOLD]) + self.poses.trouble
             raise StalePosesError(
                 f"{told} Nothing is driven while a robot is not seen: see to it ({len(old)} of "
                 f"{len(self.settings.robots)}), or take those that are away out of the file.",

@@ -71,6 +71,7 @@ class Poses:
 
     Attributes:
         unknown: robots that spoke and are none of the fleet's, a few of them.
+        trouble: why nothing is seen, as a sentence after a blank; empty where nothing is wrong.
     """
 
     def __init__(self, settings: WireSettings) -> None:
@@ -78,6 +79,7 @@ class Poses:
         self._reach = JUMP_FACTOR * settings.pixels(settings.speed)
         self._tracks = {robot: Track() for robot in settings.robots}
         self.unknown: set[str] = set()
+        self.trouble = ""
 
     @property
     def tracks(self) -> Mapping[str, Track]:

@@ -7,11 +7,9 @@ that is unplugged. So a thread reads all the time, and whoever asks is never kep
 import re
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -37,22 +35,6 @@ class CameraError(InputError):
     """A camera that does not show what is there now; the text says why."""
 
 
-class Capture(Protocol):
-    """What is read of `cv2.VideoCapture`."""
-
-    def isOpened(self) -> bool:  # noqa: N802
-        """Whether there is a camera."""
-        ...
-
-    def read(self) -> tuple[bool, Any]:
-        """Whether there was a frame, and it, (H, W, 3) BGR uint8."""
-        ...
-
-    def release(self) -> None:
-        """Let go of it."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Frame:
     """What a camera saw.
@@ -70,14 +52,15 @@ class Camera:
     """Reads a camera until it is closed.
 
     Args:
-        source: the number of a device, or the URL of a stream, or a video file.
-        opened: opens it; OpenCV does, if left out.
+        source: the number of a device, the URL of a stream, or a video file.
+
+    Attributes:
+        name: it, without who logs in.
     """
 
-    def __init__(self, source: str, opened: Callable[[], Capture] | None = None) -> None:
-        self.name = re.sub("//[^/@]*@", "//", source)  # without who logs in
+    def __init__(self, source: str) -> None:
+        self.name, self._source = re.sub("//[^/@]*@", "//", source), source
         self._pause = 1 / 30 if Path(source).is_file() else 0.0
-        self._opened = opened or (lambda: _opened(source))
         self._newest: Frame | None = None
         self._changed = self._begun = time.monotonic()
         self._count, self._over = 0, ""
@@ -116,7 +99,7 @@ class Camera:
         ends = self._begun + OPENING
         while not self._over and time.monotonic() < ends and self._count < WARM:
             time.sleep(PAUSE)
-        return self._newest or self.newest()
+        return (self._over and self._newest) or self.newest()  # a file of one frame is over soon
 
     def close(self) -> None:
         """Let go of the camera; a read that hangs is not waited for."""
@@ -125,26 +108,24 @@ class Camera:
         self._thread.join(CLOSING)
 
     def _read(self) -> None:
-        try:
-            capture = self._opened()
-            if not capture.isOpened():
-                raise ValueError
-        except (cv2.error, ValueError):
-            self._end("cannot be opened; give the number of a device such as 0, a URL or a file")
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        source = self._source
+        capture = cv2.VideoCapture(int(source)) if source.isdecimal() else cv2.VideoCapture(source)
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+        if not capture.isOpened():
+            self._over = "cannot be opened; give the number of a device such as 0, a URL or a file"
             return
         while not self._closed.wait(self._pause):
             ok, pixels = capture.read()
             if not ok:
-                self._end("gives no frames any more: it was unplugged, or its file is at its end")
+                self._over = "gives no frames any more: it was unplugged, or its file is at its end"
                 break
             seen, before = time.monotonic(), self._newest
             if before is None or not np.array_equal(before.pixels, pixels):
                 self._changed = seen
-            self._newest, self._count = Frame(pixels, seen), self._count + 1
+            self._newest = Frame(np.asarray(pixels, np.uint8), seen)
+            self._count += 1
         capture.release()
-
-    def _end(self, why: str) -> None:
-        self._over = self._over or why
 
 
 def picture_taken(source: str) -> Picture:
@@ -161,10 +142,3 @@ def picture_taken(source: str) -> Picture:
     file = BytesIO()
     Image.fromarray(frame.pixels[..., ::-1]).save(file, "PNG")
     return replace(picture_from_bytes(file.getvalue(), "camera.png"), notes=(f"by {camera.name}",))
-
-
-def _opened(source: str) -> Capture:
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    capture = cv2.VideoCapture(int(source)) if source.isdigit() else cv2.VideoCapture(source)
-    capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
-    return capture

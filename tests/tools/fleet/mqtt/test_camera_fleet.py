@@ -1,0 +1,251 @@
+"""Robots at a real broker that a camera sees: a drawn room, by where the stand-ins truly are."""
+
+import asyncio
+import math
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from formup.tools.draw.room import Room
+from formup.tools.errors import InputError
+from formup.tools.fleet.arrival import Arrival
+from formup.tools.fleet.assigning import assign_robots
+from formup.tools.fleet.deploy import deploy
+from formup.tools.fleet.mqtt.checkup import checked
+from formup.tools.fleet.mqtt.fleet import open_fleet
+from formup.tools.fleet.protocol import FleetRequest, Pose, points_of
+from formup.tools.formation.contract import Contract, Group
+from formup.tools.formation.plan import Plan, make_plan
+from formup.tools.formation.site import Site
+from formup.tools.geometry.outline import make_outline
+from formup.tools.perception.cameras.calibration import Calibration, Residuals, through
+
+ROOM = Room(picture=(960, 540), tag_size=0.12, tag_height=0.1, eye=(2.0, -0.4, 2.9), aim=(2, 1.4))
+TAGS = {"a": 4, "b": 7, "c": 11}
+EXACT = Residuals(mean_px=0, worst_px=0, mean_mm=0, worst_mm=0, corners_mm=0)
+rows: Any = ROOM.homography.tolist()
+SEEN = Calibration(
+    picture=ROOM.picture,
+    homography=rows,
+    camera=ROOM.eye,
+    floor=(0.2, 0.2, 3.8, 2.8),
+    metres_per_pixel=0.005,
+    residuals=EXACT,
+)
+MORE: dict[str, Any] = {
+    "speed": 0.5,
+    "radius": 0.06,
+    "tracking_error": 0.02,
+    "pose_timeout": 1.0,
+    "watchdog": 1.0,
+    "simulated": {"starts": [[0.6, 0.6], [0.6, 1.1], [0.6, 1.6]]},
+    "camera": {
+        "source": 0,
+        "calibration": "camera.yaml",
+        "tags": TAGS,
+        "tag_size": 0.12,
+        "tag_height": 0.1,
+    },
+}
+Labs = Callable[..., Any]
+
+
+class Drawn:
+    """In `cv2.VideoCapture`'s place: what a camera above the stand-ins sees, as it is now."""
+
+    def __init__(self) -> None:
+        self.lab: Any = None
+        self.covered = set[str]()
+        self.hangs, self.old, self.over = False, False, threading.Event()
+        self._n, self._last = 0, ROOM.frame({})
+
+    def __call__(self, source: int) -> "Drawn":
+        assert source == 0
+        return self
+
+    def isOpened(self) -> bool:  # noqa: N802
+        return True
+
+    def set(self, name: int, value: float) -> bool:
+        return True
+
+    def read(self) -> tuple[bool, np.ndarray]:
+        if self.hangs:
+            self.over.wait()
+        self.over.wait(0.03)
+        if self.lab is not None and not self.old:
+            floor = through(np.linalg.inv(SEEN.to_top), self.lab.robots.points)
+            poses = zip(TAGS, floor.tolist(), strict=True)
+            seen = {TAGS[r]: (x, y, 0.3) for r, (x, y) in poses if r not in self.covered}
+            self._n += 1
+            self._last = ROOM.frame(seen, thing=(2.4, 1.5, 0.2), seed=self._n)
+        return True, self._last
+
+    def release(self) -> None:
+        """Nothing is held."""
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    (tmp_path / "camera.yaml").write_text(SEEN.to_yaml())
+    camera = Drawn()
+    monkeypatch.setattr(cv2, "VideoCapture", camera)
+    yield camera
+    camera.over.set()
+
+
+def plan() -> tuple[Plan, Site]:
+    around = [(2.1, 1.3), (2.7, 1.3), (2.7, 1.7), (2.1, 1.7)]
+    outline = make_outline(through(SEEN.to_top, np.array(around)).tolist())
+    site = Site({"t1": outline}, *SEEN.size)
+    groups = (Group(relation="around", targets=("t1",), robots=3),)
+    return make_plan(Contract(groups=groups, robot_radius=12), site, "s"), site
+
+
+def deployed(lab: Any, act: Callable[[], object] = lambda: None) -> tuple[Arrival, Plan]:
+    """What comes of a deployment when something happens once robots are on their way."""
+    planned, site = plan()
+    begun: list[Pose] = []
+    done = False
+
+    def watch(poses: tuple[Pose, ...]) -> None:
+        nonlocal done
+        begun[:] = begun or poses
+        if not done and np.abs(points_of(poses) - points_of(begun)).max() > 20:
+            done = True
+            act()
+
+    async def go() -> Arrival:
+        fleet = lab.fleet()
+        try:
+            robots = assign_robots(await fleet.observe(), planned.formation.points).robots
+            return (await deploy(planned, site, fleet, robots, watch=watch)).arrival
+        finally:
+            await fleet.close()
+
+    return asyncio.run(go()), planned
+
+
+@pytest.fixture
+def there(lab: Labs, drawn: Drawn) -> Any:
+    made = lab(**MORE).simulate()
+    drawn.lab = made
+    return made
+
+
+def test_robots_arrive_by_what_the_camera_sees(there: Any) -> None:
+    arrival, planned = deployed(there)
+    assert arrival.arrived, arrival
+    off = there.robots.points[:, None] - planned.formation.points[None]
+    millimetres = 1000 * SEEN.metres_per_pixel * np.linalg.norm(off, axis=2).min(axis=1)
+    assert millimetres.max() < 10
+    assert 0 < max(arrival.residual_px) * SEEN.metres_per_pixel < 0.003  # as seen, not as said
+
+
+def test_poses_are_the_camera_s_and_not_what_robots_say(there: Any) -> None:
+    def elsewhere(message: dict[str, Any], n: int) -> dict[str, Any]:
+        return {**message, "x": 3.0, "y": 2.5}
+
+    there.robots.faults.update(b=elsewhere)
+
+    async def seen() -> tuple[Pose, ...]:
+        fleet = there.fleet()
+        try:
+            return await fleet.observe()
+        finally:
+            await fleet.close()
+
+    poses = asyncio.run(seen())
+    assert np.abs(points_of(poses) - there.robots.points).max() * SEEN.metres_per_pixel < 0.005
+    assert [pose.heading for pose in poses] == pytest.approx([-0.3] * 3, abs=math.radians(1))
+
+
+def hangs(drawn: Drawn) -> None:
+    drawn.hangs = True
+
+
+def hands_out_old_frames(drawn: Drawn) -> None:
+    drawn.old = True
+
+
+def has_b_covered(drawn: Drawn) -> None:
+    drawn.covered.add("b")
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (hangs, "Camera 0 has shown nothing for"),
+        (hands_out_old_frames, "Camera 0 has shown the very same picture"),
+        (has_b_covered, "Robot b not seen for"),
+    ],
+)
+def test_what_is_not_seen_is_not_driven(
+    there: Any, drawn: Drawn, fault: Callable[[Drawn], None], words: str
+) -> None:
+    arrival, _ = deployed(there, lambda: fault(drawn))
+    assert not arrival.arrived
+    assert words in (arrival.reason or "")
+    assert "b" in arrival.failed
+    before = there.robots.points.copy()
+    time.sleep(0.3)
+    assert np.abs(there.robots.points - before).max() < 0.5
+
+
+def test_a_camera_that_shows_nothing_is_named_by_the_check(lab: Labs, drawn: Drawn) -> None:
+    drawn.hangs = True
+    told, fit = checked(lab(**MORE).settings, 0.8)
+    assert not fit
+    assert "Camera 0 has shown nothing for" in told[0]
+
+
+def test_the_check_sees_robots_by_their_tags(there: Any) -> None:
+    told, fit = checked(there.settings, 1.5)
+    assert fit, told
+    assert "3 of 3 robots can be driven." in told
+
+
+def test_tags_of_another_size_are_not_believed(lab: Labs, drawn: Drawn) -> None:
+    drawn.lab = lab(**{**MORE, "camera": {**MORE["camera"], "tag_size": 0.2}}).simulate()
+    told, fit = checked(drawn.lab.settings, 1.0)
+    assert not fit
+    assert "The tag of robot a seems 0.120 m wide, and not 0.2 m." in told[0]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"tags": {"a": 4, "b": 7}}, "camera.tags takes every robot"),
+        ({"tags": {"a": 4, "b": 7, "c": 7}}, "a tag of its own"),
+        ({"dictionary": "DICT_3X3"}, "no such dictionary"),
+        ({"calibration": "none.yaml"}, "none.yaml cannot be read"),
+        ({"tag_height": 3.0}, "below the tags"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(
+    lab: Labs, drawn: Drawn, more: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        lab(**{**MORE, "camera": {**MORE["camera"], **more}})
+
+
+def test_the_frame_is_the_calibration_s(lab: Labs, drawn: Drawn) -> None:
+    with pytest.raises(InputError, match="frame is that of the camera's calibration"):
+        lab(**MORE, frame={"metres_per_pixel": 0.01})
+    frame = lab(**MORE).settings.frame
+    assert frame.to_picture(1.0, 2.0) == pytest.approx(
+        tuple(through(SEEN.to_top, np.array([(1.0, 2.0)]))[0])
+    )
+
+
+def test_a_picture_that_the_camera_has_not_seen_from_above_is_refused(
+    lab: Labs, drawn: Drawn
+) -> None:
+    made = lab(**MORE)
+    with pytest.raises(InputError, match="720 x 520"):
+        open_fleet(FleetRequest((640, 480), 3, config=made.path))
