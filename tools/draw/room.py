@@ -23,7 +23,7 @@ FINE = 2
 """Everything is drawn so many times as large, so that edges are smooth."""
 FLOOR_SCALE = 200
 """Pixels of the floor's texture to a metre."""
-CELL = 12
+CELL = 6
 """Pixels of a printed tag's cell."""
 MARGIN = 0.25
 """Share of its size that a picture without distortion reaches beyond one with it."""
