@@ -42,7 +42,7 @@ def calibrate(
     """
     if (known is None) == (not point):
         raise InputError("Give what is known of the floor: --known FILE, or four or more --point.")
-    given = Known(points=tuple(map(_point, point or ()))) if known is None else read_known(known)
+    given = Known(points=tuple(map(_clicked, point or ()))) if known is None else read_known(known)
     picture = picture_given(ctx.params)
     if picture is None:
         raise InputError("Give a picture of the floor, or --camera.")
@@ -64,7 +64,7 @@ def calibrate(
     say(f"written     {out}")
 
 
-def _point(text: str) -> KnownPoint:
+def _clicked(text: str) -> KnownPoint:
     pixel, _, floor = text.partition("=")
     try:
         return KnownPoint.model_validate({"pixel": pixel.split(","), "floor": floor.split(",")})

@@ -44,6 +44,7 @@ COMMANDS = [
 
 
 SHOWN = {
+    "formup calibrate": "written     camera.yaml",
     "formup run": "deployed:",
     "formup resume": "deployed:",
     "formup eval suites": "zerocap15",

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Self
 
-import cv2
 import numpy as np
 from pydantic import Field
 
@@ -118,8 +117,7 @@ class TagWatch:
                 f"{self._calibration.picture[0]} x {self._calibration.picture[1]}."
             )
             return
-        grey = np.asarray(cv2.cvtColor(frame.pixels, cv2.COLOR_BGR2GRAY), np.uint8)
-        seen, self._seq = tags_in(grey, self._settings.dictionary), self._seq + 1
+        seen, self._seq = tags_in(frame.pixels, self._settings.dictionary), self._seq + 1
         for robot, tag in self._settings.tags.items():
             if tag not in seen:
                 continue

@@ -40,7 +40,7 @@ def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibrati
     _check_points(names, at, floor, size)
     straight = at if lens is None else lens.straightened(at)
     matrix = _fitted(straight, floor)
-    off = _off(matrix, straight, floor)
+    off = _residuals(matrix, straight, floor)
     _check_fit(names, straight, floor, off, LARGE * math.hypot(*size))
     if not (_depths(matrix, straight) > 0).all():
         raise InputError(
@@ -56,7 +56,7 @@ def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibrati
         "lens": lens,
         "camera": known.camera or (None if lens is None else _camera(matrix, lens)),
         "floor": rectangle,
-        "metres_per_pixel": _scale(matrix, corners.mean(axis=0)),
+        "metres_per_pixel": _metres_per_pixel(matrix, corners.mean(axis=0)),
         "residuals": Residuals(
             mean_px=off.mean(),
             worst_px=off.max(),
@@ -105,7 +105,7 @@ def _depths(matrix: FloatArray, pixels: FloatArray) -> FloatArray:
     return np.column_stack([pixels, np.ones(len(pixels))]) @ matrix[2]
 
 
-def _off(matrix: FloatArray, pixels: FloatArray, floor: FloatArray) -> FloatArray:
+def _residuals(matrix: FloatArray, pixels: FloatArray, floor: FloatArray) -> FloatArray:
     """(n,) px by which points are off."""
     return np.linalg.norm(through(np.linalg.inv(matrix), floor) - pixels, axis=1)
 
@@ -146,8 +146,8 @@ def _check_fit(
         for i in range(len(names)):
             rest = np.delete(pixels, i, axis=0), np.delete(floor, i, axis=0)
             matrix = _fitted(*rest)
-            if _off(matrix, *rest).max() <= limit:
-                worst, off = [i], _off(matrix, pixels, floor)
+            if _residuals(matrix, *rest).max() <= limit:
+                worst, off = [i], _residuals(matrix, pixels, floor)
                 break
     told = ", ".join(f"{names[i]} by {off[i]:.1f} px" for i in worst[:10])
     raise InputError(
@@ -166,7 +166,7 @@ def _camera(matrix: FloatArray, lens: Lens) -> tuple[float, float, float]:
     return x, y, abs(z)
 
 
-def _scale(matrix: FloatArray, middle: FloatArray) -> float:
+def _metres_per_pixel(matrix: FloatArray, middle: FloatArray) -> float:
     """Metres to a pixel at a place of the floor, (2,) m, to two digits."""
     at = through(np.linalg.inv(matrix), middle[None])
     area = abs(np.linalg.det(matrix)) / abs(_depths(matrix, at)[0]) ** 3

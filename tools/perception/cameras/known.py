@@ -94,10 +94,10 @@ class Known(Part):
             names = [p.name or f"{p.pixel[0]:g},{p.pixel[1]:g}" for p in self.points]
             floor = np.array([p.floor for p in self.points])
             return names, np.array([p.pixel for p in self.points], dtype=float), floor
-        grey = np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), np.uint8)
         if self.board:
+            grey = np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY), np.uint8)
             return _on_board(grey, self.board)
-        seen = tags_in(grey, self.dictionary)
+        seen = tags_in(np.ascontiguousarray(pixels[..., ::-1]), self.dictionary)
         if missing := [str(tag) for tag in self.tags if tag not in seen]:
             others = ", ".join(map(str, sorted(seen))) or "none"
             raise InputError(

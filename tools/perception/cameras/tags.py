@@ -34,15 +34,16 @@ Dictionary = Annotated[str, AfterValidator(_known)]
 """What OpenCV calls a family of tags."""
 
 
-def tags_in(grey: NDArray[np.uint8], dictionary: Dictionary) -> dict[int, FloatArray]:
+def tags_in(pixels: NDArray[np.uint8], dictionary: Dictionary) -> dict[int, FloatArray]:
     """The tags of a picture that are there once.
 
     Args:
-        grey: (H, W).
+        pixels: (H, W, 3) BGR.
 
     Returns:
         by the tags' ids their corners, (4, 2) px, clockwise from the upper left of the print.
     """
+    grey = np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), np.uint8)
     family = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR

@@ -11,13 +11,16 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import yaml
 from formup.tools.draw.room import Room
 from formup.tools.errors import InputError
 from formup.tools.fleet.arrival import Arrival
 from formup.tools.fleet.assigning import assign_robots
 from formup.tools.fleet.deploy import deploy
+from formup.tools.fleet.described import described_as
 from formup.tools.fleet.mqtt.checkup import checked
 from formup.tools.fleet.mqtt.fleet import open_fleet
+from formup.tools.fleet.mqtt.settings import MqttSettings
 from formup.tools.fleet.protocol import FleetRequest, Pose, points_of
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import Plan, make_plan
@@ -26,6 +29,7 @@ from formup.tools.geometry.outline import make_outline
 from formup.tools.perception.cameras.calibration import Calibration, Residuals, through
 
 ROOM = Room(picture=(960, 540), tag_size=0.12, tag_height=0.1, eye=(2.0, -0.4, 2.9), aim=(2, 1.4))
+ROOT = Path(__file__).parents[4]
 TAGS = {"a": 4, "b": 7, "c": 11}
 EXACT = Residuals(mean_px=0, worst_px=0, mean_mm=0, worst_mm=0, corners_mm=0)
 rows: Any = ROOM.homography.tolist()
@@ -249,3 +253,13 @@ def test_a_picture_that_the_camera_has_not_seen_from_above_is_refused(
     made = lab(**MORE)
     with pytest.raises(InputError, match="720 x 520"):
         open_fleet(FleetRequest((640, 480), 3, config=made.path))
+
+
+def test_the_example_can_be_read_beside_a_calibration(drawn: Drawn, tmp_path: Path) -> None:
+    example = (ROOT / "examples/tagged.yaml").read_text("utf-8")
+    (tmp_path / "tagged.yaml").write_text(example)
+    settings = described_as(MqttSettings, tmp_path / "tagged.yaml")
+    assert settings.camera is not None
+    shown = (ROOT / "docs/cameras.md").read_text("utf-8").partition("```yaml\n")[2]
+    page = yaml.safe_load(shown.partition("```")[0])
+    assert page["camera"] == yaml.safe_load(example)["camera"]

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 from formup.tools.draw.room import Pose, Room
@@ -35,8 +34,7 @@ def calibration(room: Room) -> Calibration:
 
 
 def poses_seen(room: Room, robots: dict[int, Pose], seed: int) -> dict[int, Pose]:
-    grey = cv2.cvtColor(room.frame(robots, seed=seed), cv2.COLOR_BGR2GRAY)
-    found = tags_in(np.asarray(grey, np.uint8), room.dictionary)
+    found = tags_in(room.frame(robots, seed=seed), room.dictionary)
     known = calibration(room)
     corners = {tag: known.on_floor(seen, room.tag_height) for tag, seen in found.items()}
     return {
@@ -71,8 +69,8 @@ def test_without_its_height_a_tag_seems_further_off() -> None:
     robots: dict[int, Pose] = {3: (3.5, 2.5, 0.0)}
     x, y, _ = poses_seen(replace(ABOVE, tag_height=0.1), robots, 0)[3]
     assert math.hypot(x - 3.5, y - 2.5) < 0.003
-    grey = np.asarray(cv2.cvtColor(ABOVE.frame(robots), cv2.COLOR_BGR2GRAY), np.uint8)
-    flat = calibration(ABOVE).on_floor(tags_in(grey, ABOVE.dictionary)[3]).mean(axis=0)
+    corners = tags_in(ABOVE.frame(robots), ABOVE.dictionary)[3]
+    flat = calibration(ABOVE).on_floor(corners).mean(axis=0)
     assert math.dist(flat, (3.5, 2.5)) > 0.05
 
 
@@ -87,10 +85,8 @@ def test_a_tag_that_is_there_twice_is_not_seen() -> None:
     x, y = ABOVE.seen_at(np.array([(1.0, 1.0, 0.1)]))[0].round().astype(int)
     twice = one.copy()
     twice[y + 80 : y + 130, x - 25 : x + 25] = one[y - 25 : y + 25, x - 25 : x + 25]
-    grey = np.asarray(cv2.cvtColor(twice, cv2.COLOR_BGR2GRAY), np.uint8)
-    assert set(tags_in(grey, ABOVE.dictionary)) == {4}
+    assert set(tags_in(twice, ABOVE.dictionary)) == {4}
 
 
 def test_nothing_is_seen_on_an_empty_floor() -> None:
-    grey = np.asarray(cv2.cvtColor(ABOVE.frame({}), cv2.COLOR_BGR2GRAY), np.uint8)
-    assert tags_in(grey, ABOVE.dictionary) == {}
+    assert tags_in(ABOVE.frame({}), ABOVE.dictionary) == {}
