@@ -109,8 +109,8 @@ class Camera:
 
     def _read(self) -> None:
         cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-        source = self._source
-        capture = cv2.VideoCapture(int(source)) if source.isdecimal() else cv2.VideoCapture(source)
+        source, device = self._source, re.fullmatch("[0-9]{1,3}", self._source)
+        capture = cv2.VideoCapture(int(source)) if device else cv2.VideoCapture(source)
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
         if not capture.isOpened():
             self._over = "cannot be opened; give the number of a device such as 0, a URL or a file"

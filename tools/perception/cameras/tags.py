@@ -89,5 +89,8 @@ def _refined(grey: NDArray[np.uint8], corners: FloatArray) -> FloatArray:
         reach = (normals * middles).sum(axis=1)
         pairs = np.stack([np.roll(normals, 1, axis=0), normals], axis=1)
         reaches = np.stack([np.roll(reach, 1), reach], axis=1)[..., None]
-        corners = np.asarray(np.linalg.solve(pairs, reaches)[..., 0], dtype=float)
+        met = np.asarray(np.linalg.pinv(pairs) @ reaches, dtype=float)[..., 0]
+        if np.abs(met - corners).max() > 2 * REACH:  # something lies across a side
+            return corners
+        corners = met
     return corners

@@ -135,7 +135,9 @@ def test_a_camera_that_is_not_there(device: Device) -> None:
         picture_taken("7")
 
 
-@pytest.mark.parametrize("source", ["none.avi", "http://127.0.0.1:1/stream.mjpg", "250"])
+@pytest.mark.parametrize(
+    "source", ["none.avi", "http://127.0.0.1:1/stream.mjpg", "250", "9" * 40, ""]
+)
 def test_opencv_s_own_refusals(source: str, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(CameraError, match="cannot be opened"):
         picture_taken(source)
