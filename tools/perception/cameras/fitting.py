@@ -47,7 +47,7 @@ def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibrati
             "These points would have the floor beyond the horizon: two of them are given each "
             "other's place; see which pixel goes with which place."
         )
-    x0, y0, x1, y1 = rectangle = known.floor or _reach(floor)
+    x0, y0, x1, y1 = rectangle = known.floor or (*floor.min(axis=0), *floor.max(axis=0))
     corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
     mm = 1000 * np.linalg.norm(through(matrix, straight) - floor, axis=1)
     values = {
@@ -66,11 +66,6 @@ def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibrati
         ),
     }
     return validated(path, "a floor that can be used", Calibration, values)
-
-
-def _reach(floor: FloatArray) -> tuple[float, ...]:
-    """x0, y0, x1, y1 of the known places, m."""
-    return tuple(np.concatenate([floor.min(axis=0), floor.max(axis=0)]).tolist())
 
 
 def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, noise: float) -> float:

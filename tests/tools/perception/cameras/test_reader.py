@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -149,6 +150,46 @@ def test_who_logs_in_is_not_told(device: Device) -> None:
     with pytest.raises(CameraError, match=r"Camera rtsp://10\.0\.0\.9/top cannot") as refusal:
         picture_taken("rtsp://me:secret@10.0.0.9/top")
     assert "secret" not in str(refusal.value)
+
+
+class Stream(BaseHTTPRequestHandler):
+    """A network camera: JPEG after JPEG, until `over` is set."""
+
+    over = threading.Event()
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
+        self.end_headers()
+        for n in range(10_000):
+            pixels = np.full((96, 160, 3), (10, n % 200, 200), np.uint8)
+            data = cv2.imencode(".jpg", pixels)[1].tobytes()
+            head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
+            try:
+                self.wfile.write(head.encode() + data + b"\r\n")
+            except OSError:
+                return  # the camera was let go of
+            if self.over.wait(0.02):
+                self.over = threading.Event()
+                self.over.wait(10)  # says nothing more, with the line open
+                return
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing."""
+
+
+def test_a_stream_that_stops_is_refused() -> None:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Stream) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+        camera = Camera(f"http://127.0.0.1:{server.server_address[1]}/top.mjpg")
+        try:
+            assert camera.first().pixels.shape == (96, 160, 3)
+            Stream.over.set()
+            refused(camera, "has shown nothing for")
+        finally:
+            camera.close()
+            server.shutdown()
 
 
 def test_a_video_file_is_a_camera(tmp_path: Path) -> None:
