@@ -31,12 +31,13 @@ class MqttFleet(WireFleet):
         super().__init__(settings)
         self._topics, self._robot_of = settings.topics, settings.robot_of
         patterns = (self._topics.pose, self._topics.goal)
-        self._watch = settings.camera and TagWatch(settings.camera, self.poses)
+        self._camera = settings.camera
         listened = [*(p.replace("{robot}", "+") for p in patterns), self._topics.hold]
         will = self._topics.hold, _holding("gone"), False
         self.link = self._link = Link(
             settings.address, listened, self._heard, will=will, left=self.poses.forget
         )
+        self._watch = self._camera and TagWatch(self._camera, self.poses)
 
     def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
         """Tell robots where to go; see `WireFleet.send`."""
@@ -56,7 +57,7 @@ class MqttFleet(WireFleet):
 
     def _heard(self, topic: str, payload: bytes) -> None:
         if (robot := self._robot_of(topic, self._topics.pose)) is not None:
-            if self._watch is None:
+            if self._camera is None:
                 self.poses.heard(robot, pose_message(payload), time.monotonic())
         elif topic != self._topics.hold or payload in OF_PROGRAMS:
             self.saw_others()

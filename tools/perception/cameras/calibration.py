@@ -21,7 +21,7 @@ from ...errors import InputError
 from ...geometry.outline import FloatArray
 from ...yaml_files import content_of, validated
 from ..geotiff import Georeference
-from ..image import MAX_PIXELS, MAX_SIDE, MIN_SIDE, Picture, picture_from_bytes
+from ..image import MAX_PIXELS, MAX_SIDE, MIN_SIDE, STRIP, Picture, picture_from_bytes
 
 Floats = NDArray[np.floating[Any]]
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -190,18 +190,21 @@ class Calibration(Part):
                 f"{picture.name} has {w} x {h} pixels, but {source} is for {width} x {height}; "
                 "take it as the picture for that was taken, or calibrate anew."
             )
-        columns, rows = np.meshgrid(*(np.arange(side, dtype=float) for side in self.size))
-        to_floor = np.asarray(np.linalg.inv(self.to_top), dtype=float)
-        floor = through(to_floor, np.column_stack([columns.ravel(), rows.ravel()]))
-        at = self.in_picture(floor).astype(np.float32).reshape(*rows.shape, 2)
-        seen = cv2.remap(picture.pixels, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
+        (width, height), to_floor = self.size, np.asarray(np.linalg.inv(self.to_top), dtype=float)
+        seen = np.empty((height, width, 3), np.uint8)
+        for top in range(0, height, STRIP):
+            rows, columns = np.mgrid[top : min(top + STRIP, height), 0:width].astype(float)
+            floor = through(to_floor, np.column_stack([columns.ravel(), rows.ravel()]))
+            at = self.in_picture(floor).astype(np.float32).reshape(*rows.shape, 2)
+            strip = seen[top : top + STRIP]
+            cv2.remap(picture.pixels, at[..., 0], at[..., 1], cv2.INTER_LINEAR, dst=strip)
         x0, y0, x1, y1 = self.floor
         note = f"straight from above by {source}: x {x0:g} to {x1:g} m, y {y0:g} to {y1:g} m"
         place = Georeference(to_floor, False, 0, self.metres_per_pixel, note)
         file = BytesIO()
-        Image.fromarray(np.asarray(seen, np.uint8)).save(file, "PNG")
-        top = picture_from_bytes(file.getvalue(), f"{Path(picture.name).stem}-top.png")
-        return replace(top, place=place, notes=(note,))
+        Image.fromarray(seen).save(file, "PNG")
+        found = picture_from_bytes(file.getvalue(), f"{Path(picture.name).stem}-top.png")
+        return replace(found, place=place, notes=(note,))
 
     def to_yaml(self) -> str:
         """The file's content."""
