@@ -10,6 +10,9 @@ from ..tools.fleet.described import wire_settings
 from ..tools.fleet.mqtt.checkup import checked as mqtt_checked
 from ..tools.fleet.mqtt.settings import MqttSettings
 from ..tools.fleet.mqtt.stand_in import MqttStandIns
+from ..tools.fleet.ros.checkup import checked as ros_checked
+from ..tools.fleet.ros.settings import RosSettings
+from ..tools.fleet.ros.stand_in import RosStandIns
 from ..tools.fleet.wire.settings import WireSettings
 from .terminal import say
 
@@ -18,10 +21,12 @@ File = Annotated[Path, typer.Argument(help="A fleet's YAML file.", show_default=
 Seconds = Annotated[float, typer.Option("--seconds", help="To listen for.", min=0.1, max=3600)]
 
 CHECKUPS: Mapping[type[WireSettings], Callable[[Any, float], tuple[list[str], bool]]] = {
-    MqttSettings: mqtt_checked
+    MqttSettings: mqtt_checked,
+    RosSettings: ros_checked,
 }
 STAND_INS: Mapping[type[WireSettings], Callable[[Any, Callable[[str], None]], Any]] = {
-    MqttSettings: MqttStandIns
+    MqttSettings: MqttStandIns,
+    RosSettings: RosStandIns,
 }
 
 

@@ -15,11 +15,12 @@ from .mqtt.settings import MqttSettings
 from .physics import Physics
 from .protocol import Fleet, FleetFactory, FleetRequest
 from .registry import FLEETS
+from .ros.settings import RosSettings
 from .wire.settings import WireSettings
 
 Model = TypeVar("Model", bound=Value)
 Elsewhere = TypeVar("Elsewhere", bound=WireSettings)
-WIRES: Mapping[str, type[WireSettings]] = {"mqtt": MqttSettings}
+WIRES: Mapping[str, type[WireSettings]] = {"mqtt": MqttSettings, "ros": RosSettings}
 """What a file says of robots that are elsewhere, by its `fleet`."""
 SUFFIXES = (".yaml", ".yml")
 MOST_BYTES = 1_000_000

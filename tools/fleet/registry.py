@@ -9,5 +9,6 @@ FLEETS = Registry[FleetFactory](
     {
         "simulated": "formup.tools.fleet.simulated:open_fleet",
         "mqtt": "formup.tools.fleet.mqtt.fleet:open_fleet",
+        "ros": "formup.tools.fleet.ros.fleet:open_fleet",
     },
 )

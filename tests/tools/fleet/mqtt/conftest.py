@@ -5,9 +5,10 @@ import json
 import shutil
 import socket
 import subprocess
+import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from formup.tools.fleet.mqtt.link import Link
 from formup.tools.fleet.mqtt.settings import MqttSettings
 from formup.tools.fleet.mqtt.stand_in import MqttStandIns
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+wait_for = import_module("deploying").wait_for
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
-PATIENCE = 10.0
 USUAL: dict[str, Any] = {
     "fleet": "mqtt",
     "robots": ["a", "b", "c"],
@@ -29,13 +31,6 @@ USUAL: dict[str, Any] = {
     "tracking_error": 2,
     "simulated": {"starts": [[50, 50], [50, 100], [50, 150]]},
 }
-
-
-def wait_for(what: Callable[[], object]) -> None:
-    ends = time.monotonic() + PATIENCE
-    while not what():
-        assert time.monotonic() < ends, "it has not come about"
-        time.sleep(0.01)
 
 
 class Broker:
