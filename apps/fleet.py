@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..tools.fleet.described import wire_settings
+from ..tools.fleet.described import described_as
 from ..tools.fleet.mqtt.checkup import checked as mqtt_checked
 from ..tools.fleet.mqtt.settings import MqttSettings
 from ..tools.fleet.mqtt.stand_in import MqttStandIns
@@ -33,7 +33,7 @@ STAND_INS: Mapping[type[WireSettings], Callable[[Any, Callable[[str], None]], An
 @app.command()
 def check(file: File, seconds: Seconds = 3.0) -> None:
     """Say who is there and what is wrong; nothing is moved. Ends with 4 where all is not well."""
-    settings = wire_settings(file)
+    settings = described_as(WireSettings, file)
     told, fit = CHECKUPS[type(settings)](settings, seconds)
     say("\n".join(told))
     raise typer.Exit(0 if fit else 4)
@@ -42,7 +42,7 @@ def check(file: File, seconds: Seconds = 3.0) -> None:
 @app.command()
 def simulate(file: File) -> None:
     """Stand in for the robots of a file on the same wire, until Ctrl-C."""
-    settings = wire_settings(file)
+    settings = described_as(WireSettings, file)
     robots = STAND_INS[type(settings)](settings, lambda text: say(f"formup: {text}"))
     say(f"formup: standing in for {len(settings.robots)} robots at {settings.where}.")
     try:

@@ -27,7 +27,7 @@ ECHOES = 100
 SUCCEEDED = 4
 """As of action_msgs/GoalStatus."""
 OF_PROGRAMS = ("end", "gone")
-"""Begin holds that no person sent: a drive of another program ended."""
+"""Begin messages to hold that no person sent: a drive of another program ended."""
 
 
 class RosFleet(WireFleet):
@@ -117,32 +117,25 @@ class RosFleet(WireFleet):
         sent = {"action": name, "action_type": kind, "args": args, "feedback": False}
         self._link.say({"op": "send_action_goal", "id": goal, **sent})
 
-    def _heard(self, message: Message) -> None:
+    def _heard(self, message: Message, new: bool) -> None:
+        topic, said = str(message.get("topic")), message.get("msg")
         if message.get("op") == "action_result":
             self._ended(message)
-        elif message.get("op") == "publish":
-            self._told(str(message.get("topic")), message.get("msg"))
-
-    def _told(self, topic: str, message: Any) -> None:
-        if (robot := self._seen_at.get(topic)) is not None:
-            said = pose_message(message, self._ros, self._failed.get(robot))
-            self.poses.heard(robot, said, time.monotonic())
+        elif (robot := self._seen_at.get(topic)) is not None:
+            told = pose_message(said, self._ros, self._failed.get(robot))
+            self.poses.heard(robot, told, time.monotonic())
         elif topic == self._ros.topics.hold:
-            self._held(message)
-        elif (robot := self._sent_at.get(topic)) is not None:
-            told = goal_of(message)
-            zero = self._ros.drive_by == "cmd_vel" and told == (0.0, 0.0)
-            if told not in self._said[robot] and not zero:
+            why = hold_of(said).split()
+            if len(why) != 2 or why[0] not in OF_PROGRAMS:
+                if why[1:] != [self._me]:
+                    self.latch()  # a person stopped the robots elsewhere
+            elif why[1] != self._me and new:
                 self.saw_others()
-
-    def _held(self, message: Any) -> None:
-        said = hold_of(message).split()
-        if said[1:] == [self._me]:
-            return
-        if said[:1] and said[0] in OF_PROGRAMS and len(said) == 2:
-            self.saw_others()
-        else:  # a person stopped the robots elsewhere
-            self.latch()
+        elif (robot := self._sent_at.get(topic)) is not None:
+            goal = goal_of(said)
+            zero = self._ros.drive_by == "cmd_vel" and goal == (0.0, 0.0)
+            if new and goal not in self._said[robot] and not zero:
+                self.saw_others()
 
     def _ended(self, message: Message) -> None:
         """Note that Nav2 gave up a goal that was its robot's last."""

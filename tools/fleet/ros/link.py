@@ -25,6 +25,8 @@ AGAIN = 0.5
 CONNECTING = 5.0
 MOST_BYTES = 65_536
 """Of a message."""
+REPEATED = 1.5
+"""Seconds in which what was said before one joined may be heard: rosbridge keeps it for one."""
 LATE = 0.5
 """Seconds after which a message is not sent any more that was held up."""
 MOST_SHOWN = 200
@@ -39,7 +41,7 @@ class Link:
         url: of the bridge.
         topics: what to listen to, and of which type it is.
         spoken: what is going to be said, likewise.
-        heard: is given every operation that comes.
+        heard: is given every operation that comes, and whether it was surely said just now.
         left: is called when the connection is lost.
 
     Attributes:
@@ -56,7 +58,7 @@ class Link:
         url: str,
         topics: Iterable[tuple[str, str]],
         spoken: Iterable[tuple[str, str]],
-        heard: Callable[[Message], None],
+        heard: Callable[[Message, bool], None],
         *,
         left: Callable[[], None] = lambda: None,
     ) -> None:
@@ -72,7 +74,7 @@ class Link:
         self._url, self._connect, self._heard, self._left = url, connect, heard, left
         self.joined, self.connected, self.trouble = 0, False, "it has not answered yet"
         self._unsaid: tuple[Message, ...] = ()
-        self._closed = False
+        self._closed, self._since = False, 0.0
         self._loop = asyncio.new_event_loop()
         self._waiting: asyncio.Queue[tuple[float, Message] | None] = asyncio.Queue()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -128,7 +130,7 @@ class Link:
         for message in self._greeting:
             await socket.send(json.dumps(message))
         self._waiting = asyncio.Queue()
-        self.joined += 1
+        self.joined, self._since = self.joined + 1, time.monotonic()
         self.connected, self.trouble = True, ""
         unsaid, self._unsaid = self._unsaid, ()
         self.say(*unsaid, surely=True)
@@ -158,4 +160,4 @@ class Link:
     def _take(self, message: Message) -> None:
         if message.get("op") == "status" and message.get("level") == "error":
             self.trouble = f"it says: {message.get('msg')}"[:MOST_SHOWN]
-        self._heard(message)
+        self._heard(message, time.monotonic() - self._since > REPEATED)

@@ -81,6 +81,7 @@ class Lab:
         self._done = threading.Event()
         self._robots: Faulty | None = None
         self._thread: threading.Thread | None = None
+        self._speaking: threading.Thread | None = None
 
     @property
     def robots(self) -> Faulty:
@@ -97,11 +98,17 @@ class Lab:
         return RosFleet(self.settings)
 
     def say(self, topic: str, message: dict[str, Any]) -> None:
-        """Somebody else publishes something."""
+        """Somebody else publishes something, again and again."""
         from websockets.sync.client import connect
 
-        with connect(self.settings.url, proxy=None) as socket:
-            socket.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
+        def again() -> None:
+            with connect(self.settings.url, proxy=None) as socket:
+                for _ in range(60):
+                    socket.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
+                    self._done.wait(0.05)
+
+        self._speaking = threading.Thread(target=again)
+        self._speaking.start()
 
     def goal(self, robot: str) -> str:
         return {robot: topic for topic, robot in self.settings.goals.items()}[robot]
@@ -111,8 +118,9 @@ class Lab:
 
     def end(self) -> None:
         self._done.set()
-        if self._thread is not None:
-            self._thread.join()
+        for thread in (self._thread, self._speaking):
+            if thread is not None:
+                thread.join()
         if self._robots is not None:
             self._robots.close()
 
