@@ -9,7 +9,7 @@ from typing import Any
 
 from ..described import described_as
 from ..protocol import FleetRequest
-from ..wire.fleet import Point, Reason, WireFleet
+from ..wire.fleet import SETTLED, Point, Reason, WireFleet
 from .link import Link, Message
 from .messages import HOLD, goal_of, hold_of, pose_message, stamped, twist
 from .settings import GOALS, RosSettings
@@ -20,8 +20,8 @@ NAV2_AHEAD = 4.0
 second,"""
 NAV2_STEP = 0.25
 """another one when that has moved by this share of the way there."""
-NEAR = 0.25
-"""Robots that are driven by velocities stand within this share of their tracking error."""
+NEAR = 0.8 * SETTLED
+"""Robots that are driven by velocities stand within so many px."""
 ECHOES = 100
 """What was said, for each robot, that is known again when it comes back."""
 SUCCEEDED = 4
@@ -94,7 +94,10 @@ class RosFleet(WireFleet):
         return frame.to_robots(pose.x, pose.y), frame.turned_back(pose.heading or 0.0)
 
     def _velocity(self, robot: str, goal: Point) -> Point:
-        limits, near = (self._ros.speed, self._ros.turn_speed), NEAR * self._ros.tracking_error
+        limits, near = (
+            (self._ros.speed, self._ros.turn_speed),
+            NEAR * self._ros.frame.metres_per_pixel,
+        )
         ahead, about = velocity(*self._looks(robot), goal, limits, near)
         return round(ahead, 6), round(about, 6)
 

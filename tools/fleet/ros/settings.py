@@ -83,7 +83,7 @@ class RosSettings(WireSettings):
         for name in names:
             if not NAME.fullmatch(name):
                 raise ValueError(f"{name!r} is no name of ROS, such as /r1/pose")
-        if len(set(names)) < len(names):
+        if len(set(names)) < 2 * len(self.robots) + 1:
             raise ValueError("topics have to differ, and pose and goal to have {robot} in them")
         return self
 
