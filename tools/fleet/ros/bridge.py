@@ -4,6 +4,8 @@ without looking at types. Robots that stand in for real ones live in the same pr
 import asyncio
 import json
 import threading
+import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -15,6 +17,8 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import Server, ServerConnection
 
 CLOSING = 5.0
+KEPT, MOST_KEPT = 1.0, 1_000
+"""Whoever joins is told what clients said in so many seconds before, as by rosbridge."""
 
 
 class StandInBridge:
@@ -35,6 +39,7 @@ class StandInBridge:
     def __init__(self, address: tuple[str, int], heard: Callable[[Message], None]) -> None:
         self._heard = heard
         self._listeners: dict[ServerConnection, set[str]] = {}
+        self._kept = deque[tuple[float, Message]](maxlen=MOST_KEPT)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
@@ -92,7 +97,12 @@ class StandInBridge:
                     message = json.loads(text)
                     if message["op"] == "subscribe":
                         topics.add(message["topic"])
+                        since = time.monotonic() - KEPT
+                        for said, kept in [*self._kept]:
+                            if said > since and kept["topic"] == message["topic"]:
+                                await socket.send(json.dumps(kept))
                     elif message["op"] == "publish":
+                        self._kept.append((time.monotonic(), message))
                         self._pass_on(message, message["topic"])
                     self._heard(message)
         finally:
