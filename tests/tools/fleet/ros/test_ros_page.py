@@ -38,11 +38,7 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("by", ["cmd_vel", "pose", "nav2"])
-def test_the_page_gets_from_nothing_to_a_formation(place: Path, by: str) -> None:
-    file = place / "examples/ros.yaml"
-    changed = file.read_text().replace("drive_by: cmd_vel ", f"drive_by: {by} ")
-    file.write_text(changed.replace("/cmd_vel\n", "/goal\n"))
+def test_the_page_gets_from_nothing_to_a_formation(place: Path) -> None:
     simulate, *others = COMMANDS
     assert simulate == "formup fleet simulate examples/ros.yaml"
     assert others[-1] == "formup deploy plan/plan.json --fleet examples/ros.yaml"
