@@ -54,7 +54,7 @@ def recorded_rows(path: Path) -> list[Row]:
         if path.stat().st_size > MOST_BYTES:
             raise InputError(f"{path} is larger than {MOST_BYTES:,} bytes; cut it.")
         with path.open(encoding="utf-8", newline="") as lines:
-            found = _read(path, csv.DictReader(lines) if path.suffix == ".csv" else lines)
+            found = _checked_rows(path, csv.DictReader(lines) if path.suffix == ".csv" else lines)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         why = getattr(error, "strerror", None) or error
         raise InputError(f"{path} cannot be read: {why}.") from None
@@ -63,7 +63,7 @@ def recorded_rows(path: Path) -> list[Row]:
     return sorted(found, key=lambda row: row.time)
 
 
-def _read(path: Path, lines: Iterable[str | dict[str | Any, str | Any]]) -> list[Row]:
+def _checked_rows(path: Path, lines: Iterable[str | dict[str | Any, str | Any]]) -> list[Row]:
     rows: list[Row] = []
     for number, line in enumerate(lines, start=1 if path.suffix != ".csv" else 2):
         try:
