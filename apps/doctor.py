@@ -26,6 +26,7 @@ PURPOSES = {
     "otel": "spans",
     "postgres": "a store",
     "ray": "evals on a cluster",
+    "ros": "robots that run ROS",
     "serve": "a server",
     "torch": "trained networks",
 }

@@ -6,10 +6,13 @@ from typing import Annotated, Any
 
 import typer
 
-from ..tools.fleet.described import wire_settings
+from ..tools.fleet.described import described_as
 from ..tools.fleet.mqtt.checkup import checked as mqtt_checked
 from ..tools.fleet.mqtt.settings import MqttSettings
 from ..tools.fleet.mqtt.stand_in import MqttStandIns
+from ..tools.fleet.ros.checkup import checked as ros_checked
+from ..tools.fleet.ros.settings import RosSettings
+from ..tools.fleet.ros.stand_in import RosStandIns
 from ..tools.fleet.vda5050.checkup import checked as vda5050_checked
 from ..tools.fleet.vda5050.settings import Vda5050Settings
 from ..tools.fleet.vda5050.stand_in import Vda5050StandIns
@@ -22,10 +25,12 @@ Seconds = Annotated[float, typer.Option("--seconds", help="To listen for.", min=
 
 CHECKUPS: Mapping[type[WireSettings], Callable[[Any, float], tuple[list[str], bool]]] = {
     MqttSettings: mqtt_checked,
+    RosSettings: ros_checked,
     Vda5050Settings: vda5050_checked,
 }
 STAND_INS: Mapping[type[WireSettings], Callable[[Any, Callable[[str], None]], Any]] = {
     MqttSettings: MqttStandIns,
+    RosSettings: RosStandIns,
     Vda5050Settings: Vda5050StandIns,
 }
 
@@ -33,7 +38,7 @@ STAND_INS: Mapping[type[WireSettings], Callable[[Any, Callable[[str], None]], An
 @app.command()
 def check(file: File, seconds: Seconds = 3.0) -> None:
     """Say who is there and what is wrong; nothing is moved. Ends with 4 where all is not well."""
-    settings = wire_settings(file)
+    settings = described_as(WireSettings, file)
     told, fit = CHECKUPS[type(settings)](settings, seconds)
     say("\n".join(told))
     raise typer.Exit(0 if fit else 4)
@@ -42,7 +47,7 @@ def check(file: File, seconds: Seconds = 3.0) -> None:
 @app.command()
 def simulate(file: File) -> None:
     """Stand in for the robots of a file on the same wire, until Ctrl-C."""
-    settings = wire_settings(file)
+    settings = described_as(WireSettings, file)
     robots = STAND_INS[type(settings)](settings, lambda text: say(f"formup: {text}"))
     say(f"formup: standing in for {len(settings.robots)} robots at {settings.where}.")
     try:

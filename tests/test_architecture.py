@@ -45,6 +45,7 @@ HEAVY = {
     "pygame",
     "stable_baselines3",
     "scipy",
+    "websockets",
 }
 SOURCES = sorted(p for room in ROOMS for p in (ROOT / room).rglob("*.py"))
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))

@@ -31,6 +31,7 @@ def blocks(language: str) -> list[tuple[str, str]]:
 ELSEWHERE = {
     "fleets.md": "tests/tools/fleet/mqtt/test_fleets_page.py",
     "prompts.md": "tests/apps/test_prompts.py",
+    "ros.md": "tests/tools/fleet/ros/test_ros_page.py",
     "serving.md": "tests/apps/server/test_docs.py",
     "warehouse.md": "tests/tools/fleet/vda5050/test_warehouse_page.py",
 }

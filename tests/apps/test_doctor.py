@@ -128,7 +128,8 @@ def test_plugins_that_are_broken_are_named_and_print_nothing_on_stdout(home: Pat
     )
     fleets = told(home)["fleet"]
     assert fleets.pop("wheels") == "of an installed package"
-    assert {fleets.pop(name) for name in ("simulated", "mqtt", "vda5050")} == {"built in"}
+    ours = ("simulated", "mqtt", "recorded", "ros", "vda5050")
+    assert {fleets.pop(name) for name in ours} == {"built in"}
     assert fleets == {
         "absent": "broken: InputError: The fleet 'absent' (nowhere:open_fleet) cannot be "
         "imported: No module named 'nowhere'.",

@@ -11,13 +11,19 @@ from ..yaml_files import content_of, validated
 from .mqtt.settings import MqttSettings
 from .physics import Physics
 from .protocol import Fleet, FleetFactory, FleetRequest
+from .recording import RecordedSettings
 from .registry import FLEETS
+from .ros.settings import RosSettings
 from .vda5050.settings import Vda5050Settings
-from .wire.settings import WireSettings
 
-Elsewhere = TypeVar("Elsewhere", bound=WireSettings)
-WIRES: Mapping[str, type[WireSettings]] = {"mqtt": MqttSettings, "vda5050": Vda5050Settings}
-"""What a file says of robots that are elsewhere, by its `fleet`."""
+KINDS: Mapping[str, type[Value]] = {
+    "mqtt": MqttSettings,
+    "recorded": RecordedSettings,
+    "ros": RosSettings,
+    "vda5050": Vda5050Settings,
+}
+"""What a file says of robots that are not simulated, by its `fleet`."""
+Model = TypeVar("Model", bound=Value)
 SUFFIXES = (".yaml", ".yml")
 BEGIN = "fleet: simulated"
 
@@ -52,8 +58,8 @@ def fleet_named(name: str) -> FleetFactory:
     """
     path = Path(name)
     if path.suffix.lower() not in SUFFIXES:
-        if name in WIRES:
-            raise InputError(f"Robots on {name} are described by a file: --fleet FILE.yaml.")
+        if name in KINDS:
+            raise InputError(f"The fleet {name!r} is described by a file: --fleet FILE.yaml.")
         return FLEETS.load(name)
     kind = content_of(path, BEGIN).get("fleet")
     if not isinstance(kind, str):
@@ -61,8 +67,8 @@ def fleet_named(name: str) -> FleetFactory:
     load: Callable[[FleetRequest], Fleet] = FLEETS.load(kind)
     if kind == "simulated":
         described(path).physics({"speed": 1.0, "acceleration": 1.0})
-    if kind in WIRES:
-        wire_settings(path)
+    if kind in KINDS:
+        described_as(KINDS[kind], path)
     return lambda request: load(replace(request, config=path))
 
 
@@ -80,30 +86,22 @@ def described(path: Path) -> Described:
     return Described(path, content, pace)
 
 
-def wire_settings(path: Path) -> WireSettings:
-    """What a file says of robots that are elsewhere.
+def described_as(kind: type[Model], path: Path) -> Model:
+    """What a file says of robots of a kind, which may be `WireSettings`: all that are elsewhere.
 
     Raises:
         InputError: it cannot be read, or does not describe such; names every mistake.
     """
     content = content_of(path, BEGIN)
-    found = WIRES.get(str(content.pop("fleet", None)))
-    if found is None:
-        kinds = " or ".join(f"`fleet: {kind}`" for kind in WIRES)
-        raise InputError(f"{path} describes no robots elsewhere; begin it with {kinds}.")
+    found = KINDS.get(str(content.pop("fleet", None)))
+    if found is None or not issubclass(found, kind):
+        kinds = (f"`fleet: {name}`" for name, model in KINDS.items() if issubclass(model, kind))
+        raise InputError(f"{path} describes other robots; begin it with {' or '.join(kinds)}.")
     settings = validated(path, "a fleet", found, content)
     if isinstance(settings, MqttSettings) and settings.camera is not None:
         camera, frame = settings.camera.beside(path.parent)
-        return settings.model_copy(update={"camera": camera, "frame": frame})
+        settings = settings.model_copy(update={"camera": camera, "frame": frame})
     return settings
-
-
-def described_as(kind: type[Elsewhere], path: Path) -> Elsewhere:
-    """What a file says of robots of one kind; raises as `wire_settings` does."""
-    found = wire_settings(path)
-    if not isinstance(found, kind):
-        raise InputError(f"{path} describes robots of another kind.")
-    return found
 
 
 def schema() -> dict[str, Any]:
@@ -111,7 +109,7 @@ def schema() -> dict[str, Any]:
     pace = {"pace": {"enum": ["fast", "real"], "default": "fast"}}
     usual = "speed", "acceleration"  # depend on the picture where a file leaves them out
     simulated = _file_of("simulated", Physics, pace, usual)
-    files = [simulated, *(_file_of(kind, model) for kind, model in WIRES.items())]
+    files = [simulated, *(_file_of(kind, model) for kind, model in KINDS.items())]
     shared = {name: value for file in files for name, value in file.pop("$defs").items()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -32,7 +32,8 @@ from formup.tools.formation.site import Site
 from formup.tools.geometry.outline import make_outline
 from formup_example_fleet import Carts
 
-assert FLEETS.names() == ("simulated", "mqtt", "vda5050", "example"), FLEETS.names()
+KINDS = ("simulated", "mqtt", "recorded", "ros", "vda5050", "example")
+assert FLEETS.names() == KINDS, FLEETS.names()
 opened = FLEETS.load("example")(FleetRequest((640.0, 480.0), 2))
 assert isinstance(opened, Carts) and opened.real
 asyncio.run(check_fleet(lambda: FLEETS.load("example")(FleetRequest((640.0, 480.0), 2))))

@@ -74,9 +74,10 @@ class WireFleet(ABC):
     Attributes:
         poses: what is believed of where they are; to be fed with what they say.
         link: what connects them; to be set before the fleet is used.
+        ahead: see `AHEAD`.
     """
 
-    real, turns = True, False
+    real, turns, ahead = True, False, AHEAD
     name: str
     link: Connection
 
@@ -263,7 +264,7 @@ class Release:
         at, following = {pose.id: pose for pose in poses}, self._following
         points = points_of([at[robot] for robot in following.ids])
         self._progress = done = following.advance(points, self._progress, self._off_path)
-        ahead = np.minimum(following.room(done, self._stops), AHEAD * self._fleet.speed)
+        ahead = np.minimum(following.room(done, self._stops), self._fleet.ahead * self._fleet.speed)
         places = following.at(np.minimum(following.limits(done), done + ahead))
         self._look(points)
         self._seq += 1

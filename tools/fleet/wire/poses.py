@@ -8,7 +8,6 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -23,8 +22,7 @@ JITTER = 0.2
 """so many seconds more, as messages come in bursts."""
 MOST_JUMPS = 3
 """A robot that jumps so often within `pose_timeout` may be two of one name: it is not believed."""
-MOST_UNKNOWN = 20
-Refused = Literal["malformed", "out of order", "jumped"]
+MOST_UNKNOWN = MOST_REASONS = 20
 
 
 class PoseMessage(BaseModel):
@@ -60,8 +58,8 @@ class Track:
     pose: Pose | None = None
     fault: str | None = None
     heard: int = 0
-    refused: Counter[Refused] = field(default_factory=Counter[Refused])
-    why: Refused | None = None
+    refused: Counter[str] = field(default_factory=Counter[str])
+    why: str | None = None
     last: tuple[int, Pose] | None = None
     jumps: tuple[float, ...] = ()
 
@@ -90,7 +88,7 @@ class Poses:
         """Know nothing: what is seen next counts."""
         self._tracks = {robot: Track() for robot in self._tracks}
 
-    def heard(self, robot: str, said: PoseMessage | Refused | None, now: float) -> None:
+    def heard(self, robot: str, said: PoseMessage | str | None, now: float) -> None:
         """Take in a message that came at a time on our own clock.
 
         One that is not to be believed is given as the reason, None if it cannot be read.
@@ -138,7 +136,7 @@ class Poses:
     def _timeout(self) -> float:
         return self._settings.pose_timeout
 
-    def _judged(self, track: Track, seq: int, pose: Pose) -> tuple[Refused | None, bool]:
+    def _judged(self, track: Track, seq: int, pose: Pose) -> tuple[str | None, bool]:
         """Why a message is refused, if it is, and whether it agrees with one before."""
         if track.last is None or pose.seen - track.last[1].seen > self._timeout:
             return None, False
@@ -150,8 +148,8 @@ class Poses:
             return "jumped", False
         return None, True
 
-    def _refuse(self, track: Track, why: Refused, now: float) -> None:
-        track.refused[why] += 1
+    def _refuse(self, track: Track, why: str, now: float) -> None:
+        track.refused[why if len(track.refused) < MOST_REASONS else "malformed"] += 1
         track.why = why
         if why == "jumped":
             track.jumps = (*track.jumps, now)[-MOST_JUMPS:]

@@ -47,6 +47,10 @@ class RobotFrame(Value):
         """A heading of the robots', about their x axis towards their y axis, in the picture."""
         return math.radians(self.turn) + self._side * heading
 
+    def turned_back(self, heading: float) -> float:
+        """A heading in the picture as robots have it."""
+        return self._side * (heading - math.radians(self.turn))
+
     @property
     def _side(self) -> float:
         return -1.0 if self.y == "up" else 1.0

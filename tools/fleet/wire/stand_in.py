@@ -51,9 +51,11 @@ class StandIns(ABC):
         robots: what each has been told, by id.
         seq: how many times they have spoken.
         link: what connects them; to be set before they run.
+        simulator: what moves them.
     """
 
     link: Connection
+    simulator: type[Simulator] = Simulator
 
     def __init__(self, settings: WireSettings, told: Callable[[str], None]) -> None:
         self._settings, self._told, self.seq = settings, told, 0
@@ -69,7 +71,7 @@ class StandIns(ABC):
         )
         n = len(self.robots)
         looks = np.full(n, 0.0 if stand_in.drive == "differential" else math.nan)
-        self._sim = Simulator(settings.robots, self._starts(), looks, physics)
+        self._sim = self.simulator(settings.robots, self._starts(), looks, physics)
         self._sim.accompany(settings.robots)
         self._changes: dict[str, list[str]] = defaultdict(list)
 

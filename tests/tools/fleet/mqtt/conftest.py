@@ -1,9 +1,10 @@
 """Robots that are simulated on the wire of a real broker, and files of both."""
 
 import json
+import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from formup.tools.fleet.mqtt.link import Link
 from formup.tools.fleet.mqtt.settings import MqttSettings
 from formup.tools.fleet.mqtt.stand_in import MqttStandIns
 
-PATIENCE = 10.0
+sys.path.insert(0, str(Path(__file__).parents[1]))
+wait_for = import_module("deploying").wait_for
 USUAL: dict[str, Any] = {
     "fleet": "mqtt",
     "robots": ["a", "b", "c"],
@@ -24,13 +26,6 @@ USUAL: dict[str, Any] = {
     "tracking_error": 2,
     "simulated": {"starts": [[50, 50], [50, 100], [50, 150]]},
 }
-
-
-def wait_for(what: Callable[[], object]) -> None:
-    ends = time.monotonic() + PATIENCE
-    while not what():
-        assert time.monotonic() < ends, "it has not come about"
-        time.sleep(0.01)
 
 
 class Faulty(MqttStandIns):

@@ -66,4 +66,4 @@ def test_what_is_wrong_is_told_by_exit_codes(
 
 def test_the_schema_is_told(cli: Cli) -> None:
     code, out = cli("tools", "schema", "fleet")
-    assert (code, len(json.loads(out)["oneOf"])) == (0, 3)
+    assert (code, len(json.loads(out)["oneOf"])) == (0, 5)

@@ -2,73 +2,42 @@
 
 import asyncio
 import re
+import sys
 import time
 from collections.abc import Callable
 from contextlib import aclosing
-from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from formup.tools.fleet import getting_on
-from formup.tools.fleet.arrival import Arrival
-from formup.tools.fleet.assigning import assign_robots
-from formup.tools.fleet.deploy import deploy
 from formup.tools.fleet.protocol import (
     Fleet,
     FleetStoppedError,
     FleetUnreachableError,
     Motion,
-    Pose,
     StalePosesError,
 )
 from formup.tools.fleet.wire import fleet as fleet_module
-from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.plan import make_plan
-from formup.tools.formation.site import Site
-from formup.tools.geometry.outline import make_outline
 
-SITE = Site({"t1": make_outline([(200, 200), (300, 200), (300, 300), (200, 300)])}, 640, 480)
-PLAN = make_plan(
-    Contract(groups=(Group(relation="around", targets=("t1",), robots=3),), robot_radius=5),
-    SITE,
-    "s",
-)
-SURE = {"speed": 200, "pose_timeout": 1.0, "watchdog": 1.0}
-"""Fast, and with time enough for a machine that does other things too."""
+sys.path.insert(0, str(Path(__file__).parents[1]))
+shared = import_module("deploying")
+deployed, stand, stops = shared.deployed, shared.stand, shared.stops
+Case, SURE = shared.Case, shared.SURE
 Act = Callable[[Any, Fleet], object]
 Labs = Callable[..., Any]
-
-
-def deployed(lab: Any, fleet: Fleet, act: Act = lambda lab, fleet: None) -> Arrival:
-    """What comes of a deployment when something happens once robots are on their way."""
-    begun: list[Pose] = []
-    done = False
-
-    def watch(poses: tuple[Pose, ...]) -> None:
-        nonlocal done
-        begun[:] = begun or poses
-        pairs = zip(begun, poses, strict=True)
-        if not done and any(abs(a.x - b.x) + abs(a.y - b.y) > 20 for a, b in pairs):
-            done = True
-            act(lab, fleet)
-
-    async def go() -> Arrival:
-        robots = assign_robots(await fleet.observe(), PLAN.formation.points).robots
-        return (await deploy(PLAN, SITE, fleet, robots, watch=watch)).arrival
-
-    return asyncio.run(go())
-
-
-def stand(lab: Any) -> bool:
-    before = lab.robots.points.copy()
-    time.sleep(0.2)
-    return bool(abs(lab.robots.points - before).max() < 0.5)
 
 
 def fault(of: Callable[[dict[str, Any], int], dict[str, Any] | None]) -> Act:
     """Robot b says something else from now on, made of what it would say and of its number."""
     return lambda lab, fleet: lab.robots.faults.update(b=of)
+
+
+def act(of: Act) -> Act:
+    """What happens, with its types."""
+    return of
 
 
 def lagging(lab: Any, fleet: Fleet) -> None:
@@ -83,27 +52,13 @@ def lagging(lab: Any, fleet: Fleet) -> None:
         lab.robots.faults[robot] = of
 
 
-def stops(lab: Any, fleet: Fleet) -> None:
-    asyncio.get_running_loop().create_task(fleet.stop())
-
-
 def elsewhere(topic: str, **message: Any) -> Act:
     """Somebody else says something, again and again for half a second."""
     return lambda lab, fleet: [lab.link().say(lab.topic(topic, "a"), message)]
 
 
-@dataclass(frozen=True)
-class Case:
-    """What happens on the way, how it ends, and what is told of it."""
-
-    act: Act
-    ended: str
-    words: str = ""
-    failed: tuple[str, ...] = ()
-
-
 CASES = {
-    "none": Case(lambda lab, fleet: None, "arrived"),
+    "none": Case(act(lambda lab, fleet: None), "arrived"),
     "one glitch": Case(
         fault(lambda m, n: m | ({"x": m["x"] + 300} if n % 40 == 0 else {})), "arrived"
     ),
@@ -168,7 +123,7 @@ def test_stand_ins_may_have_wheels_and_be_lost(lab: Labs, monkeypatch: pytest.Mo
 def test_robots_that_begin_to_count_anew_are_held_and_then_believed_again(lab: Labs) -> None:
     there = lab(**SURE).simulate()
     fleet = there.fleet()
-    arrival = deployed(there, fleet, lambda lab, fleet: lab.robots.reboot())
+    arrival = deployed(there, fleet, act(lambda lab, fleet: lab.robots.reboot()))
     assert (arrival.ended, arrival.failed) == ("failed", ("a", "b", "c"))
     assert "out of order" in (arrival.reason or "")
     assert stand(there)
@@ -236,7 +191,7 @@ def test_a_broker_that_dies_ends_it_and_all_is_observed_anew_when_it_is_back(
     broker = brokers()
     there = lab(broker, **SURE).simulate()
     fleet = there.fleet()
-    arrival = deployed(there, fleet, lambda lab, fleet: broker.kill())
+    arrival = deployed(there, fleet, act(lambda lab, fleet: broker.kill()))
     assert arrival.ended == "failed"
     assert "out of reach" in (arrival.reason or "")
     until = time.monotonic() + 5
@@ -281,7 +236,7 @@ def test_nothing_is_driven_while_a_robot_does_not_hold(lab: Labs) -> None:
     there = lab(**SURE).simulate()
     fleet = there.fleet()
     arrival = deployed(
-        there, fleet, lambda lab, fleet: (lab.robots.runaway.add("b"), stops(lab, fleet))
+        there, fleet, act(lambda lab, fleet: (lab.robots.runaway.add("b"), stops(lab, fleet)))
     )
     assert arrival.ended == "stopped"
     asyncio.run(fleet.release())

@@ -114,7 +114,7 @@ def test_the_schema_that_is_published_is_this_one_and_takes_the_examples() -> No
     published = json.loads((ROOT / "docs/fleet.schema.json").read_text("utf-8"))
     assert published == schema()
     validator = jsonschema.Draft202012Validator(published)
-    for name in ("hamsters", "moving", "lab", "warehouse"):
+    for name in ("hamsters", "moving", "lab", "ros", "warehouse"):
         validator.validate(yaml.safe_load((ROOT / f"examples/{name}.yaml").read_text("utf-8")))
         fleet_named(str(ROOT / f"examples/{name}.yaml"))
     assert not validator.is_valid({**USUAL, "wings": 2})

@@ -1,0 +1,140 @@
+"""A stand-in bridge on a free port, robots that stand in behind it, and files of both."""
+
+import json
+import socket
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from formup.tools.fleet.described import described_as
+from formup.tools.fleet.ros.bridge import StandInBridge
+from formup.tools.fleet.ros.fleet import RosFleet
+from formup.tools.fleet.ros.settings import RosSettings
+from formup.tools.fleet.ros.stand_in import RosStandIns
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+wait_for = import_module("deploying").wait_for
+USUAL: dict[str, Any] = {
+    "fleet": "ros",
+    "robots": ["a", "b", "c"],
+    "speed": 100,
+    "radius": 5,
+    "tracking_error": 2,
+    "frame": {"y": "down"},
+    "turn_speed": 4,
+    "simulated": {"starts": [[50, 50], [50, 100], [50, 150]]},
+}
+
+
+class Faulty(RosStandIns):
+    """Stand-ins of which some do what they should not, from when their ids are put in here."""
+
+    def __init__(self, settings: RosSettings, told: Callable[[str], None]) -> None:
+        self.faults: dict[str, Callable[[dict[str, Any], int], dict[str, Any] | None]] = {}
+        self._reboots = False
+        self.heard: list[Mapping[str, Any]] = []
+        super().__init__(settings, told)
+        self.seq = 1_000
+
+    def step(self) -> None:
+        if self._reboots:  # all at once
+            self._reboots, self.seq = False, 0
+        super().step()
+
+    def reboot(self) -> None:
+        self._reboots = True
+
+    def restart_bridge(self) -> None:
+        self.link = self._bridge = StandInBridge(self._ros.address, self._heard)
+
+    def result(self, status: int) -> None:
+        robot, (goal, action) = next(iter(self._acting.items()))
+        self.robots[robot].goal = None
+        self._result(robot, goal, action, status)
+
+    def _heard(self, message: Mapping[str, Any]) -> None:
+        self.heard.append(message)
+        super()._heard(message)
+
+    def _message(self, robot: str, place: tuple[float, float]) -> dict[str, Any] | None:
+        message = super()._message(robot, place)
+        if message is None or robot not in self.faults:
+            return message
+        return self.faults[robot](message, self.seq)
+
+
+class Lab:
+    """A fleet's file, its stand-ins in a thread, and whatever speaks beside them."""
+
+    def __init__(self, path: Path, more: dict[str, Any]) -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port: int = free.getsockname()[1]
+        path.write_text(yaml.safe_dump({**USUAL, "bridge": f"ws://127.0.0.1:{port}", **more}))
+        self.path, self.told = path, list[str]()
+        self.settings: RosSettings = described_as(RosSettings, path)
+        self._done = threading.Event()
+        self._robots: Faulty | None = None
+        self._thread: threading.Thread | None = None
+        self._speaking: threading.Thread | None = None
+
+    @property
+    def robots(self) -> Faulty:
+        assert self._robots is not None
+        return self._robots
+
+    def simulate(self) -> "Lab":
+        self._robots = Faulty(self.settings, self.told.append)
+        self._thread = threading.Thread(target=self.robots.run, args=(self._done.is_set,))
+        self._thread.start()
+        return self
+
+    def fleet(self) -> RosFleet:
+        return RosFleet(self.settings)
+
+    def say(self, topic: str, message: dict[str, Any]) -> None:
+        """Somebody else publishes something, again and again."""
+        from websockets.sync.client import connect
+
+        def again() -> None:
+            with connect(self.settings.url, proxy=None) as socket:
+                for _ in range(60):
+                    socket.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
+                    self._done.wait(0.05)
+
+        self._speaking = threading.Thread(target=again)
+        self._speaking.start()
+
+    def goal(self, robot: str) -> str:
+        return {robot: topic for topic, robot in self.settings.goals.items()}[robot]
+
+    def was_told(self, what: str) -> bool:
+        return any(what in text for text in self.told)
+
+    def end(self) -> None:
+        self._done.set()
+        for thread in (self._thread, self._speaking):
+            if thread is not None:
+                thread.join()
+        if self._robots is not None:
+            self._robots.close()
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Iterator[Callable[..., Lab]]:
+    """Makes labs; what is given is said in their file."""
+    pytest.importorskip("websockets", reason="the extra ros is not installed")
+    made: list[Lab] = []
+
+    def make(**more: Any) -> Lab:
+        made.append(Lab(tmp_path / "lab.yaml", more))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.end()

@@ -1,0 +1,1 @@
+"""Robots that run ROS 2, reached through rosbridge."""
