@@ -2,10 +2,11 @@
 
 import asyncio
 import json
-from collections.abc import Callable, Generator
+from collections.abc import Awaitable, Callable, Generator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import typer
 from rich.console import Console
@@ -28,6 +29,8 @@ from .run_display import show_report
 from .run_files import write_films
 from .terminal import say
 from .window import watching
+
+Made = TypeVar("Made")
 
 
 def deploy(
@@ -85,7 +88,7 @@ def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
     with _session(plan, context) as session:
         context = context.at(session.start(context.world))
     try:
-        found = asyncio.run(trajectories_to(context, chosen))
+        found = asyncio.run(_and_closed(context, trajectories_to(context, chosen)))
     except ToolError as error:
         raise InputError(f"{plan}: {error}") from None
     scale = context.world.metres_per_pixel
@@ -93,6 +96,14 @@ def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
     write_whole(path, text.encode())
     say(f"formup: {len(found.ids)} robots' ways in {path}; none was moved.", error=True)
     return 0
+
+
+async def _and_closed(context: Context, work: Awaitable[Made]) -> Made:
+    """What comes of the work, with the fleets, and cameras of theirs, let go of."""
+    try:
+        return await work
+    finally:
+        await context.services.close_fleets()
 
 
 @dataclass
@@ -145,7 +156,8 @@ def _driven(
     watching = replace(context, observed=observed.append, moving=session.moving, agreed=True)
     try:
         node = watching.world.plan(plan.id)
-        observed.append(asyncio.run(drive_to(watching, node, follow))[1])
+        driven = asyncio.run(_and_closed(context, drive_to(watching, node, follow)))
+        observed.append(driven[1])
     except ToolError as error:
         raise InputError(f"{path}: {error}") from None
     except FleetError:

@@ -10,11 +10,20 @@ from ..fleet.arrival import Arrival, Track
 from ..fleet.deploy import TRACK_FRAMES, tolerance
 from ..fleet.escort import escort, lost, rigid_of, sighted
 from ..fleet.follow import Follow, Rigid
-from ..fleet.protocol import Fleet, Pose, points_of
+from ..fleet.protocol import Fleet, Pose, Watcher, points_of
 from ..formation.plan import Plan
 from ..formation.units import length_text
 from ..world import World
 from .tracks import read_track, with_track
+
+
+def watch_target(context: Context, plan: Plan, fleet: Fleet) -> None:
+    """Have a fleet with a camera look out for what a plan is about, as the picture shows it."""
+    if isinstance(fleet, Watcher):
+        outlines = context.world.site(plan.formation.contract).outlines
+        names = plan.formation.contract.target_ids
+        bgr = np.ascontiguousarray(context.picture.pixels[..., ::-1])
+        fleet.watch(bgr, {name: outlines[name] for name in names})
 
 
 async def stands_about(context: Context, plan: Plan, fleet: Fleet, follow: Follow | None) -> bool:

@@ -34,7 +34,7 @@ from ..formation.units import length_text
 from ..motion.routes import obstacles
 from ..tool import in_thread
 from ..world import PlanNode, World
-from .follows import followed, stands_about
+from .follows import followed, stands_about, watch_target
 from .motions import Going, going, met_by
 from .tracks import with_track
 
@@ -136,6 +136,7 @@ async def drive_to(
     plan, world, moved = node.plan, context.world, True
     try:
         fleet = await _team(context, plan.formation.contract, plan.formation.robots)
+        watch_target(context, plan, fleet)
         if follow is not None:
             await check_follow(plan, fleet, follow.most(world.picture.size))
         agreed = context.settings.approved == plan.id and (follow is None or context.agreed)

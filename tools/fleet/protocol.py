@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import FleetError
 from ..formation.contract import Contract
-from ..geometry.outline import FloatArray
+from ..geometry.outline import FloatArray, Outline
 from ..geometry.sampling import min_spacing
 from ..motion.motion import Motion
 
@@ -189,6 +190,20 @@ class Tracker(Protocol):
         Args:
             places: is asked every period; robots are driven at the velocity of their places, and
                 back onto them.
+        """
+        ...
+
+
+@runtime_checkable
+class Watcher(Protocol):
+    """What a `Tracker` has beside that has to be told what to look out for."""
+
+    def watch(self, picture: NDArray[np.uint8], things: Mapping[str, Outline]) -> None:
+        """Look out for things from now on, and for no others.
+
+        Args:
+            picture: (H, W, 3) BGR, in which they have their outlines.
+            things: by the ids of their targets.
         """
         ...
 

@@ -38,6 +38,7 @@ class MqttFleet(WireFleet):
             settings.address, listened, self._heard, will=will, left=self.poses.forget
         )
         self._watch = self._camera and TagWatch(self._camera, self.poses)
+        self.look = self._watch and self._watch.top_view
 
     def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
         """Tell robots where to go; see `WireFleet.send`."""

@@ -5,16 +5,19 @@ themselves. So whatever fails, here or on the way, ends with robots that stand.
 """
 
 import asyncio
+import itertools
 import math
 import time
 import uuid
 from abc import ABC, abstractmethod
-from collections.abc import AsyncGenerator, Mapping
+from collections.abc import AsyncGenerator, Callable, Mapping
+from contextlib import aclosing
 from typing import Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...geometry.outline import FloatArray
+from ...geometry.outline import FloatArray, Outline
 from ...motion.following import Following
 from ...motion.motion import Motion
 from ..protocol import (
@@ -22,11 +25,14 @@ from ..protocol import (
     FleetClosedError,
     FleetStoppedError,
     FleetUnreachableError,
+    Places,
     Pose,
     RobotsFailedError,
+    Sighting,
     StalePosesError,
     points_of,
 )
+from ..seen_things import Look, SeenThings
 from .poses import Poses
 from .settings import WireSettings
 
@@ -34,6 +40,8 @@ WAIT = 3.0
 """Seconds for which robots are waited for that have not been seen since the broker was found."""
 AHEAD = 0.5
 """Robots are sent as far ahead as they drive in so many seconds at most."""
+LEAD = 0.15
+"""Robots at places that move are sent to where these will be in so many seconds."""
 SETTLED = 0.25
 """A robot has come to its end within so many px,"""
 CALM = 0.5
@@ -75,11 +83,13 @@ class WireFleet(ABC):
         poses: what is believed of where they are; to be fed with what they say.
         link: what connects them; to be set before the fleet is used.
         ahead: see `AHEAD`.
+        look: the newest frame of the camera above the robots; None where there is none.
     """
 
     real, turns, ahead = True, False, AHEAD
     name: str
     link: Connection
+    look: Look | None = None
 
     def __init__(self, settings: WireSettings) -> None:
         self.settings = settings
@@ -89,6 +99,7 @@ class WireFleet(ABC):
         self._driving = self._closed = False
         self._others = -OTHERS
         self.poses = Poses(settings)
+        self._things: SeenThings | None = None
 
     @abstractmethod
     def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
@@ -115,10 +126,59 @@ class WireFleet(ABC):
 
     async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
         """Release the paths a little at a time, in their order of passage; poses as they come."""
-        self._check_drive(motion)
+        self._check_drive(motion.paths)
         if not motion.paths:
             return
+        release = Release(motion, self)
+        async with aclosing(self._steps(motion.paths, release.goals)) as steps:
+            async for poses in steps:
+                yield poses
+                if release.there:
+                    return
+
+    async def sightings(self) -> tuple[Sighting, ...]:
+        """Where the camera sees the things that are watched; nothing without one."""
+        self._check_open()
+        return () if self._things is None else await self._things.sightings()
+
+    def watch(self, picture: NDArray[np.uint8], things: Mapping[str, Outline]) -> None:
+        """Look out for things from now on; see `Watcher.watch`."""
+        self._things = self.look and SeenThings(self.look, picture, things)
+
+    async def accompany(
+        self, places: Callable[[], Places]
+    ) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Keep robots at places that move; see `Tracker.accompany`."""
+        wanted = places()
+        self._check_drive(wanted)
+        async with aclosing(self._steps(wanted, lambda poses: self._led(places(), poses))) as steps:
+            async for poses in steps:
+                yield poses
+
+    def _led(self, places: Places, poses: tuple[Pose, ...]) -> dict[str, Point]:
+        """Where robots are sent to be at places that move, in the robots' frame."""
+        at, most = {pose.id: pose for pose in poses}, AHEAD * self.speed
+        goals: dict[str, Point] = {}
+        for robot, (x, y, u, v) in places.items():
+            pose = at[robot]
+            off = np.array([x + LEAD * u - pose.x, y + LEAD * v - pose.y])
+            off *= min(1.0, most / max(float(np.hypot(*off)), 1e-9))
+            goals[robot] = self.settings.frame.to_robots(pose.x + off[0], pose.y + off[1])
+        return goals
+
+    async def _steps(
+        self,
+        robots: Mapping[str, object],
+        goals: Callable[[tuple[Pose, ...]], Mapping[str, Point]],
+    ) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Send robots to their goals every period, and yield the poses; at the end they hold.
+
+        Args:
+            robots: by id, those that are driven.
+            goals: from the poses, in the robots' frame.
+        """
         self._driving, stops, begun = True, self._stops, False
+        drive = uuid.uuid4().hex[:12]
         try:
             await self.observe()
             if moving := await self._until_still():
@@ -127,16 +187,13 @@ class WireFleet(ABC):
                     "and look at its watchdog.",
                     moving,
                 )
-            joined, release = self.link.joined, Release(motion, self)
-            due = time.monotonic()
-            while True:
+            joined, due = self.link.joined, time.monotonic()
+            for seq in itertools.count(1):
                 poses = self.poses.seen()
-                self._check_going(motion, stops, joined)
+                self._check_going(robots, stops, joined)
                 begun = True
-                self.send(release.drive, *release.goals(poses))
+                self.send(drive, seq, goals(poses))
                 yield poses
-                if release.there:
-                    return
                 due = max(due + self.settings.period, time.monotonic())
                 await asyncio.sleep(due - time.monotonic())
         finally:
@@ -191,13 +248,13 @@ class WireFleet(ABC):
         if self._closed:
             raise FleetClosedError(f"The {self.name} fleet is closed; open it again.")
 
-    def _check_drive(self, motion: Motion) -> None:
+    def _check_drive(self, robots: Mapping[str, object]) -> None:
         self._check_open()
         if self.stopped:
             raise FleetStoppedError(f"The {self.name} fleet is stopped; release it to drive.")
         if self._driving:
             raise FleetBusyError(f"The {self.name} fleet is driving already; wait, or stop it.")
-        unknown = sorted(set(motion.paths) - set(self.settings.robots))
+        unknown = sorted(set(robots) - set(self.settings.robots))
         if unknown:
             raise RobotsFailedError(f"Robot {', '.join(unknown)} is not in the file.", unknown)
 
@@ -211,7 +268,7 @@ class WireFleet(ABC):
                 f"{alone[1:]}; `formup fleet check FILE` looks for the cause."
             )
 
-    def _check_going(self, motion: Motion, stops: int, joined: int) -> None:
+    def _check_going(self, robots: Mapping[str, object], stops: int, joined: int) -> None:
         """Refuse to go on where anything is not as it has to be."""
         self._check_open()
         if self._stops != stops:
@@ -220,7 +277,7 @@ class WireFleet(ABC):
         if time.monotonic() - self._others < OTHERS:
             raise FleetBusyError("Another program drives these robots; end it, and drive again.")
         self._check_seen(self.settings.pose_timeout)
-        faults = {r: self.poses.tracks[r].fault for r in motion.paths}
+        faults = {r: self.poses.tracks[r].fault for r in robots}
         failed = {robot: fault for robot, fault in faults.items() if fault}
         if failed:
             told = [f"Robot {robot} cannot drive: {fault!r}." for robot, fault in failed.items()]
@@ -241,7 +298,6 @@ class Release:
     """How far robots of one drive may go by now.
 
     Attributes:
-        drive: names it.
         there: whether all have come to their ends.
     """
 
@@ -252,12 +308,11 @@ class Release:
         self._ends = self._following.at(self._following.lengths)
         bends = np.sin(np.minimum(self._following.turns, np.pi / 2))
         self._stops = self._following.stops(self._off_path / np.maximum(bends, 1e-9))
-        self.drive, self._seq = uuid.uuid4().hex[:12], 0
         self._stood, self._since = np.full_like(self._ends, np.inf), 0.0
         self.there = False
 
-    def goals(self, poses: tuple[Pose, ...]) -> tuple[int, dict[str, Point]]:
-        """A number, and what each robot is told next, in the robots' frame.
+    def goals(self, poses: tuple[Pose, ...]) -> dict[str, Point]:
+        """What each robot is told next, in the robots' frame.
 
         Where it is to turn it is sent no further than there.
         """
@@ -267,10 +322,9 @@ class Release:
         ahead = np.minimum(following.room(done, self._stops), self._fleet.ahead * self._fleet.speed)
         places = following.at(np.minimum(following.limits(done), done + ahead))
         self._look(points)
-        self._seq += 1
         frame = self._fleet.settings.frame
         spoken = [frame.to_robots(x, y) for x, y in places.tolist()]
-        return self._seq, dict(zip(following.ids, spoken, strict=True))
+        return dict(zip(following.ids, spoken, strict=True))
 
     def _look(self, points: FloatArray) -> None:
         """Note whether robots are there, or as near as they can come."""

@@ -89,6 +89,15 @@ class TagWatch:
         self._thread = threading.Thread(target=self._watch, name="tags", daemon=True)
         self._thread.start()
 
+    def top_view(self) -> Frame:
+        """The newest frame as the floor is seen from straight above.
+
+        Raises:
+            CameraError: there is none.
+        """
+        frame = self._camera.newest()
+        return Frame(self._calibration.rectified(frame.pixels), frame.seen)
+
     def close(self) -> None:
         """Let go of the camera."""
         self._closed.set()

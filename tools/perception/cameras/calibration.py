@@ -175,6 +175,23 @@ class Calibration(Part):
         again = np.abs(self.on_floor(at) - places).max(axis=1) < self.metres_per_pixel
         return ahead & inside & again
 
+    def _seen_at(self, top: int, bottom: int) -> NDArray[np.float32]:
+        """(bottom - top, w, 2) px where rows of the top view are in the picture."""
+        rows, columns = np.mgrid[top:bottom, 0 : self.size[0]].astype(float)
+        places = np.column_stack([columns.ravel(), rows.ravel()])
+        floor = through(np.linalg.inv(self.to_top), places)
+        return self.in_picture(floor).astype(np.float32).reshape(*rows.shape, 2)
+
+    @cached_property
+    def all_seen_at(self) -> NDArray[np.float32]:
+        """(h, w, 2) px where the top view is in the picture."""
+        return self._seen_at(0, self.size[1])
+
+    def rectified(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """One of many frames, (H, W, 3), as the floor is seen from straight above, (h, w, 3)."""
+        at = self.all_seen_at
+        return np.asarray(cv2.remap(frame, at[..., 0], at[..., 1], cv2.INTER_LINEAR), np.uint8)
+
     def top_view(self, picture: Picture, source: str) -> Picture:
         """The floor from straight above, with its scale.
 
@@ -193,10 +210,7 @@ class Calibration(Part):
         (width, height), to_floor = self.size, np.asarray(np.linalg.inv(self.to_top), dtype=float)
         seen = np.empty((height, width, 3), np.uint8)
         for top in range(0, height, STRIP):
-            rows, columns = np.mgrid[top : min(top + STRIP, height), 0:width].astype(float)
-            floor = through(to_floor, np.column_stack([columns.ravel(), rows.ravel()]))
-            at = self.in_picture(floor).astype(np.float32).reshape(*rows.shape, 2)
-            strip = seen[top : top + STRIP]
+            at, strip = self._seen_at(top, min(top + STRIP, height)), seen[top : top + STRIP]
             cv2.remap(picture.pixels, at[..., 0], at[..., 1], cv2.INTER_LINEAR, dst=strip)
         x0, y0, x1, y1 = self.floor
         note = f"straight from above by {source}: x {x0:g} to {x1:g} m, y {y0:g} to {y1:g} m"
