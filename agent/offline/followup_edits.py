@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ...tools.formation.number_words import SMALL
+from ...tools.formation.number_words import SMALL, TENS
 from .followup_frames import Slots
 from .followup_words import Chunk
 from .phrases import phrase
@@ -23,16 +23,22 @@ FACTOR = {"bit": 1.25, "": 1.5, "big": 2.0}
 """Of distances, spacings and sizes."""
 TURN = {"bit": 15.0, "": 45.0, "big": 90.0}
 """Degrees."""
-ADDED_LENGTH = re.compile(r"[,;:]\s*[\w.]+ ?(?:px|pix|m\b|met|cm)\w*\W*$", re.IGNORECASE)
+ADDED_LENGTH = re.compile(
+    r"[,;:]\s*[\w.]+ ?(?:px|pix|m\b|met|cm)\w*(?: (?:from|off|away|across|wide)\b[\w ]*)?\W*$",
+    re.IGNORECASE,
+)
 """A length said after the change, "further out, 6 m": so far it is then."""
 STEP = re.compile(r"\b(?:position|place|spot|slot|step|seat)s?\b", re.IGNORECASE)
 """Of a ring: from one robot to the next."""
 EXACT = re.compile(
-    rf"\bto (?:exactly |about |just |only |some )?(?:[0-9]|(?:{'|'.join(SMALL)})\b)", re.IGNORECASE
+    rf"\bto (?:exactly |about |just |only |some )?(?:[0-9]|(?:{'|'.join((*SMALL, *TENS))})\b)",
+    re.IGNORECASE,
 )
 """The whole of it, not a change: "increase it to 60 px"."""
 LESSER = re.compile(r"\W*(?:not (?:so|as|that|quite)|less)\b", re.IGNORECASE)
 """Takes a part of the last change back: "not so tight"."""
+SAME_WAY = re.compile(r"\bsame (?:way|direction|sense)\b", re.IGNORECASE)
+UPSIDE = re.compile(r"\bupside down\b|\bon its head\b", re.IGNORECASE)
 LEAST_BARE = 5
 """Numbers without a unit below this are hardly pixels."""
 SIDES = ("left", "right", "top", "bottom")
@@ -201,13 +207,19 @@ def rotate(slots: Slots, said: Said) -> Effects:
             twice = 2 if "otherway" in slots else 1  # what was turned back, and as far again
             return [{**last, "degrees": -twice * last["degrees"]}]
         sign = -1 if last is None or last["degrees"] > 0 else 1
-    elif "more" in slots and not directions and last:
+    elif ("more" in slots or SAME_WAY.search(said.words)) and not directions and last:
         sign = 1 if last["degrees"] > 0 else -1
     return [{"kind": "rotate", "degrees": sign * degrees}]
 
 
 def _of_kind(edits: list[Effect], *kinds: str) -> Effect | None:
     return next((e for e in reversed(edits) if e["kind"] in kinds), None)
+
+
+def upended(slots: Slots, said: Said) -> Effects:
+    """Upside down: half a turn, by which a V opens to the other side."""
+    upside = slots["axis"] == ["top-bottom"] and UPSIDE.search(said.words)
+    return [{"kind": "rotate", "degrees": 180}] if upside else None
 
 
 def mirror(slots: Slots, said: Said) -> Effects:
@@ -230,6 +242,9 @@ def scale(slots: Slots, said: Said) -> Effects:
         return [{"kind": "scale", "factor": float(slots["ratio_scale"][0])}]
     if slots["scale"][0] == "smaller" and "share" in slots:
         return [{"kind": "scale", "factor": rounded(1 - float(slots["share"][0]))}]
+    if "px" in slots:
+        way = {"bigger": "out", "smaller": "in"}[slots["scale"][0]]
+        return [{"kind": way, "px": slots["px"][0]}] if said.standing.relation in RINGS else None
     factor = factor_of(slots)
     return [
         {

@@ -40,6 +40,7 @@ def way(slots: Slots, said: Said) -> tuple[float, float] | None:
 
 BESIDE = re.compile(
     r"\b(?:to|on) the (?:left|right|top|bottom)(?:[- ]hand)?(?: side)? of\b|\b(?:to|on) its\b|"
+    r"\bon the (?:left|right)\b|"
     r"\b(?:[0-9]+|[a-z]+) (?:(?:of the|more) )?(?:robots|bots|drones|rovers)\b"
     r"(?<!the robots)(?<!all robots)(?<!these robots)[^,;.]*\bto the (?:left|right)\b",
     re.IGNORECASE,

@@ -1,8 +1,12 @@
-"""From a frame to edits of which sides robots stand on, and of gaps in their ring."""
+"""From a frame to edits of how robots are arranged, on which sides, and of gaps in their ring."""
 
 import re
+from dataclasses import replace
 
+from ...tools.formation.contract import MAX_ROBOTS
+from .drawn_forms import SIDES as PLACES
 from .followup_edits import (
+    ADDED_LENGTH,
     OPPOSITE,
     RINGS,
     SIDE_OF,
@@ -17,9 +21,17 @@ from .followup_edits import (
     where,
 )
 from .followup_frames import Slots
+from .followup_teams import count, group_of, target, whole
 
 PUSHING = re.compile(r"\b(?:move|shift|nudge|push|pull|slide|drag)\b", re.IGNORECASE)
 """With these "all right" is a way to go, no side to be on."""
+
+
+EACH_CORNER = re.compile(r"\b(?:each|every)\b.*\bcorner", re.IGNORECASE)
+STRAIGHT = re.compile(r"\bstraight (?:row|line)\b", re.IGNORECASE)
+BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
+WHOLE = re.compile(r"\b(?:ring|circle|row|line|formation|v|u|star|wedge|arc)\b", re.IGNORECASE)
+"""What all robots together are called: its width is not that of a gap."""
 
 
 def sides(slots: Slots, said: Said) -> Effects:
@@ -100,7 +112,10 @@ def gap(slots: Slots, said: Said) -> Effects:
                 *(f"leave a gap to the {s}" for s in ("left", "right", "top", "bottom")),
             )
         sign = 1 if change == "wider" else -1
-        width = said.standing.groups[0]["opening"] + sign * slots["px"][0] if "px" in slots else 0.0
+        slots.has("much")
+        before = 0.0 if ADDED_LENGTH.search(said.words) else said.standing.groups[0]["opening"]
+        by = sign if before else 1
+        width = before + by * slots["px"][0] if "px" in slots else 0.0
         return [
             opening
             | ({"px": width} if width > 0 else {"factor": rounded(factor_of(slots) ** sign)})
@@ -124,6 +139,7 @@ def sided(slots: Slots, said: Said) -> Effects:
     """A side alone: the one robots stand on, or the gap is on."""
     side = str(slots["side"][0])
     moved = said.denies and not said.standing.edits  # else "left" is a way to go
+    moved = moved or re.search(r"\bnot\b", said.line, re.IGNORECASE) is not None
     group = said.standing.groups[0]
     if (
         "too" in said.words.split()
@@ -139,9 +155,13 @@ def sided(slots: Slots, said: Said) -> Effects:
 
 
 def wider(slots: Slots, said: Said) -> Effects:
-    """Wider alone: the gap, where there is one."""
-    if said.standing.groups[0].get("opening") is not None:
+    """Wider alone: the gap, where there is one; so wide from left to right."""
+    if said.standing.groups[0].get("opening") is not None and not WHOLE.search(said.words):
         return gap(slots, said)
+    if "px" in slots:
+        slots.has("much")
+        wide = "wide" in slots["wide"] or ADDED_LENGTH.search(said.words)
+        return [{"kind": "scale", "px": slots["px"][0]}] if wide else None
     if any(e["kind"] == "spacing" for e in said.last):
         factor = factor_of(slots) ** (1 if slots["wide"][0] == "wider" else -1)
         return [{"kind": "spacing", "factor": rounded(factor)}]
@@ -153,12 +173,35 @@ def wider(slots: Slots, said: Said) -> Effects:
 def close(slots: Slots, said: Said) -> Effects:
     """The whole ring again, without an opening; "no gap, back" takes the last one back."""
     slots.has("relation")
-    if slots.has("back", "undo") and said.standing.changes:
+    to_none = BACK_TO.search(said.words) is not None  # an earlier gap may stand before the last
+    if slots.has("back", "undo") and said.standing.changes and not to_none:
         opened = [e["kind"] for e in said.standing.edits] == ["opening"]
         return [{"kind": "undo", "steps": 1}] if opened else [{"kind": "close"}]
     if said.standing.relation == "inside":
         return [{"kind": "arrange", "demands": {"relation": "around"}}]
     return [{"kind": "close"}]
+
+
+def closed_with(slots: Slots, said: Said) -> Effects:
+    """The whole ring again, of so many robots."""
+    counted = count(slots, replace(said, phrases=()))
+    if counted is None:
+        return None
+    return [*(close(slots, said) or ()), *(e for e in counted if e["kind"] != "talk")]
+
+
+def add_on_side(slots: Slots, said: Said) -> Effects:
+    """So many more on one side: of the row that stands there, else it is asked."""
+    n, groups = whole(slots), said.standing.groups
+    side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]))
+    slots.has("more", "add", "onword")
+    rows = [k for k, g in enumerate(groups, 1) if side in (g.get("side"), *(g.get("sides") or ()))]
+    if n is None or side is None:
+        return None
+    if len(rows) == 1:
+        return [{"kind": "add", "n": n, **({"group": rows[0]} if len(groups) > 1 else {})}]
+    question = f"Robots that are added share all of the way with the others. {n} more of them?"
+    return ask(question, f"{n} more", f"{n} more, all only on the {side} side")
 
 
 def opened(slots: Slots, said: Said) -> Effects:
@@ -183,3 +226,64 @@ def cage(slots: Slots, said: Said) -> Effects:
         near = {"relation": "cage", "closure": "escape-proof", "clearance": None}
         return [{"kind": "arrange", "demands": near}]
     return [{"kind": "escape-proof"}]
+
+
+def arrange(slots: Slots, said: Said) -> Effects:
+    """Another arrangement of the same robots."""
+    named = list(dict.fromkeys(slots["relation"]))
+    named = [r for r in named if r != "around"] or named
+    slots.has("back", "only", "onword")
+    if "along" in named and STRAIGHT.search(said.words):
+        return _straight(slots, said)
+    current = [str(name) for name in slots.get("current", ())]
+    if "both" in named:
+        ends = [name for name, _ in said.standing.things]
+        between = {"relation": "between", "targets": ends}
+        return [{"kind": "arrange", "demands": between}] if len(ends) == 2 else None
+    if len(named) != 1 or named[0] == "shape":
+        return None
+    relation = named[0]
+    edits: list[Effect] = []
+    if slots.has("thing", "there", "other"):
+        return target(slots, said)
+    if relation == "between":
+        return None
+    if relation == said.standing.relation and not slots.has("px", "flank", "side"):
+        return [{"kind": "talk", "about": "already"}]
+    demands = group_of(relation, slots)
+    if len(said.standing.targets) > len(said.standing.groups) and len(current) == 1:
+        demands["targets"] = current  # of two things one
+    edits.append({"kind": "arrange", "demands": demands})
+    if "px" in slots:
+        edits.append({"kind": "distance", "px": float(slots["px"][0])})
+    return edits
+
+
+def _straight(slots: Slots, said: Said) -> Effects:
+    """A straight line beside the thing; a row goes along its outline, however that bends."""
+    named = str((slots.get("flank") or slots.get("side") or [""])[0])
+    where = PLACES.get(named) or (None if named else said.standing.beside)
+    if slots.has("thing", "there", "other", "px", "away"):
+        return None
+    if where is None:
+        return ask("On which side?", *(f"in a straight line {w} it" for w in ("above", "below")))
+    shape = {"kind": "line", "where": where}
+    return [{"kind": "arrange", "demands": {"relation": "shape", "shape": shape}}]
+
+
+def arranged(slots: Slots, said: Said) -> Effects:
+    """Another arrangement, of so many robots."""
+    n = whole(slots)
+    if n is not None and EACH_CORNER.search(said.words):
+        n *= 4
+    if n is None or n > MAX_ROBOTS:
+        return None
+    given = Slots({k: v for k, v in slots.items() if k not in ("num", "lone")})
+    slots.used.update(slots)
+    made = arrange(given, said)
+    if not made or made[0]["kind"] not in ("arrange", "talk"):
+        return made
+    edits = [e for e in made if e["kind"] != "talk"]
+    counted: list[Effect] = [] if n == said.count else [{"kind": "count", "robots": n}]
+    fewer = n < said.count and any(e.get("demands", {}).get("relation") == "corners" for e in edits)
+    return ([*counted, *edits] if fewer else [*edits, *counted]) or made

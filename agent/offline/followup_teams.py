@@ -23,9 +23,10 @@ PLACING = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 """Robots, a number of them, a thing and such a word make a new instruction."""
-EACH_CORNER = re.compile(r"\b(?:each|every)\b.*\bcorner", re.IGNORECASE)
 ALIKE = re.compile(r"\b(?:same|too|also|as well|likewise)\b", re.IGNORECASE)
 SHARES = {"half": 2, "third": 3, "quarter": 4}
+DIRECTED = re.compile(r"^\W*(?:\w+ )?(?:(?P<up>up)|down) to\b", re.IGNORECASE)
+"""More or fewer than there are: "up to 9", "go down to five"."""
 LIKE_A_RING = ("around", "cage", "corners", "shape")
 """Arrangements about a thing, which "around" the next one keeps."""
 
@@ -126,6 +127,9 @@ def count(slots: Slots, said: Said) -> Effects:
         if "ratio_count" in slots
         else whole(slots)
     )
+    way = DIRECTED.search(said.words)
+    if n is not None and way and n != said.count and (n > said.count) != bool(way["up"]):
+        return ask(f"{n} of what?", f"{n} px away from it", f"make it {n} robots")
     if n is not None and n > MAX_ROBOTS:
         return refuse(f"{n:,} robots are too many; at most {MAX_ROBOTS:,} can be placed.")
     if n == said.count:
@@ -134,7 +138,25 @@ def count(slots: Slots, said: Said) -> Effects:
     if n and n > 2 * said.count and of_distance and "robotword" not in slots:
         return ask(f"{n} of what?", f"{n} px away from it", f"{n} robots")
     kept = re.match(r"\W*keep\b", said.words, re.IGNORECASE) is None or (n or 0) <= said.count
-    return None if n is None or not kept else [{"kind": "count", "robots": n}]
+    return None if n is None or not kept or _rearranges(said) else [{"kind": "count", "robots": n}]
+
+
+def _rearranges(said: Said) -> bool:
+    """Whether another arrangement is named beside a number: "six around it", not "around six".
+
+    So is all of a ring where only a part of it is stood on.
+    """
+    stands = (said.standing.relation, *(LIKE_A_RING if said.standing.targets else ()))
+    after = [c.kinds for c, _ in said.phrases[1:]] + [{}]
+    named = [c.kinds.get("relation", stands[0]) for c, _ in said.phrases]
+    group = said.standing.groups[0]
+    partly = group.get("sides") or group.get("opening") is not None
+    if partly and any("close" in c.kinds for c, _ in said.phrases):
+        return True
+    return any(
+        r not in (stands if stands[0] in LIKE_A_RING else stands[:1]) and "num" not in then
+        for r, then in zip(named, after, strict=False)
+    )
 
 
 def needed(slots: Slots, said: Said) -> Effects:
@@ -210,13 +232,15 @@ def target(slots: Slots, said: Said) -> Effects:
     if "to" in last and last["kind"] == "add" and ALIKE.search(said.words):
         return [last | {"to": to}]
     relation = slots.get("relation", ["around"])[0]
+    if relation == "around" and not said.standing.targets:
+        return [{"kind": "arrange", "demands": {"relation": relation, "targets": [to]}}]
     kept = relation == said.standing.relation or (
         relation == "around" and said.standing.relation in LIKE_A_RING
     )
     if "same" in slots or "relation" not in slots or kept:
         return [moved]
     return (
-        [moved, {"kind": "arrange", "demands": _group(relation, slots)}]
+        [moved, {"kind": "arrange", "demands": group_of(relation, slots)}]
         if relation != "shape"
         else None
     )
@@ -303,6 +327,8 @@ def merge_to(slots: Slots, said: Said) -> Effects:
 def even_out(slots: Slots, said: Said) -> Effects:
     """The gaps that were left are shared out."""
     slots.has("rest")
+    if slots.get("num", [said.count]) != [said.count]:
+        return None
     demands = {"relation": said.standing.relation, "spacing": "even"}
     return [{"kind": "arrange", "demands": demands}]
 
@@ -327,54 +353,7 @@ def add_one(slots: Slots, said: Said) -> Effects:
     return ask("Another robot, or another thing?", "one more robot", "around the other one")
 
 
-def arrange(slots: Slots, said: Said) -> Effects:
-    """Another arrangement of the same robots."""
-    named = list(dict.fromkeys(slots["relation"]))
-    named = [r for r in named if r != "around"] or named
-    slots.has("back", "only", "onword")
-    current = [str(name) for name in slots.get("current", ())]
-    if "both" in named:
-        ends = [name for name, _ in said.standing.things]
-        between = {"relation": "between", "targets": ends}
-        return [{"kind": "arrange", "demands": between}] if len(ends) == 2 else None
-    if len(named) != 1 or named[0] == "shape":
-        return None
-    relation = named[0]
-    edits: list[Effect] = []
-    if slots.has("thing", "there", "other"):
-        return target(slots, said)
-    if relation == "between":
-        return None
-    if relation == said.standing.relation and not slots.has("px", "flank", "side"):
-        return [{"kind": "talk", "about": "already"}]
-    demands = _group(relation, slots)
-    if len(said.standing.targets) > len(said.standing.groups) and len(current) == 1:
-        demands["targets"] = current  # of two things one
-    edits.append({"kind": "arrange", "demands": demands})
-    if "px" in slots:
-        edits.append({"kind": "distance", "px": float(slots["px"][0])})
-    return edits
-
-
-def arranged(slots: Slots, said: Said) -> Effects:
-    """Another arrangement, of so many robots."""
-    n = whole(slots)
-    if n is not None and EACH_CORNER.search(said.words):
-        n *= 4
-    if n is None or n > MAX_ROBOTS:
-        return None
-    given = Slots({k: v for k, v in slots.items() if k not in ("num", "lone")})
-    slots.used.update(slots)
-    made = arrange(given, said)
-    if not made or made[0]["kind"] not in ("arrange", "talk"):
-        return made
-    edits = [e for e in made if e["kind"] != "talk"]
-    counted: list[Effect] = [] if n == said.count else [{"kind": "count", "robots": n}]
-    fewer = n < said.count and any(e.get("demands", {}).get("relation") == "corners" for e in edits)
-    return ([*counted, *edits] if fewer else [*edits, *counted]) or made
-
-
-def _group(relation: str, slots: Slots) -> Effect:
+def group_of(relation: str, slots: Slots) -> Effect:
     """The fields of the group of an arrangement; a circle, about a thing of any shape, is drawn."""
     if relation == "circle":
         return {"relation": "shape", "shape": {"kind": "circle", "where": "around"}}

@@ -3,10 +3,12 @@
 import re
 
 from .followup_edits import (
+    ROWS,
     Effect,
     Effects,
     Said,
     ask,
+    listed,
     refuse,
 )
 from .followup_frames import Slots
@@ -19,6 +21,26 @@ STATED, WIDEST = 2.0, 0.11
 """Widest range of a distance that was stated: so many px, or this share of it."""
 CHOSEN = re.compile(r"\bnot\b|\b(?:then|sorry|i mean(?:t)?|rather|instead)\W*$", re.IGNORECASE)
 """What says that something is chosen: "six then", "7, not 5"."""
+STATED_BY = ("distance", "spacing", "opening")
+"""Kinds of edits by a length that is meant exactly."""
+STEPS = re.compile(r"\b(?:steps?|changes?|edits?|times|plans?|moves)\b", re.IGNORECASE)
+CALLED = {
+    "swap": ("swap",),
+    "turn": ("rotate",),
+    "spin": ("rotate",),
+    "mirror": ("mirror",),
+    "gap": ("opening", "close", "sides"),
+    "scale": ("scale",),
+    "add": ("add", "count"),
+    "remove": ("remove", "count"),
+    "apart": ("spacing",),
+    "quantity": ("distance", "out", "in", "spacing", "count"),
+    "split": ("target",),
+    "face": ("heading",),
+    "dir": ("shift", "place"),
+}
+"""What changes are called, by the kinds of phrases that say it, and of which kinds they are."""
+OF_THEM = re.compile(r"\bof them\b|\b(?:robots|bots|drones|units)\b", re.IGNORECASE)
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
@@ -53,9 +75,41 @@ def returned(slots: Slots, said: Said) -> Effects:
     if not named and len(numbers) == 1 and numbers[0] < gone and PUT_BACK.search(said.words):
         return [{"kind": "add", "n": numbers[0]}]
     for steps, (relations, robots) in enumerate(said.standing.past, 1):
-        if named <= {*relations} and numbers in ([], [robots]) and BACK_TO.search(said.words):
+        fits = named <= {*relations} and numbers in ([], [robots])
+        if fits and (steps == 1 or named or not numbers) and BACK_TO.search(said.words):
             return [{"kind": "undo", "steps": steps}]
-    return None
+    if named or len(numbers) != 1 or not BACK_TO.search(said.words) or STEPS.search(said.words):
+        return None
+    last = said.last[-1] if len(said.last) == 1 else {}
+    if "px" in last and last["kind"] in STATED_BY:
+        return ask(f"{numbers[0]} of what?", f"make it {numbers[0]} px", f"{numbers[0]} robots")
+    return count(Slots(num=numbers), said)
+
+
+def put_back(slots: Slots, said: Said) -> Effects:
+    """Robots as they stood before the last change."""
+    return stay(slots, said) if said.standing.edits else None
+
+
+def undone(slots: Slots, said: Said) -> Effects:
+    """The last change taken back, where it is called by what it was: "undo the swap"."""
+    names = {e for name in CALLED for e in CALLED[name] if name in slots}
+    last = [str(e["kind"]) for e in said.standing.edits]
+    if {*last} & names:
+        return undo(Slots(), said)
+    what = f"The last change was of another kind: {listed(last)}." if last else "Nothing to undo."
+    return ask(f"{what} Undo that?", "undo") if last else undo(Slots(), said)
+
+
+def kept(slots: Slots, said: Said) -> Effects:
+    """What stays as it is beside a change: the spacing, by a demand of its own."""
+    of = str(slots["quantity"][0])
+    if re.search(r"\b(?:keep\w*|same|leave|stays?|unchanged)\b", said.words, re.IGNORECASE) is None:
+        return None
+    if of == "spacing" and said.standing.relation not in ROWS:
+        return None  # on a ring, that would take another distance
+    keeps = {"kind": "spacing", "factor": 1.0} if of == "spacing" else None
+    return [keeps or {"kind": "talk", "about": "already"}]
 
 
 def unadded(slots: Slots, said: Said) -> Effects:
@@ -130,16 +184,19 @@ def steps(slots: Slots, said: Said) -> Effects:
 
 def bare(slots: Slots, said: Said) -> Effects:
     """An amount alone: what it is of is asked."""
+    last = said.last[-1] if len(said.last) == 1 else {}
+    exact = "px" in last and last["kind"] in STATED_BY
+    if "px" in slots and exact and (said.denies or CHOSEN.search(said.line)):
+        return [last | {"px": float(slots["px"][0])}]
     if "px" in slots and slots["px"][0] > 0 and _is_at_length(said):
         return [{"kind": "distance", "px": float(slots["px"][0])}]
     if "px" in slots:
         px = f"{slots['px'][0]:g} px"
         moves = (f"{px} further out", f"{px} closer") if slots["px"][0] > 0 else ()
         return ask(f"{px} of what?", f"{px} away from it", *moves)
-    last = said.last[-1] if len(said.last) == 1 else {}
-    if "num" in slots and "px" in last and last["kind"] in ("distance", "spacing", "opening"):
+    if "num" in slots and exact:
         return [last | {"px": float(slots["num"][0])}]
-    if "num" in slots and _is_count(said):
+    if "num" in slots and _is_count(slots["num"][0], said):
         return count(Slots(num=slots["num"]), said)
     if "num" in slots:
         n = f"{slots['num'][0]:g}"
@@ -147,13 +204,19 @@ def bare(slots: Slots, said: Said) -> Effects:
     return ask(f'What should change, in "{said.words}"?', *MOVES[1:])
 
 
-def _is_count(said: Said) -> bool:
+def _is_count(n: float, said: Said) -> bool:
     """Whether a bare number is one of robots: they were counted last, or it corrects the first."""
-    if any("howmany" in c.kinds for c in chunks_of(said.standing.said, said.standing)):
+    before = chunks_of(said.standing.said, said.standing)
+    if any("howmany" in c.kinds for c in before):
         return True
     counted = {e["kind"] for e in said.last} <= {"count"}
     chosen = said.denies or CHOSEN.search(said.line) is not None
-    return counted and chosen and len(said.standing.groups) < 2
+    amounts = ("num", "px", "m", "angle", "share")
+    spoken = [c.kinds[a] for c in before for a in amounts if a in c.kinds]
+    named = n > said.count and OF_THEM.search(said.line) is not None
+    chosen = chosen or (spoken == [said.count] and n <= 2 * said.count)
+    far = n > 2 * said.count and _is_at_length(said)
+    return (named or (counted and chosen and not far)) and len(said.standing.groups) < 2
 
 
 def _is_at_length(said: Said) -> bool:

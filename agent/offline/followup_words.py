@@ -124,7 +124,8 @@ class _Reader:
                 if kinds:
                     found, end = kinds, k + 1
             k += 1
-        return dict(found), end
+        new = self.plain[at] in ("a", "an") and "relation" in found  # "a V", not "the V"
+        return {k: v for k, v in found.items() if not (new and k == "team")}, end
 
     def _until(self, at: int, end: int) -> int:
         """The word after a place in the text."""

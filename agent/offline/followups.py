@@ -5,12 +5,12 @@ asked about, quoting what was not understood. Nothing said is left out.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 from .accounting import read_instruction
-from .asides import without_asides
+from .asides import TELLS_OF, without_asides
 from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty, is_part
 from .drafting import contract_of
 from .drawn_forms import form_in
@@ -33,6 +33,13 @@ INSTRUCTING = (
     *("distance", "shift"),
 )
 """Frames of what is an instruction when no plan stands."""
+REMEDIES = ("out", "in", "distance", "scale", "spacing", "count", "add", "remove")
+"""Kinds of edits that say what is to be done about "too close"."""
+KEEPS = re.compile(
+    r"\bkeep\w* (?:(?:the|this|that|their|same) )*(?P<what>distance|number)\b", re.IGNORECASE
+)
+KEPT = {"distance": {"out", "in", "distance", "scale"}, "number": {"count", "add", "remove"}}
+"""What may not be changed where it is to be kept, by the kinds of edits that change it."""
 ADDING = ("more", "less", "again", "toofar", "otherway", "corrected")
 """Frames that build on the last change also after "no"."""
 PLAIN = (
@@ -105,14 +112,15 @@ def read_followup(words: str, standing: Standing | None) -> Followup:
     if standing is not None:
         words, _ = without_follow(words, standing.stood_about, standing.metres_per_pixel)
     meant = _read(words, standing)
-    if standing is None or meant.kind != "ask":
+    if standing is None or not (meant.kind == "ask" or meant.things):
         return meant
     kept, told = without_asides(words, standing)
+    told = told if meant.kind == "ask" else tuple(part for part in told if TELLS_OF.match(part))
     if not told or not kept.strip(" ,.;:!?"):
         return meant
     plain = _read(kept, standing)
-    clear = plain.kind not in ("ask", "refuse", "instruction", "talk")
-    return replace(plain, background=told) if clear else meant
+    clear = plain.kind not in ("ask", "instruction", "talk")
+    return replace(plain, background=(*plain.background, *told)) if clear else meant
 
 
 def _read(words: str, standing: Standing | None) -> Followup:
@@ -211,7 +219,8 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
     if question is not None:
         return question
     undo = sum(e.get("steps", 0) for e in effects if e["kind"] == "undo")
-    edits.sort(key=lambda e: e["kind"] == "escape-proof")  # with as many as there are then
+    # a spacing that is kept is that of before, and a ring holds with as many as there are then
+    edits.sort(key=lambda e: (e.get("factor") != 1, e["kind"] == "escape-proof"))
     added = line.adds or clauses[0].frame in ADDING
     if "no " in line.led and edits and not undo and not added:
         last = [dict(e) for e in line.standing.edits]
@@ -221,7 +230,8 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
             made = corrected(last, edits)
             undo = sum(e.get("steps", 0) for e in made if e["kind"] == "undo")
             edits = [e for e in made if e["kind"] != "undo"]
-    return _settled(line, effects, edits, undo)
+    moot = [line.words_of(c.chunks) for c in clauses if c.frame == "toofar" and c not in kept]
+    return replace(_settled(line, effects, edits, undo), background=tuple(moot))
 
 
 def _edits(clause: Clause) -> bool:
@@ -243,8 +253,10 @@ def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
     waved = [c for c in kept if waving & set(line.words_of(c.chunks).lower().split())]
     lessened = [c for c in kept if c.frame in ("less", "toofar")]
     gaps = any(e["kind"] == "opening" for c in kept if c not in lessened for e in c.effects)
+    others = [e["kind"] for c in kept if c not in lessened for e in c.effects]
     other = any(c not in lessened and c.frame not in TALK for c in kept)
-    doubtful = [c for c in lessened if gaps or (other and not c.settled)]
+    mended = gaps or any(kind in REMEDIES for kind in others)
+    doubtful = [c for c in lessened if mended or (other and not c.settled)]
     moot = [*waved, *lessened[1:], *doubtful]
     return [c for c in kept if c not in moot] or kept
 
@@ -252,6 +264,10 @@ def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
 def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
     """The question to ask where edits contradict each other."""
     alone = [e["kind"] for e in edits if "group" not in e and not e.get("robots")]
+    kept = KEEPS.search(line.words)
+    if kept and {*alone} & KEPT[kept["what"].lower()]:
+        question = f'"{line.words}" both changes and keeps the {kept["what"]}. Which?'
+        return _questioned(line, question)
     if {"out", "in"} <= {*alone}:
         says = "says both further out and closer. Which?"
         return _questioned(line, f'"{line.words}" {says}', ("further out", "closer"))
@@ -272,6 +288,13 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
     """The follow-up of effects that neither ask nor refuse."""
     kinds = [e["kind"] for e in effects]
     stays = [r for e in effects if e["kind"] == "stay" for r in e["robots"]] + [*line.excepted]
+    moved = {e.get(name) for e in line.standing.edits for name in _called_in(e)}
+    swapped = [e["kind"] for e in line.standing.edits] == ["swap"] and moved & {*stays}
+    unchanged = not moved or line.standing.said not in ("", line.standing.words)
+    if stays and not edits and unchanged and line.denies:
+        return Followup("talk", about="already")
+    if stays and not edits and (swapped or (moved and moved <= {*stays})):
+        return Followup("undo", undo=1)
     if stays and not edits:
         if not line.standing.edits:
             return _questioned(line, f"Robot {listed(stays)} stays. What should the others do?")
@@ -299,6 +322,11 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
     )
 
 
+def _called_in(edit: Mapping[str, Any]) -> tuple[str, ...]:
+    """The fields of an edit in which single robots are named."""
+    return ("a", "b") if edit["kind"] == "swap" else ("robot",)
+
+
 def _about(talk: Sequence[str]) -> str:
     """What is talked about above all: thanks and greetings come last."""
     weighty = (about for about in talk if about not in ("thanks", "hello"))
@@ -321,12 +349,17 @@ def _not_framed(line: Line) -> Followup:
         return Followup("instruction", text=text)
     drawn = text[slice(*form_in(text)[1])].lower()
     known = {*rules()["common"], *rules()["void"], "relation"}
+    known |= {"side", "dir"} if "side" in reading.group else set[str]()
     words = (line.words_of([c]).lower() for c in line.chunks if not known & set(c.kinds))
     if reading.form is None or any(word not in drawn for word in words):
         return _not_understood(line)
     group = contract_of(reading, reading.robots or len(line.standing.robots), [], [])["groups"][0]
     fields = {k: v for k, v in group.items() if (k, v) not in DEFAULTS}
     demands = {k: v for k, v in fields.items() if k not in ("robots", "targets")}
+    demands["shape"]["where"] = demands["shape"]["where"] or line.standing.beside
+    if demands["shape"]["where"] is None:
+        options = tuple(f"{text} on the {side}" for side in ("left", "right"))
+        return _questioned(line, f'Where by it, in "{text}"?', options)
     edits: list[Effect] = [{"kind": "arrange", "demands": demands}]
     edits += [{"kind": "count", "robots": reading.robots}] if reading.robots else []
     return Followup("edits", edits=tuple(edits))

@@ -5,7 +5,9 @@ A slip is put right where only one known word can be meant.
 
 import re
 from functools import cache
+from importlib import resources
 
+from ...tools.formation.number_words import SMALL, TENS
 from .followup_words import known_words, lexicon, rules
 from .lexicon import fillers
 from .phrases import HEADS, phrase, table
@@ -28,6 +30,8 @@ NOUNS = frozenset(
     | {"robotword", "other", "rest", "portion", "it", "same", "opposite", "nearest", "first"}
 )
 """Kinds of phrases that may follow "the"; others are no name, such as what is to be done."""
+NUMBER = rf"(?:[0-9]+|{'|'.join((*SMALL, *TENS))})"
+"""What `<n>` stands for in the patterns of followups.yaml."""
 UNITS = ("degrees", "pixels", "metres", "meters")
 
 
@@ -55,7 +59,7 @@ def instructed(text: str) -> str:
 @cache
 def _short_forms() -> list[tuple[re.Pattern[str], str]]:
     """Short forms of first instructions, of followups.yaml, and what each becomes."""
-    return [(re.compile(pattern), put) for pattern, put in rules()["short_forms"]]
+    return [(re.compile(p.replace("<n>", NUMBER)), put) for p, put in rules()["short_forms"]]
 
 
 @cache
@@ -77,8 +81,16 @@ def _rewritten() -> list[tuple[re.Pattern[str], str]]:
         for part, degrees in rules()["parts"].items()
     ]
     return [
-        (re.compile(p), put) for p, put in [*rules()["short_forms"], *rules()["rewritten"], *parts]
+        (re.compile(p.replace("<n>", NUMBER)), put)
+        for p, put in [*rules()["short_forms"], *rules()["rewritten"], *parts]
     ]
+
+
+@cache
+def _everyday() -> frozenset[str]:
+    """Words of everyday English that are one slip away from another one, everyday.txt."""
+    text = resources.files(__package__ or "").joinpath("everyday.txt").read_text("utf-8")
+    return frozenset(text.split())
 
 
 @cache
@@ -94,7 +106,7 @@ def _meant(word: str, names: bool = False) -> str | None:
     drawn = [re.sub(r"(.)\1{2,}", put, word) for put in (r"\1", r"\1\1")]  # "sooo"
     if word not in drawn:
         return next((w for w in drawn if w in known), None)
-    if len(word) < LEAST_CORRECTED or word in known or phrase([word], 0) is not None:
+    if len(word) < LEAST_CORRECTED or word in known | _everyday() or phrase([word], 0) is not None:
         return None
     near = [w for w in _telling_words() if len(w) >= LEAST_CORRECTED and _is_slip(word, w)]
     if len(near) != 1 or (names and not _may_be_named(word, near[0])):

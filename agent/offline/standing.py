@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from .drawn_forms import SIDES
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -74,6 +76,14 @@ class Standing:
     def relation(self) -> str:
         """Of the first group."""
         return str(self.groups[0]["relation"])
+
+    @property
+    def beside(self) -> str | None:
+        """Where by its target the first group's form or row is: "above"; None for what is round."""
+        group = self.groups[0]
+        shape: dict[str, Any] = group.get("shape") or {}
+        where: str | None = shape.get("where")
+        return where or SIDES.get(str(group.get("side")))
 
     @property
     def targets(self) -> list[str]:

@@ -5,6 +5,7 @@ Whatever an edit does not name stays as it is, and every robot keeps its number.
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import count
 from typing import Annotated, Any
 
@@ -14,7 +15,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from ..context import Context
 from ..errors import ToolError
-from ..formation.editing.edit_kinds import Edit
+from ..formation.editing.edit_kinds import Edit, Offset, Place, Shift
 from ..formation.editing.edits import Edited, edited
 from ..formation.plan import Plan
 from ..formation.units import with_metres
@@ -28,6 +29,8 @@ from .targets import doubtful, measured_all, with_pointed
 
 MOST_MOVES = 12
 """Robots of a reply whose ways are listed; of the others the number and the longest."""
+SHARES = (0.75, 0.5, 0.25)
+"""Of a way that there is no room for, those that are tried."""
 STAYS = 0.05
 """A robot whose place is nearer than this to the one it had, px, stays."""
 SHORT: dict[str, Any] = {
@@ -97,11 +100,34 @@ def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]
         more = len(findings) - MAX_FINDINGS
         text = " ".join([*findings[:MAX_FINDINGS], *([f"And {more} more."] if more > 0 else [])])
         raise ToolError(
-            f"Nothing was changed: plan {plan.id} stands, because after this {text}",
+            f"Nothing was changed: plan {plan.id} stands, because after this {text}"
+            f"{_possible(world, plan, edits, stay)}",
             "edit",
             findings=findings,
         )
     return made
+
+
+def _possible(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]) -> str:
+    """How much of a move that is refused would do, as a sentence; "" where none is known to."""
+    for share in SHARES:
+        less = [_lessened(edit, share) for edit in edits]
+        with suppress(ToolError):
+            made = edited(plan, less, world.whole_site, world.version_of, stay)
+            if less != list(edits) and made.plan.verdict.certified:
+                return f" {share:.0%} of that way would do."
+    return ""
+
+
+def _lessened(edit: Edit, share: float) -> Edit:
+    """An edit that moves by a share of the way that another one does."""
+    if isinstance(edit, Shift):
+        return edit.model_copy(update={"dx": edit.dx * share, "dy": edit.dy * share})
+    if isinstance(edit, Place) and edit.by is not None:
+        return edit.model_copy(update={"by": (edit.by[0] * share, edit.by[1] * share)})
+    if isinstance(edit, Offset) and edit.px is not None:
+        return edit.model_copy(update={"px": edit.px * share})
+    return edit
 
 
 def previewed(world: World, edits: Sequence[Edit], plan_id: str | None = None) -> Plan:

@@ -36,3 +36,11 @@ def test_the_name_of_a_thing_is_no_slip(words: str) -> None:
 )
 def test_a_slip_is_put_right(typed: str, meant: str) -> None:
     assert spelled(typed) == meant
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["roger", "it is boring", "save some room for my wife", "that was a shame", "the whole world"],
+)
+def test_a_word_of_everyday_english_is_no_slip(words: str) -> None:
+    assert spelled(words) == words

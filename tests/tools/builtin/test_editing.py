@@ -125,3 +125,13 @@ def test_the_plan_is_measured_robot_by_robot(work: "ToolCalls") -> None:
         work.call("measure", a="r9", b="t1")
     with pytest.raises(ToolError, match="b is missing"):
         work.call("measure", a="t1")
+
+
+def test_how_much_of_a_way_there_is_room_for_is_said(work: "ToolCalls") -> None:
+    x, y = places(work)["1"]
+    by = [(BOX[0] + BOX[2]) / 4 - x / 2, (BOX[1] + BOX[3]) / 4 - y / 2]
+    with pytest.raises(ToolError, match="25% of that way would do") as refused:
+        edit(work, {"kind": "place", "robot": 1, "by": by})
+    assert "stands on t1" in str(refused.value)
+    quarter = [0.25 * v for v in by]
+    assert edit(work, {"kind": "place", "robot": 1, "by": quarter})["moving"] == 1

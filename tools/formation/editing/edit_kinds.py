@@ -95,10 +95,15 @@ class Shift(_GroupEdit):
 
 
 class Scale(_GroupEdit):
-    """Larger or smaller about the thing robots are round or in; a row or form about its middle."""
+    """Larger or smaller about the thing robots are round or in; a row or form about its middle.
 
+    px is how wide it is then, from the leftmost robot to the rightmost.
+    """
+
+    ONE_OF = ("px", "factor")
     kind: Literal["scale"] = "scale"
-    factor: Annotated[float, Field(gt=0, le=1000)]
+    px: Positive | None = None
+    factor: Annotated[float, Field(gt=0, le=1000)] | None = None
 
 
 class Add(_GroupEdit):

@@ -49,6 +49,8 @@ HELD_TO = {
 SAME_WIDTH, HALVINGS = 1e-3, 40
 STRAIGHT = 0.5
 """Robots this near to a line, px, stand on it."""
+ALONG = 0.9
+"""Share of a way that leads along a row's side, from which on the row slides along it."""
 QUARTERS: tuple[SideName, ...] = ("left", "top", "right", "bottom")
 """Clockwise as seen."""
 OPPOSITE: Mapping[str, Mapping[str, SideName]] = {
@@ -77,7 +79,7 @@ def _moved(part: Part, edit: Rotate | Mirror | Shift | Scale) -> tuple[Part, tup
     if isinstance(edit, Rotate):
         there = _rotated(part, edit.degrees)
     elif isinstance(edit, Scale):
-        there = scaled(part, edit.factor)
+        there = scaled(part, edit.factor or _widened(part, edit.px or 0.0))
     else:
         there = _mirrored(part, edit) if isinstance(edit, Mirror) else _shifted(part, edit)
     findings = there.findings
@@ -88,7 +90,8 @@ def _moved(part: Part, edit: Rotate | Mirror | Shift | Scale) -> tuple[Part, tup
     findings = there.findings if findings else ()
     kept = _kept(part, edit) if findings else set[str]()
     if not findings or any(f.kind in kept or f.kind not in HELD_TO for f in findings):
-        return there, ()
+        slid = _slid(part, edit) if findings and isinstance(edit, Shift) else None
+        return slid or there, ()
     return _freed(there), findings
 
 
@@ -239,6 +242,37 @@ def _shifted(part: Part, edit: Shift) -> Part:
     least, greatest = min(least, float(off.min())), max(greatest, float(off.max()))
     clearance = (math.floor(least * 1e3) / 1e3, math.ceil(greatest * 1e3) / 1e3)
     return there.to(there.points, clearance=clearance)
+
+
+def _widened(part: Part, px: float) -> float:
+    """The factor that makes robots stand so wide, px.
+
+    Raises:
+        ToolError: they have no width, as one robot or a row up and down.
+    """
+    width = float(np.ptp(part.points[:, 0]))
+    if width < STRAIGHT:
+        raise ToolError("The robots stand above one another: scale them by a factor instead.")
+    return px / width
+
+
+def _slid(part: Part, edit: Shift) -> Part | None:
+    """A row moved along the side it keeps its distance to; None where that is not the way meant."""
+    if part.group.relation != "along":
+        return None
+    here = part.track(len(part.points))
+    if len(here.curve.lines) != 1 or not here.holds(part.points):
+        return None
+    stations, way = here.stations(part.points), np.array([edit.dx, edit.dy])
+    ends = here.at(np.array([stations.min(), stations.max()]))
+    unit = (ends[1] - ends[0]) / max(float(np.linalg.norm(ends[1] - ends[0])), 1e-9)
+    by = float(way @ unit)
+    there = stations + by
+    off = abs(by) < ALONG * np.linalg.norm(way)
+    if off or there.min() < 0 or there.max() > here.curve.length:
+        return None
+    slid = part.to(here.at(there))
+    return slid if slid.certified else None
 
 
 def scaled(part: Part, factor: float) -> Part:

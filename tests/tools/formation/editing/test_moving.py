@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from formup.tools.errors import ToolError
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.editing.edit_kinds import Edit
 from formup.tools.formation.editing.edits import Edited, edited
@@ -183,3 +184,22 @@ def test_a_mirrored_formation_is_certified_though_its_thing_is_no_mirror_image(
 def test_out_of_the_picture_is_a_sentence() -> None:
     found = after(standing("row"), {"kind": "shift", "dx": 600})
     assert {f.kind for f in found.plan.verdict.findings} >= {"out_of_picture"}
+
+
+def test_a_row_at_a_stated_distance_slides_along_its_side() -> None:
+    plan = standing("row", robots=3, clearance=(10, 11), pitch=20)
+    found = after(plan, {"kind": "shift", "dx": 0, "dy": 15})
+    assert found.plan.verdict.certified
+    assert found.plan.formation.contract.groups[0].relation == "along"
+    np.testing.assert_allclose(points(found) - points(plan), [[0, 15]] * 3, atol=0.1)
+
+
+@pytest.mark.parametrize("name", ["ring", "v", "square"])
+def test_robots_stand_as_wide_as_was_said(name: str) -> None:
+    found = after(standing(name), {"kind": "scale", "px": 200})
+    assert float(np.ptp(points(found)[:, 0])) == pytest.approx(200, abs=0.01)
+
+
+def test_robots_above_one_another_have_no_width() -> None:
+    with pytest.raises(ToolError, match="by a factor"):
+        after(standing("row"), {"kind": "scale", "px": 200})
