@@ -5,8 +5,8 @@ that is repeated to the person, or is left unread: then the planner asks and quo
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
+from .barring import ENDS, MAY_BE, Barring
 from .demand_fields import Fields
 from .demands import (
     Item,
@@ -54,18 +54,11 @@ PLACES = {
     "along": ("beside", "by", "near", "at", "to"),
 }
 """Words directly before a thing, and where a form is drawn then."""
-CLOSING = {"enclose", "enclosure", "prevent"}
-MAY_CLOSE = 0.2
-"""Least probability of a cage for one of these classes to settle it."""
 PREPOSITIONS = frozenset(word for words in PLACES.values() for word in words)
 DEFINITE = frozenset(("the", "this", "that", "these", "those", "my", "our", "your"))
 """Articles after which a phrase for a thing goes on."""
-SUBJECTS = frozenset(("nobody", "none", "nothing", "no", "anything"))
-"""Negations that are what a sentence is about, whoever it is told to."""
 OUTWARD = frozenset(("off", "away", "clear", "out", "outside"))
 """Words with a distance that is kept outside the thing."""
-ENDS = frozenset(",.;:!?()")
-"""Signs at which a stretch of words that was not understood ends."""
 
 
 def read_instruction(text: str, metres_per_pixel: float | None = None) -> Reading:
@@ -102,10 +95,8 @@ class _Reader:
         self.fields = Fields(text, items, reading, metres_per_pixel)
         self.taken = [item.symbol == "<f>" for item in items]
         self.classes = [frozenset(c) for c in word_classes([item.symbol for item in items])]
-        ends = [k for k, item in enumerate(items) if item.symbol in ENDS]
-        bounds = pairwise([-1, *ends, len(items)])
-        self.clauses = [range(first + 1, last) for first, last in bounds]
-        self.prevented = self._prevented()
+        self.barring = Barring(items, self.classes)
+        self.clauses, self.prevented = self.barring.clauses, self.barring.prevented
         self.demands = tuple(
             d
             for d in demands_in(items)
@@ -128,18 +119,6 @@ class _Reader:
         self._count_alone()
         self._account()
         return self.reading
-
-    def _prevented(self) -> frozenset[int]:
-        """Items that say what must not happen: "so that nobody gets near it"."""
-        found: set[int] = set()
-        for clause in self.clauses:
-            start = next((k for k in clause if self.items[k].symbol == "so"), clause.stop)
-            rest = range(start, clause.stop)
-            symbols = {self.items[k].symbol for k in rest}
-            prevents = any("prevent" in self.classes[k] for k in rest)
-            if symbols & NEGATIONS and prevents and not symbols & {"robot", "robots"}:
-                found |= {*rest}
-        return frozenset(found)
 
     def _count_corners(self) -> None:
         """As many robots as the words name corners, where they name no robots."""
@@ -180,7 +159,7 @@ class _Reader:
         """A form that is named is drawn, and a side that is named takes a row."""
         reading = self.reading
         sets = {d.sets for d in self.demands}
-        forced = "cage" if self._closes() else None
+        forced = "cage" if self.barring.closes(reading, self.demands) else None
         if reading.form is not None or "form" in sets:
             forced = "shape"
         elif self._parts():
@@ -205,53 +184,8 @@ class _Reader:
     def _parts(self) -> bool:
         """Whether the command says between: the arrangement is no other then."""
         return any(i.symbol == "between" and i.label == "command" for i in self.items) and (
-            dict(self.reading.meanings).get("between", 0) >= MAY_CLOSE
+            dict(self.reading.meanings).get("between", 0) >= MAY_BE
         )
-
-    def _closes(self) -> bool:
-        """Whether a command for a ring has a word that closes it: a barrier all round."""
-        likely = dict(self.reading.meanings).get("cage", 0)
-        if self.reading.relation == "around" and self._prevents():
-            return True
-        closing = any(
-            classes & CLOSING and not classes & {"surround", "ring", "near"}
-            for k, classes in enumerate(self.classes)
-            if self.items[k].label == "command" and not self._is_forbidden(k)
-        )
-        return self.reading.relation == "around" and closing and likely >= MAY_CLOSE
-
-    def _prevents(self) -> bool:
-        """Whether a sentence says that something must not get in or out."""
-        demanded = {k for d in self.demands for k in range(d.first, d.last)}
-        at = 0
-        for sentence in sentences(self.items):
-            place = [k for k in range(at, at + len(sentence)) if k not in demanded]
-            at += len(sentence)
-            symbols = {self.items[k].symbol for k in place}
-            negated = any(self._forbids_others(k, place) for k in place)
-            if negated and any("prevent" in self.classes[k] for k in place):
-                return True
-            if "kept" in symbols and symbols & {"out", "away", "in"}:
-                return True
-        return False
-
-    def _is_forbidden(self, k: int) -> bool:
-        """Whether robots are told not to do it: "and do not block it"."""
-        clause = next((c for c in self.clauses if k in c), range(0))
-        before = [j for j in clause if j < k and self.items[j].symbol in NEGATIONS]
-        return any(not self._forbids_others(j, clause) for j in before)
-
-    def _forbids_others(self, k: int, sentence: Sequence[int]) -> bool:
-        """Whether a negation is about somebody else: "nobody", but not "they must not touch it"."""
-        symbol = self.items[k].symbol
-        if symbol not in NEGATIONS or symbol == "without":
-            return False
-        clause = next(c for c in self.clauses if k in c)
-        before = [j for j in sentence if j in clause and j < k]
-        told = {self.items[j].symbol for j in before}
-        orders = not told - {"and", "but", "so", "please", "they", "do"}
-        to_robots = bool(told & {"they", "you"}) or any("robot" in self.classes[j] for j in before)
-        return symbol in SUBJECTS or not (orders or to_robots)
 
     def _refer(self) -> None:
         """Phrases for things: the arrangement is about those that no demand took."""
