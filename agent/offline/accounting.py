@@ -7,7 +7,7 @@ that is repeated to the person, or is left unread: then the planner asks and quo
 from collections.abc import Iterator, Sequence
 
 from .barring import ENDS, MAY_BE, Barring
-from .demand_fields import Fields
+from .demand_fields import LENGTHS, Fields
 from .demands import (
     Item,
     demands_in,
@@ -113,6 +113,8 @@ class _Reader:
             elif demand.sets not in OF_OTHERS:  # what it names is the target
                 self.fields.mentioned += range(demand.first, demand.last)
             self.taken[demand.first : demand.last] = [True] * (demand.last - demand.first)
+        for demand in self.fields.unsettled():
+            self.reading.unread.append(self._quote(demand.first, demand.last))
         self._count_corners()
         self._refer()
         self.reading.place = self._place()
@@ -166,7 +168,7 @@ class _Reader:
             forced = "between"
         elif sets & {"rings", "rings_of"} and reading.relation in ("several", "shape"):
             forced = next(m for m, _ in reading.meanings if m in ("around", "cage", "along"))
-        elif "groups" in sets and reading.relation in ("several", "around", "along"):
+        elif "each_side" in sets or "groups" in sets and reading.relation in ("several", "around", "along"):
             forced = "along"
         elif "atop" in sets and reading.relation in ("several", "along", "around"):
             forced = "inside"
@@ -183,7 +185,11 @@ class _Reader:
 
     def _parts(self) -> bool:
         """Whether the command says between: the arrangement is no other then."""
-        return any(i.symbol == "between" and i.label == "command" for i in self.items) and (
+        lengths = [range(d.first, d.last) for d in self.demands if d.sets in LENGTHS]
+        return any(
+            item.symbol == "between" and item.label == "command" and not any(k in r for r in lengths)
+            for k, item in enumerate(self.items)
+        ) and (
             dict(self.reading.meanings).get("between", 0) >= MAY_BE
         )
 

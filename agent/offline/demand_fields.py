@@ -1,7 +1,7 @@
 """Demands of an instruction to fields of the contract, one rule after another."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from .tagging import tokens, word_classes
 FARTHEST = 100_000
 """Stands for no upper bound of a clearance, px."""
 OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
+LONG_SIDES = ("long", "longer", "short", "shorter")
 OPENS = {side: side for side in ("left", "right", "up", "down")} | {"top": "up", "bottom": "down"}
 COUNTING = frozenset(
     ("of", "in", "with", "using", "by", "use", "total", "altogether", "strong", "number")
@@ -37,6 +38,8 @@ class Fields:
         self.scale = metres_per_pixel
         self.corners: list[int] = []  # how many corners the words name
         self.mentioned: list[int] = []  # items of demands whose phrases name it
+        self.per_side: Demand | None = None  # so many on each side, whose number is to be settled
+        self.some_sides: Demand | None = None
         self.reaches: dict[int, int] = {}  # of phrases for things that go on: past-the-last item
 
     def apply(self, demand: Demand) -> bool:
@@ -90,6 +93,12 @@ class Fields:
         """A length that ends the words about a ring is its distance from the thing."""
         rings = self.reading.relation in ("around", "cage", "corners")
         return rings and self._length(replace(demand, sets="clearance"))
+
+    def _every(self, demand: Demand) -> bool:
+        """One robot every so many pixels."""
+        if any(q.kind == "number" and q.whole != 1 for q in demand.numbers):
+            return False
+        return self._length(replace(demand, sets="pitch"))
 
     def _spaced(self, demand: Demand, low: float, high: float) -> bool:
         name = demand.sets
@@ -200,6 +209,66 @@ class Fields:
             return False
         self.reading.shares = list(zip(sides, counts, strict=True))
         return not all(counts) or self._robots_are(sum(counts))
+
+    def _each_side(self, demand: Demand) -> bool:
+        """Both sides, all four, or as many as the robots take that are so many on each."""
+        said = {self.items[k].symbol for k in range(demand.first, demand.last)}
+        if self.reading.shares or self.per_side is not None:
+            return False
+        if demand.value == "each" and not said & {"either", *LONG_SIDES}:
+            self.per_side = demand
+            return True
+        per = demand.quantity.whole if demand.quantity else int(demand.value == "each")
+        return self._on_sides(LONG_SIDES if demand.value != "all" else {*OPPOSITE}, said, per)
+
+    def _on_sides(self, sides: Collection[str], said: set[str], per: int | None) -> bool:
+        kind = "short" if said & {"short", "shorter"} else "long"
+        both = [kind, f"other {kind}"]
+        named = both if sides is LONG_SIDES else [*OPPOSITE]
+        self.reading.shares = [(side, per or 0) for side in named]
+        return per is not None and (not per or self._robots_are(per * len(named)))
+
+    def _some_sides(self, demand: Demand) -> bool:
+        """Three sides, which are named there or by the one that is left free."""
+        self.reading.meanings = [("around", 1.0), *self.reading.meanings]
+        self.some_sides = demand
+        return not demand.sides or self._only([*demand.sides])
+
+    def unsettled(self) -> list[Demand]:
+        """The demands about sides that nothing else settles: how many they are, or which."""
+        found: list[Demand] = []
+        each, some, robots = self.per_side, self.some_sides, self.reading.robots
+        if each is not None:
+            per = each.quantity.whole if each.quantity else 1
+            sides = {2: LONG_SIDES, 4: {*OPPOSITE}}.get((robots or 0) // (per or 1))
+            if not (per and robots and sides and self._on_sides(sides, set(), per)):
+                found.append(each)
+        if some is not None:
+            if len(self.reading.group.get("sides", ())) != some.numbers[0].whole:
+                found.append(some)
+        return found
+
+    def _rows_of(self, demand: Demand) -> bool:
+        """Two rows of five: a grid, or beside a thing one row outside the other."""
+        rows, each = ([2, *(q.whole or 0 for q in demand.numbers)])[-2:]
+        across = any(self.items[k].symbol == "columns" for k in range(demand.first, demand.last))
+        if self.reading.relation == "along" and rows == 2:
+            self.reading.rings, self.reading.ring_counts = 2, [each, each]
+            return self._robots_are(2 * each)
+        if self.reading.form is not None or not rows or not each:
+            return False
+        grid = {"kind": "grid", "rows": each if across else rows}
+        self.reading.form = Form(grid, f"{rows} rows of {each}", rows * each)
+        self.reading.meanings = [("shape", 1.0), *self.reading.meanings]
+        return True
+
+    def _further(self, demand: Demand) -> bool:
+        """Robots beside the arrangement: "and one in the middle"."""
+        count = demand.numbers[0].whole
+        if not count or self.reading.relation not in ("around", "cage", "corners"):
+            return False
+        self.reading.further.append((next(iter(demand.sides), "centre"), count))
+        return True
 
     def _rings(self, demand: Demand) -> bool:
         count = next((q.whole for q in demand.numbers), 2)

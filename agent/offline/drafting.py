@@ -1,5 +1,6 @@
 """From what was read to a contract, or to the question that has to be asked first."""
 
+from dataclasses import replace
 from typing import Any
 
 from ...tools.formation.contract import MAX_ROBOTS
@@ -78,6 +79,14 @@ def _groups(
     reading: Reading, robots: int, basics: dict[str, Any], attempt: int
 ) -> list[dict[str, Any]]:
     relation = reading.relation
+    if reading.further:
+        aside = sum(count for _, count in reading.further)
+        whole = reading.one_a_corner and reading.robots is not None
+        main = replace(reading, further=[])
+        return [
+            *_groups(main, robots - aside if whole else robots, basics, attempt),
+            *(_beside(side, count, basics["targets"]) for side, count in reading.further),
+        ]
     if reading.shares:
         counts = [count or robots // 2 for _, count in reading.shares]
         if sum(counts) != robots and len(counts) == 2:
@@ -96,6 +105,11 @@ def _groups(
         drawn = _drawn(reading, basics, attempt)
         return [basics | {"relation": "shape", "robots": robots} | drawn]
     return [_related(reading, basics | {"robots": robots})]
+
+
+def _beside(side: str, robots: int, targets: list[str]) -> dict[str, Any]:
+    place = {"relation": "centre"} if side == "centre" else {"relation": "along", "side": side}
+    return place | {"targets": targets, "robots": robots}
 
 
 def _related(reading: Reading, basics: dict[str, Any]) -> dict[str, Any]:

@@ -18,9 +18,18 @@ SIDE = "(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?"
 ONLY_SIDE = re.compile(f"(?:(?:the|its) )?{SIDE}(?: side| end| edge)?")
 """Where at a thing, not which thing."""
 SIDE_OF = re.compile(
-    f"(?:the |its )?{SIDE}(?: side| edge| end| flank)? of "
-    r"(?=it|this|that|the (?!two|three|four|\w+s\b))"
+    f"(?:the |its )?(?:{SIDE}|(?:two |both )?(?:long|short)(?:er)?)(?: sides?| edges?| end| flanks?)? of "
+    r"(?=it|this|that|the (?!two|three|four|\w+[^\Wsu]s\b))"
 )
+FURTHER = re.compile(
+    r"(?:(?:,|;|and|plus|with|then|also|put|another|a further|the other) )+(?:\w+(?: - \w+)? )"
+    r"(?:(?:more|others?|further|extra|robots?|bots?|drones?|units?|ones?|of them|go|stand) )*"
+    r"(?:on|at|to|along|in|above|below|over|under|beneath|underneath|left|right|by|around)\b"
+)
+"""How further robots begin that stand elsewhere: "and another two on the left"."""
+LONGEST_LEAD = 12
+"""Words of the longest such beginning."""
+MIDDLE = re.compile("(?:the |its )(?:very |exact )?(?:centre|center|middle)")
 OWNED_SIDE = re.compile(f"'s ({SIDE} (?:side|edge)|corners)$")
 
 
@@ -28,8 +37,12 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     """The labels, without what is no phrase for a thing, or no part of one."""
     found = list(labels)
     for start, end in _runs(found, "thing"):
-        while start < end - 1 and (words[start] in _lists()["leading"] or _is_verb(words, start)):
+        while start < end and (words[start] in _lists()["leading"] or _is_verb(words, start)):
             found[start], start = "command", start + 1
+        more = _further(words, start) or _further(words, max(start - 1, 0))
+        if more:
+            found[start : min(more, end)] = ["command"] * (min(more, end) - start)
+            start = min(more, end)
         headed = _after_verb(words, start, end)
         found[start:headed], start = ["command"] * (headed - start), headed
         while end > start and words[end - 1] in _lists()["trailing"]:
@@ -66,9 +79,15 @@ def _mark_beside(words: Sequence[str], found: list[str]) -> None:
             found[k:stop] = ["thing"] * (stop - k)
 
 
+def _further(words: Sequence[str], at: int) -> int:
+    """Past-the-last of the words that begin further robots at a place; 0 where none do."""
+    more = FURTHER.match(" ".join(words[at : at + LONGEST_LEAD]))
+    return at + len(more[0].split()) if more is not None and numbers_in(more[0]) else 0
+
+
 def _is_verb(words: Sequence[str], at: int) -> bool:
     """Whether a word before a determiner is no noun: "circle the" at the very beginning."""
-    return at == 0 and not may_open(words[0]) and may_open(words[1])
+    return at == 0 and len(words) > 1 and not may_open(words[0]) and may_open(words[1])
 
 
 def _after_verb(words: Sequence[str], start: int, end: int) -> int:
@@ -93,7 +112,7 @@ def _ends_thing(word: str) -> bool:
 def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
     """What the words of a phrase for a thing are, up to a purpose or a further number."""
     phrase, count = " ".join(words[start:end]), end - start
-    if phrase.startswith(tuple(_lists()["no_thing"])) or ONLY_SIDE.fullmatch(phrase):
+    if phrase.startswith(tuple(_lists()["no_thing"])) or phrase == "it" or ONLY_SIDE.fullmatch(phrase):
         return ["demand"] * count
     found = ["thing"] * count
     if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
@@ -112,6 +131,14 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
             found[k - start] = "demand"
     for k in range(1, count):
         rest = " ".join(words[start + k : end])
+        more = min(_further(words, start + k), end)
+        if more:
+            middle = MIDDLE.match(" ".join(words[more:end]))
+            rest_labels = ["demand"] * (end - more)
+            if middle is None and more < end:
+                rest_labels = _thing_labels(words, more, end)
+            head = _thing_labels(words, start, start + k)
+            return [*head, *["command"] * (more - start - k), *rest_labels]
         for label in ("background", "demand"):
             if rest.startswith(tuple(_lists()[f"begin_{label}"])):
                 k -= not words[start + k - 1][0].isalnum()
