@@ -38,6 +38,8 @@ LONGEST_CALL = 3
 """Words of an exclamation that only calls somebody: "Ball boys!"."""
 LINES = frozenset(("file", "line", "row", "column", "arc", "circle", "ring", "square", "grid"))
 """What robots may stand in; "a" such thing is never said beside the matter."""
+RINGS = frozenset(("ring", "radius", "diameter"))
+"""Demands that only a ring can meet."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
 """What these can do for a demand that is carried out demands nothing more."""
 STATING = frozenset(
@@ -55,6 +57,9 @@ PLACES = {
 }
 """Words directly before a thing, and where a form is drawn then."""
 PREPOSITIONS = frozenset(word for words in PLACES.values() for word in words)
+BEFORE_NOUNS = frozenset(("around", "round", "inside", "within", "along", "beside", "across"))
+"""Words after which a noun without an article is the thing: "8 inside bunker"."""
+LONGEST_NAME = 3
 DEFINITE = frozenset(("the", "this", "that", "these", "those", "my", "our", "your"))
 """Articles after which a phrase for a thing goes on."""
 OUTWARD = frozenset(("off", "away", "clear", "out", "outside"))
@@ -168,7 +173,11 @@ class _Reader:
             forced = "between"
         elif sets & {"rings", "rings_of"} and reading.relation in ("several", "shape"):
             forced = next(m for m, _ in reading.meanings if m in ("around", "cage", "along"))
-        elif "each_side" in sets or "groups" in sets and reading.relation in ("several", "around", "along"):
+        elif sets & RINGS and reading.relation not in ("around", "cage", "ask"):
+            forced = "around"
+        elif "each_side" in sets or (
+            "groups" in sets and reading.relation in ("several", "around", "along")
+        ):
             forced = "along"
         elif "atop" in sets and reading.relation in ("several", "along", "around"):
             forced = "inside"
@@ -187,11 +196,11 @@ class _Reader:
         """Whether the command says between: the arrangement is no other then."""
         lengths = [range(d.first, d.last) for d in self.demands if d.sets in LENGTHS]
         return any(
-            item.symbol == "between" and item.label == "command" and not any(k in r for r in lengths)
+            item.symbol == "between"
+            and item.label == "command"
+            and not any(k in r for r in lengths)
             for k, item in enumerate(self.items)
-        ) and (
-            dict(self.reading.meanings).get("between", 0) >= MAY_BE
-        )
+        ) and (dict(self.reading.meanings).get("between", 0) >= MAY_BE)
 
     def _refer(self) -> None:
         """Phrases for things: the arrangement is about those that no demand took."""
@@ -230,7 +239,8 @@ class _Reader:
         free = [k for k, i in enumerate(self.items) if i.symbol == "<n>" and not self.taken[k]]
         aside = ("background", "thing")
         free = [k for k in free if all(i.label not in aside for i in self.items[k : k + 2])]
-        if self.reading.robots is None and not self.reading.odd_count and len(free) == 1:
+        known = self.reading.robots is not None or self.reading.one_a_corner
+        if not (known or self.reading.odd_count) and len(free) == 1:
             quantity = self.items[free[0]].quantity
             if quantity is not None and quantity.whole is not None:
                 self.reading.robots = quantity.whole
@@ -255,12 +265,25 @@ class _Reader:
         """A reason changes nothing; what stands after "around the" is the thing, if no other is."""
         reading, words = self.reading, [i.symbol for i in self.items[first:last]]
         named = words[0] in PREPOSITIONS and len(words) > 2 and words[1] in DEFINITE
-        if self._gives_reason(first, last):
+        named = named or (words[0] in BEFORE_NOUNS and self._is_bare(first + 1, last))
+        known = {w for thing in reading.things for w in thing.lower().split()}
+        if words[0] in ("from", "at", "to", "of") and {*words[1:]} and {*words[1:]} <= known:
+            return
+        if words[0] == "between" and words[-1] == "and" and self._is_bare(first + 1, last - 1):
+            reading.things.insert(0, self._quote(first + 1, last - 1))
+        elif self._gives_reason(first, last):
             reading.background.append(self._quote(first, last))
         elif named and not reading.things and self._only_names(first + 1, last):
             reading.things.append(self._quote(first + 1, last))
         else:
             reading.unread.append(self._quote(first, last))
+
+    def _is_bare(self, first: int, last: int) -> bool:
+        """Whether words are a noun, perhaps with adjectives, that stand without an article."""
+        words = [i.symbol for i in self.items[first:last]]
+        plain = all(w.isalpha() and w not in WEIGHTY | fillers() for w in words)
+        telling = any(self.classes[k] & ASKED_CLASSES - {"motion"} for k in range(first, last))
+        return plain and not telling and 0 < len(words) <= LONGEST_NAME
 
     def _only_names(self, first: int, last: int) -> bool:
         """Whether words can be a phrase for a thing that says nothing else."""

@@ -15,10 +15,11 @@ import yaml
 from ...tools.formation.number_words import numbers_in
 
 SIDE = "(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?"
-ONLY_SIDE = re.compile(f"(?:(?:the|its) )?{SIDE}(?: side| end| edge)?")
+ONLY_SIDE = re.compile(f"it|(?:(?:the|its) )?{SIDE}(?: side| end| edge)?")
 """Where at a thing, not which thing."""
 SIDE_OF = re.compile(
-    f"(?:the |its )?(?:{SIDE}|(?:two |both )?(?:long|short)(?:er)?)(?: sides?| edges?| end| flanks?)? of "
+    f"(?:the |its )?(?:{SIDE}|(?:two |both )?(?:long|short)(?:er)?)"
+    "(?: sides?| edges?| end| flanks?)? of "
     r"(?=it|this|that|the (?!two|three|four|\w+[^\Wsu]s\b))"
 )
 FURTHER = re.compile(
@@ -29,6 +30,11 @@ FURTHER = re.compile(
 """How further robots begin that stand elsewhere: "and another two on the left"."""
 LONGEST_LEAD = 12
 """Words of the longest such beginning."""
+COUNTED = re.compile(
+    r"(?:the (?:exact |very )?middle(?= between )|"
+    r"(?!one)(\w+) (?:to|at|on|in|around|round|along|inside)(?= ))"
+)
+"""What stands before a thing that is named last: "five to the lid", "the middle between"."""
 MIDDLE = re.compile("(?:the |its )(?:very |exact )?(?:centre|center|middle)")
 OWNED_SIDE = re.compile(f"'s ({SIDE} (?:side|edge)|corners)$")
 
@@ -37,12 +43,11 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     """The labels, without what is no phrase for a thing, or no part of one."""
     found = list(labels)
     for start, end in _runs(found, "thing"):
+        began = start
+        start = min(_counted(words, start, end), end)
         while start < end and (words[start] in _lists()["leading"] or _is_verb(words, start)):
-            found[start], start = "command", start + 1
-        more = _further(words, start) or _further(words, max(start - 1, 0))
-        if more:
-            found[start : min(more, end)] = ["command"] * (min(more, end) - start)
-            start = min(more, end)
+            start += 1
+        found[began:start] = ["command"] * (start - began)
         headed = _after_verb(words, start, end)
         found[start:headed], start = ["command"] * (headed - start), headed
         while end > start and words[end - 1] in _lists()["trailing"]:
@@ -85,6 +90,15 @@ def _further(words: Sequence[str], at: int) -> int:
     return at + len(more[0].split()) if more is not None and numbers_in(more[0]) else 0
 
 
+def _counted(words: Sequence[str], start: int, end: int) -> int:
+    """Where a phrase for a thing begins behind a number of robots, or "the middle" between two."""
+    more = _further(words, start) or _further(words, max(start - 1, 0))
+    counted = COUNTED.match(" ".join(words[start:end]))
+    if counted is not None and (counted[1] is None or numbers_in(counted[1])):
+        more = start + len(counted[0].split())
+    return more or start
+
+
 def _is_verb(words: Sequence[str], at: int) -> bool:
     """Whether a word before a determiner is no noun: "circle the" at the very beginning."""
     return at == 0 and len(words) > 1 and not may_open(words[0]) and may_open(words[1])
@@ -112,7 +126,7 @@ def _ends_thing(word: str) -> bool:
 def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
     """What the words of a phrase for a thing are, up to a purpose or a further number."""
     phrase, count = " ".join(words[start:end]), end - start
-    if phrase.startswith(tuple(_lists()["no_thing"])) or phrase == "it" or ONLY_SIDE.fullmatch(phrase):
+    if phrase.startswith(tuple(_lists()["no_thing"])) or ONLY_SIDE.fullmatch(phrase):
         return ["demand"] * count
     found = ["thing"] * count
     if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
@@ -129,21 +143,31 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
         last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
         for k in range(turned - (words[turned - 1] in ("that", "which")), min(last, end)):
             found[k - start] = "demand"
+    return _ended(words, start, end, found)
+
+
+def _ended(words: Sequence[str], start: int, end: int, found: list[str]) -> list[str]:
+    """The labels of a phrase for a thing, up to where it goes on with something else."""
+    count = end - start
     for k in range(1, count):
         rest = " ".join(words[start + k : end])
         more = min(_further(words, start + k), end)
         if more:
-            middle = MIDDLE.match(" ".join(words[more:end]))
-            rest_labels = ["demand"] * (end - more)
-            if middle is None and more < end:
-                rest_labels = _thing_labels(words, more, end)
-            head = _thing_labels(words, start, start + k)
-            return [*head, *["command"] * (more - start - k), *rest_labels]
+            between = ["command"] * (more - start - k)
+            return [*_thing_labels(words, start, start + k), *between, *_place(words, more, end)]
         for label in ("background", "demand"):
             if rest.startswith(tuple(_lists()[f"begin_{label}"])):
                 k -= not words[start + k - 1][0].isalnum()
                 return found[:k] + [label] * (count - k)
     return found
+
+
+def _place(words: Sequence[str], start: int, end: int) -> list[str]:
+    """What the words are that say where further robots stand."""
+    middle = MIDDLE.match(" ".join(words[start:end])) is not None
+    return (
+        ["demand"] * (end - start) if middle or start == end else _thing_labels(words, start, end)
+    )
 
 
 def _passive(words: Sequence[str], start: int, end: int) -> int:

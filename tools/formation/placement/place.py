@@ -144,8 +144,8 @@ def side_direction(group: Group, outline: Outline, site: Site) -> tuple[float, f
     (unit, length, width), other = outline.long_axis, name.startswith("other ")
     if other and length < LONG * width:
         raise ToolError(
-            f"{group.targets[0]} has no two long sides, being about as wide as it is long: name its "
-            "sides, left and right or top and bottom."
+            f"{group.targets[0]} is about as wide as it is long and has no two long sides: name "
+            "its sides, left and right or top and bottom."
         )
     normal = np.array([-unit[1], unit[0]]) if name.endswith("long") else unit
     reach = (width if name.endswith("long") else length) / 2
