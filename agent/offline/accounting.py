@@ -56,6 +56,7 @@ PLACES = {
     "along": ("beside", "by", "near", "at", "to"),
 }
 """Words directly before a thing, and where a form is drawn then."""
+WITHIN = frozenset(PLACES["inside"])
 PREPOSITIONS = frozenset(word for words in PLACES.values() for word in words)
 BEFORE_NOUNS = frozenset(("around", "round", "inside", "within", "along", "beside", "across"))
 """Words after which a noun without an article is the thing: "8 inside bunker"."""
@@ -105,7 +106,7 @@ class _Reader:
         self.demands = tuple(
             d
             for d in demands_in(items)
-            if d.numbers or not self.prevented.issuperset(range(d.first, d.last))
+            if d.numbers or d.sides or not self.prevented.issuperset(range(d.first, d.last))
         )
         self.scenery = self._scenery()
 
@@ -171,20 +172,40 @@ class _Reader:
             forced = "shape"
         elif self._parts():
             forced = "between"
-        elif sets & {"rings", "rings_of"} and reading.relation in ("several", "shape"):
-            forced = next(m for m, _ in reading.meanings if m in ("around", "cage", "along"))
-        elif sets & RINGS and reading.relation not in ("around", "cage", "ask"):
-            forced = "around"
-        elif "each_side" in sets or (
-            "groups" in sets and reading.relation in ("several", "around", "along")
-        ):
-            forced = "along"
-        elif "atop" in sets and reading.relation in ("several", "along", "around"):
-            forced = "inside"
-        elif reading.relation in ("around", "cage", "inside") and self._stands_off():
-            forced = forced or (reading.relation if reading.sure else "around")
+        else:
+            forced = forced or self._demanded(sets)
         if forced and reading.relation != "ask":
             reading.meanings = [(forced, 1.0), *reading.meanings]
+
+    def _demanded(self, sets: set[str]) -> str | None:
+        """The arrangement that demands are made of alone, where the command says another."""
+        reading = self.reading
+        rings = {"rings", "rings_of"}, ("several", "shape"), ("around", "cage", "along")
+        besides = {"further"}, ("several", "centre"), ("around", "cage", "corners")
+        for named, instead, likely in (rings, besides):
+            if sets & named and reading.relation in instead:
+                return next(m for m, _ in reading.meanings if m in likely)
+        if sets & RINGS and reading.relation not in ("around", "cage", "ask"):
+            return "around"
+        rows = "groups" in sets and reading.relation in ("several", "around", "along")
+        if rows or ("each_side" in sets and not self._surrounds()):
+            return "along"
+        if "atop" in sets and reading.relation in ("several", "along", "around"):
+            return "inside"
+        if reading.relation in ("around", "inside") and self._stands_off():
+            within = any(item.symbol in WITHIN for item in self.items)
+            return reading.relation if reading.sure and within else "around"
+        unsure = not reading.sure and reading.relation != "ask"
+        return "along" if "side" in sets and unsure else None
+
+    def _surrounds(self) -> bool:
+        """Whether the command has a word that means all round alone: "surround it, four a side"."""
+        sided = [range(d.first, d.last) for d in self.demands if d.sets == "each_side"]
+        return any(
+            item.label == "command" and "surround" in self.classes[k]
+            for k, item in enumerate(self.items)
+            if not any(k in span for span in sided)
+        )
 
     def _stands_off(self) -> bool:
         """Whether a distance is said as one that is kept outside: "20 px off"."""
@@ -263,7 +284,11 @@ class _Reader:
 
     def _account_unread(self, first: int, last: int) -> None:
         """A reason changes nothing; what stands after "around the" is the thing, if no other is."""
-        reading, words = self.reading, [i.symbol for i in self.items[first:last]]
+        reading = self.reading
+        at = next((k for k in range(first, last) if self.items[k].symbol in BEFORE_NOUNS), first)
+        if "unread" not in map(self._kind, range(first, at)):
+            first = at  # "ring" is known in "ring around fountain"
+        words = [i.symbol for i in self.items[first:last]]
         named = words[0] in PREPOSITIONS and len(words) > 2 and words[1] in DEFINITE
         named = named or (words[0] in BEFORE_NOUNS and self._is_bare(first + 1, last))
         known = {w for thing in reading.things for w in thing.lower().split()}

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from .demands import Demand, Item
+from .demands import Demand, Item, is_part
 from .drawn_forms import Form
 from .lexicon import fillers
 from .portions import OPPOSITE, Portions
@@ -63,7 +63,8 @@ class Fields(Portions):
             return False
         low, high = (quantity.least, quantity.most) if bare else quantity.px(self.scale) or (0, 0)
         among = [i for i in self.items if i.symbol == "<t>"]
-        if len(among) > 1 and self._other(demand) is not None:
+        other = self._other(demand) if len(among) > 1 else None
+        if other is not None and not is_part(other):
             return False
         if low <= 0 and demand.sets != "clearance":
             return False

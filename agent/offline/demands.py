@@ -172,6 +172,12 @@ def says_inside(phrase: str) -> bool:
     return any(pattern.search(phrase.lower()) for pattern in _patterns("insides"))
 
 
+def is_part(phrase: str) -> bool:
+    """Whether a phrase names a part by which a distance from a thing is told: "the wings"."""
+    parts = re.sub(WRAPPED, "|", _table()["words"]["SURFACE"])
+    return re.fullmatch(f"(?:(?:the|its|their) )?(?:{parts})", phrase.lower()) is not None
+
+
 @cache
 def _patterns(name: str) -> tuple[re.Pattern[str], ...]:
     return tuple(re.compile(pattern) for pattern in _table()[name])

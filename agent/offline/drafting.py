@@ -10,6 +10,7 @@ from .reading import Reading
 
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
+LEAST_CAGE = 3
 LIKELY_PLACE = 0.3
 """Least probability of another arrangement for it to say where a form is drawn."""
 NAMES = {
@@ -34,13 +35,15 @@ def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
         or _not_understood(reading, robots)
         or _unsettled(reading)
         or _how_many(reading, robots)
+        or (None if task.robots else _too_few(reading, robots))
         or which_things(task, reading)
     )
 
 
-def would_do(task: Task, reading: Reading) -> bool:
+def would_do(task: Task, reading: Reading, robots: int) -> bool:
     """Whether all but words that were left unread is settled, so that a contract can be shown."""
     settled = not (reading.stops or reading.unscaled or _unsettled(reading))
+    settled = settled and _too_few(reading, robots) is None
     settled = settled and not (reading.others or reading.faced or which_things(task, reading))
     return settled and bool(reading.unread)
 
@@ -208,6 +211,12 @@ def _how_many(reading: Reading, robots: int | None) -> str | None:
             f"{form.wording} takes {form.robots} robots, {robots} were named. Which?".capitalize()
         )
     return None if robots else "How many robots? Say a number."
+
+
+def _too_few(reading: Reading, robots: int | None) -> str | None:
+    if reading.relation != "cage" or robots is None or robots >= LEAST_CAGE:
+        return None
+    return f"A closed ring takes {LEAST_CAGE} robots or more, not {robots}. How many robots?"
 
 
 def which_things(task: Task, reading: Reading) -> str | None:

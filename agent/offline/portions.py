@@ -50,7 +50,7 @@ class Portions:
     def _each_side(self, demand: Demand) -> bool:
         """Both sides, all four, or as many as the robots take that are so many on each."""
         said = {self.items[k].symbol for k in range(demand.first, demand.last)}
-        if self.reading.shares or self.per_side is not None:
+        if self.reading.relation != "along" or self.reading.shares or self.per_side is not None:
             return False
         if demand.value == "each" and not said & {"either", *LONG_SIDES}:
             self.per_side = demand

@@ -48,6 +48,10 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
         while start < end and (words[start] in _lists()["leading"] or _is_verb(words, start)):
             start += 1
         found[began:start] = ["command"] * (start - began)
+        if words[start : start + 1] == ["its"] and numbers_in(
+            " ".join(words[max(start - 2, 0) : start])
+        ):
+            found[start:end], start = ["demand"] * (end - start), end  # "and one at its centre"
         headed = _after_verb(words, start, end)
         found[start:headed], start = ["command"] * (headed - start), headed
         while end > start and words[end - 1] in _lists()["trailing"]:
@@ -126,7 +130,8 @@ def _ends_thing(word: str) -> bool:
 def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
     """What the words of a phrase for a thing are, up to a purpose or a further number."""
     phrase, count = " ".join(words[start:end]), end - start
-    if phrase.startswith(tuple(_lists()["no_thing"])) or ONLY_SIDE.fullmatch(phrase):
+    none = (*_lists()["no_thing"], *_lists()["begin_demand"])
+    if phrase.startswith(none) or ONLY_SIDE.fullmatch(phrase):
         return ["demand"] * count
     found = ["thing"] * count
     if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
@@ -164,10 +169,11 @@ def _ended(words: Sequence[str], start: int, end: int, found: list[str]) -> list
 
 def _place(words: Sequence[str], start: int, end: int) -> list[str]:
     """What the words are that say where further robots stand."""
-    middle = MIDDLE.match(" ".join(words[start:end])) is not None
-    return (
-        ["demand"] * (end - start) if middle or start == end else _thing_labels(words, start, end)
-    )
+    if start == end or MIDDLE.match(" ".join(words[start:end])) is not None:
+        return ["demand"] * (end - start)
+    if words[start] in _lists()["leading"]:
+        return ["command", *_place(words, start + 1, end)]
+    return _thing_labels(words, start, end)
 
 
 def _passive(words: Sequence[str], start: int, end: int) -> int:

@@ -279,6 +279,13 @@ def test_forms_are_drawn(words: str, kind: str, robots: int) -> None:
         ("Put 4 robots on the left and 2 on the right of it", [("left", 4), ("right", 2)]),
         ("Two robots on its top side and three on its bottom side", [("top", 2), ("bottom", 3)]),
         ("Stand half of the 6 robots on the left of it, the other half on the right", None),
+        ("6 robots to the left of the van and another 4 at its top", [("left", 6), ("top", 4)]),
+        ("5 robots along the top of the shed, then 3 more below it", [("top", 5), ("bottom", 3)]),
+        ("One robot left of the vase plus two right of the vase", [("left", 1), ("right", 2)]),
+        ("8 robots on both sides of the bench, four a side", [("long", 4), ("other long", 4)]),
+        ("Two robots on each short side of the rug", [("short", 2), ("other short", 2)]),
+        ("Three robots on either side of the hedge", [("long", 3), ("other long", 3)]),
+        ("4 robots, one on each side of it", [(s, 1) for s in ("left", "right", "top", "bottom")]),
     ],
 )
 def test_several_groups_have_their_numbers(
@@ -294,6 +301,105 @@ def test_several_groups_have_their_numbers(
     assert [(g["relation"], g["side"], g["robots"]) for g in groups] == [
         ("along", side, count) for side, count in shares
     ]
+
+
+def test_so_many_on_each_side_is_asked_about_where_the_sides_are_not_known() -> None:
+    for words in ("Two robots on each side of it", "7 robots, two on each side of it"):
+        reading, question = read(words)
+        assert reading.unread
+        assert question is not None
+
+
+@pytest.mark.parametrize(
+    ("words", "sides"),
+    [
+        ("6 robots on three sides of it, nothing on the right", ["left", "top", "bottom"]),
+        ("6 robots on three sides of it: left, top and right", ["left", "top", "right"]),
+        ("6 robots on three sides of it", None),
+        ("6 robots on three sides of it: left and top", None),
+    ],
+)
+def test_some_of_the_sides_are_those_that_are_named(words: str, sides: list[str] | None) -> None:
+    reading, question = read(words)
+    assert (question is None) == (sides is not None)
+    assert sides is None or (reading.relation, reading.group) == ("around", {"sides": sides})
+
+
+@pytest.mark.parametrize(
+    ("words", "groups"),
+    [
+        ("Ring it with 8 robots and one in the middle of it", [("around", 8), ("centre", 1)]),
+        ("A robot at each corner of it and one at its centre", [("corners", 4), ("centre", 1)]),
+        ("8 robots around it and another two above it", [("around", 8), ("along", 2)]),
+        ("Flank it with 8 robots on both long sides", [("along", 4), ("along", 4)]),
+        ("8 robots in two rows of four inside it", [("shape", 8)]),
+        ("8 robots in two rows of four below it", [("along", 4), ("along", 4)]),
+    ],
+)
+def test_rows_of_so_many_and_robots_besides(words: str, groups: list[tuple[str, int]]) -> None:
+    reading, question = read(words, 4 if "corner" in words else None)
+    assert question is None
+    robots = reading.robots or 4
+    contract = contract_of(reading, robots, ["t1"], [])
+    assert [(g["relation"], g["robots"]) for g in contract["groups"]] == groups
+    Contract.model_validate(contract)
+
+
+@pytest.mark.parametrize(
+    ("words", "fields"),
+    [
+        ("8 robots around it, minimum spacing 20 px", {"min_spacing": 20}),
+        ("8 robots around it, minimum inter-robot spacing 20 px", {"min_spacing": 20}),
+        ("8 robots round the basin, not less than 50 px between each other", {"min_spacing": 50}),
+        ("8 robots round it, between each other not less than 50 px", {"min_spacing": 50}),
+        ("8 robots round it, distance between robots 40 pixel", {"pitch": 40}),
+        ("8 robots round it, separated from one another by 30 px", {"pitch": 30}),
+        ("8 robots round it, the greatest distance between neighbours 60 px", {"max_gap": 60}),
+        ("8 robots round it, nobody nearer than 20 px to a neighbour", {"min_spacing": 20}),
+        ("8 robots round it, one robot every 30 px", {"pitch": 30}),
+        ("8 robots round it, nobody nearer than 25 px to the blades", {"clearance": [25, 100_000]}),
+        ("8 robots round the jet, 40 px clear of the wings", {"clearance": [40, 41]}),
+        ("Set up a perimeter on the depot, 8 robots, and stand off 30 px", {"clearance": [30, 31]}),
+        ("8 robots on a circle of radius 90 px centred on the plate", {"radius": 90}),
+        ("8 robots round it, but don't block the exit at the top",
+         {"opening": 0, "opening_towards": "top"}),
+        ("8 robots round it and give it plenty of room", {"fit": "wide"}),
+        ("8 robots in an arc above it, 30 px off", {"sides": ["top half"], "clearance": [30, 31]}),
+    ],
+)  # fmt: skip
+def test_a_ring_is_described_in_many_words(words: str, fields: dict[str, Any]) -> None:
+    reading, question = read(words)
+    assert question is None
+    assert (reading.relation, reading.robots, reading.group) == ("around", 8, fields)
+
+
+def test_a_robot_every_so_many_pixels_counts_no_robots() -> None:
+    reading, question = read("Ring the pond with one robot every 80 px")
+    assert (reading.robots, reading.group) == (None, {"pitch": 80})
+    assert question is not None
+
+
+@pytest.mark.parametrize(
+    ("words", "things"),
+    [
+        ("7 around lighthouse", ["lighthouse"]),
+        ("ring of 7 robots around old statue", ["old statue"]),
+        ("7 inside bunker", ["bunker"]),
+        ("7 around rock, all looking away from rock", ["rock"]),
+        ("Seven robots in the middle between the shed and the barn", ["the shed and the barn"]),
+        ("between barn and the silo, seven robots", ["barn and the silo"]),
+        ("Seven robots between these two", []),
+    ],
+)
+def test_nouns_name_the_thing_without_an_article(words: str, things: list[str]) -> None:
+    reading, question = read(words)
+    assert question is None
+    assert (reading.robots, reading.things) == (7, things)
+
+
+def test_no_word_that_arranges_is_taken_for_a_noun() -> None:
+    for words in ("7 robots along wall side", "7 robots around 3 trees", "7 robots across each"):
+        assert read(words)[1] is not None, words
 
 
 @pytest.mark.parametrize(
@@ -320,6 +426,13 @@ def test_two_rings_or_rows_are_two_groups(words: str, relation: str) -> None:
         ("My cousin lost a bet. Ring the lid with 8 robots, cheers", "My cousin lost a bet"),
         ("Ring the lid with 8 robots because the inspector is coming", "inspector"),
         ("Good morning, team. Ring the lid with 8 robots.", "Good morning"),
+        ("Ring the lid with 8 robots like they are guarding a bank", "like they are guarding"),
+        (
+            "Ring the lid with 8 robots before the mayor arrives at four",
+            "the mayor arrives at four",
+        ),
+        ("We close early tonight. Ring the lid with 8 robots.", "tonight"),
+        ("Keep visitors away from the lid: 8 robots round it", "Keep visitors away"),
     ],
 )
 def test_background_changes_nothing_and_is_repeated(words: str, background: str) -> None:
