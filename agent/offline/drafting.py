@@ -88,7 +88,7 @@ def _groups(
         main = replace(reading, further=[])
         return [
             *_groups(main, robots - aside if whole else robots, basics, attempt),
-            *(_beside(side, count, basics["targets"]) for side, count in reading.further),
+            *(_group_aside(side, count, basics["targets"]) for side, count in reading.further),
         ]
     if reading.shares:
         counts = [count or robots // 2 for _, count in reading.shares]
@@ -110,7 +110,7 @@ def _groups(
     return [_related(reading, basics | {"robots": robots})]
 
 
-def _beside(side: str, robots: int, targets: list[str]) -> dict[str, Any]:
+def _group_aside(side: str, robots: int, targets: list[str]) -> dict[str, Any]:
     place = {"relation": "centre"} if side == "centre" else {"relation": "along", "side": side}
     return place | {"targets": targets, "robots": robots}
 

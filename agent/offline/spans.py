@@ -44,7 +44,7 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     found = list(labels)
     for start, end in _runs(found, "thing"):
         began = start
-        start = min(_counted(words, start, end), end)
+        start = min(_behind_number(words, start, end), end)
         while start < end and (words[start] in _lists()["leading"] or _is_verb(words, start)):
             start += 1
         found[began:start] = ["command"] * (start - began)
@@ -94,7 +94,7 @@ def _further(words: Sequence[str], at: int) -> int:
     return at + len(more[0].split()) if more is not None and numbers_in(more[0]) else 0
 
 
-def _counted(words: Sequence[str], start: int, end: int) -> int:
+def _behind_number(words: Sequence[str], start: int, end: int) -> int:
     """Where a phrase for a thing begins behind a number of robots, or "the middle" between two."""
     more = _further(words, start) or _further(words, max(start - 1, 0))
     counted = COUNTED.match(" ".join(words[start:end]))
@@ -148,10 +148,10 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
         last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
         for k in range(turned - (words[turned - 1] in ("that", "which")), min(last, end)):
             found[k - start] = "demand"
-    return _ended(words, start, end, found)
+    return _up_to_next(words, start, end, found)
 
 
-def _ended(words: Sequence[str], start: int, end: int, found: list[str]) -> list[str]:
+def _up_to_next(words: Sequence[str], start: int, end: int, found: list[str]) -> list[str]:
     """The labels of a phrase for a thing, up to where it goes on with something else."""
     count = end - start
     for k in range(1, count):

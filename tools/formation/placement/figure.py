@@ -250,10 +250,11 @@ def _brought_near(
     """Beside the outline, not only its box: no further off than allowed."""
     x, y, scale = place
     solid, gap = site.outlines[group.targets[0]].filled, nominal(group.offsets()) + radius
+    placed = sketch.at((x, y), scale)
     for _ in range(SEARCH):  # no step is longer than what is free
-        placed = sketch.at((x, y), scale)
         off = drawn_by(placed).distance(solid)
         if off <= group.offsets(radius)[1]:
             break
         x, y = x - beside[0] * (off - gap), y - beside[1] * (off - gap)
+        placed = sketch.at((x, y), scale)
     return placed
