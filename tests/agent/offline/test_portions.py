@@ -115,3 +115,18 @@ def test_nouns_name_the_thing_without_an_article(words: str, things: list[str]) 
 def test_no_word_that_arranges_is_taken_for_a_noun() -> None:
     for words in ("7 robots along wall side", "7 robots around 3 trees", "7 robots across each"):
         assert read(words)[1] is not None, words
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "8 robots around the van and not 2 on the left",
+        "5 robots around the shed without blocking the gate on the right",
+        "6 robots on the left of the van and none on the right",
+        "6 robots around it and never 2 at the top",
+        "4 robots at its corners but none in the middle",
+    ],
+)
+def test_what_is_denied_is_never_lost_in_a_name(words: str) -> None:
+    reading, question = read(words)
+    assert question is not None or {"sides", "opening"} & set(reading.group)
