@@ -5,9 +5,9 @@ that is repeated to the person, or is left unread: then the planner asks and quo
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
-from .demand_fields import Fields
+from .barring import ENDS, MAY_BE, Barring
+from .demand_fields import LENGTHS, Fields
 from .demands import (
     Item,
     demands_in,
@@ -38,6 +38,8 @@ LONGEST_CALL = 3
 """Words of an exclamation that only calls somebody: "Ball boys!"."""
 LINES = frozenset(("file", "line", "row", "column", "arc", "circle", "ring", "square", "grid"))
 """What robots may stand in; "a" such thing is never said beside the matter."""
+RINGS = frozenset(("ring", "radius", "diameter"))
+"""Demands that only a ring can meet."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
 """What these can do for a demand that is carried out demands nothing more."""
 STATING = frozenset(
@@ -54,18 +56,15 @@ PLACES = {
     "along": ("beside", "by", "near", "at", "to"),
 }
 """Words directly before a thing, and where a form is drawn then."""
-CLOSING = {"enclose", "enclosure", "prevent"}
-MAY_CLOSE = 0.2
-"""Least probability of a cage for one of these classes to settle it."""
+WITHIN = frozenset(PLACES["inside"])
 PREPOSITIONS = frozenset(word for words in PLACES.values() for word in words)
+BEFORE_NOUNS = frozenset(("around", "round", "inside", "within", "along", "beside", "across"))
+"""Words after which a noun without an article is the thing: "8 inside bunker"."""
+LONGEST_NAME = 3
 DEFINITE = frozenset(("the", "this", "that", "these", "those", "my", "our", "your"))
 """Articles after which a phrase for a thing goes on."""
-SUBJECTS = frozenset(("nobody", "none", "nothing", "no", "anything"))
-"""Negations that are what a sentence is about, whoever it is told to."""
 OUTWARD = frozenset(("off", "away", "clear", "out", "outside"))
 """Words with a distance that is kept outside the thing."""
-ENDS = frozenset(",.;:!?()")
-"""Signs at which a stretch of words that was not understood ends."""
 
 
 def read_instruction(text: str, metres_per_pixel: float | None = None) -> Reading:
@@ -102,14 +101,12 @@ class _Reader:
         self.fields = Fields(text, items, reading, metres_per_pixel)
         self.taken = [item.symbol == "<f>" for item in items]
         self.classes = [frozenset(c) for c in word_classes([item.symbol for item in items])]
-        ends = [k for k, item in enumerate(items) if item.symbol in ENDS]
-        bounds = pairwise([-1, *ends, len(items)])
-        self.clauses = [range(first + 1, last) for first, last in bounds]
-        self.prevented = self._prevented()
+        self.barring = Barring(items, self.classes)
+        self.clauses, self.prevented = self.barring.clauses, self.barring.prevented
         self.demands = tuple(
             d
             for d in demands_in(items)
-            if d.numbers or not self.prevented.issuperset(range(d.first, d.last))
+            if d.numbers or d.sides or not self.prevented.issuperset(range(d.first, d.last))
         )
         self.scenery = self._scenery()
 
@@ -122,24 +119,14 @@ class _Reader:
             elif demand.sets not in OF_OTHERS:  # what it names is the target
                 self.fields.mentioned += range(demand.first, demand.last)
             self.taken[demand.first : demand.last] = [True] * (demand.last - demand.first)
+        for demand in self.fields.unsettled():
+            self.reading.unread.append(self._quote(demand.first, demand.last))
         self._count_corners()
         self._refer()
         self.reading.place = self._place()
         self._count_alone()
         self._account()
         return self.reading
-
-    def _prevented(self) -> frozenset[int]:
-        """Items that say what must not happen: "so that nobody gets near it"."""
-        found: set[int] = set()
-        for clause in self.clauses:
-            start = next((k for k in clause if self.items[k].symbol == "so"), clause.stop)
-            rest = range(start, clause.stop)
-            symbols = {self.items[k].symbol for k in rest}
-            prevents = any("prevent" in self.classes[k] for k in rest)
-            if symbols & NEGATIONS and prevents and not symbols & {"robot", "robots"}:
-                found |= {*rest}
-        return frozenset(found)
 
     def _count_corners(self) -> None:
         """As many robots as the words name corners, where they name no robots."""
@@ -180,21 +167,45 @@ class _Reader:
         """A form that is named is drawn, and a side that is named takes a row."""
         reading = self.reading
         sets = {d.sets for d in self.demands}
-        forced = "cage" if self._closes() else None
+        forced = "cage" if self.barring.closes(reading, self.demands) else None
         if reading.form is not None or "form" in sets:
             forced = "shape"
         elif self._parts():
             forced = "between"
-        elif sets & {"rings", "rings_of"} and reading.relation in ("several", "shape"):
-            forced = next(m for m, _ in reading.meanings if m in ("around", "cage", "along"))
-        elif "groups" in sets and reading.relation in ("several", "around", "along"):
-            forced = "along"
-        elif "atop" in sets and reading.relation in ("several", "along", "around"):
-            forced = "inside"
-        elif reading.relation in ("around", "cage", "inside") and self._stands_off():
-            forced = forced or (reading.relation if reading.sure else "around")
+        else:
+            forced = forced or self._demanded(sets)
         if forced and reading.relation != "ask":
             reading.meanings = [(forced, 1.0), *reading.meanings]
+
+    def _demanded(self, sets: set[str]) -> str | None:
+        """The arrangement that demands are made of alone, where the command says another."""
+        reading = self.reading
+        rings = {"rings", "rings_of"}, ("several", "shape"), ("around", "cage", "along")
+        besides = {"further"}, ("several", "centre"), ("around", "cage", "corners")
+        for named, instead, likely in (rings, besides):
+            if sets & named and reading.relation in instead:
+                return next(m for m, _ in reading.meanings if m in likely)
+        if sets & RINGS and reading.relation not in ("around", "cage", "ask"):
+            return "around"
+        rows = "groups" in sets and reading.relation in ("several", "around", "along")
+        if rows or ("each_side" in sets and not self._surrounds()):
+            return "along"
+        if "atop" in sets and reading.relation in ("several", "along", "around"):
+            return "inside"
+        if reading.relation in ("around", "inside") and self._stands_off():
+            within = any(item.symbol in WITHIN for item in self.items)
+            return reading.relation if reading.sure and within else "around"
+        unsure = not reading.sure and reading.relation != "ask"
+        return "along" if "side" in sets and unsure else None
+
+    def _surrounds(self) -> bool:
+        """Whether the command has a word that means all round alone: "surround it, four a side"."""
+        sided = [range(d.first, d.last) for d in self.demands if d.sets == "each_side"]
+        return any(
+            item.label == "command" and "surround" in self.classes[k]
+            for k, item in enumerate(self.items)
+            if not any(k in span for span in sided)
+        )
 
     def _stands_off(self) -> bool:
         """Whether a distance is said as one that is kept outside: "20 px off"."""
@@ -204,54 +215,13 @@ class _Reader:
 
     def _parts(self) -> bool:
         """Whether the command says between: the arrangement is no other then."""
-        return any(i.symbol == "between" and i.label == "command" for i in self.items) and (
-            dict(self.reading.meanings).get("between", 0) >= MAY_CLOSE
-        )
-
-    def _closes(self) -> bool:
-        """Whether a command for a ring has a word that closes it: a barrier all round."""
-        likely = dict(self.reading.meanings).get("cage", 0)
-        if self.reading.relation == "around" and self._prevents():
-            return True
-        closing = any(
-            classes & CLOSING and not classes & {"surround", "ring", "near"}
-            for k, classes in enumerate(self.classes)
-            if self.items[k].label == "command" and not self._is_forbidden(k)
-        )
-        return self.reading.relation == "around" and closing and likely >= MAY_CLOSE
-
-    def _prevents(self) -> bool:
-        """Whether a sentence says that something must not get in or out."""
-        demanded = {k for d in self.demands for k in range(d.first, d.last)}
-        at = 0
-        for sentence in sentences(self.items):
-            place = [k for k in range(at, at + len(sentence)) if k not in demanded]
-            at += len(sentence)
-            symbols = {self.items[k].symbol for k in place}
-            negated = any(self._forbids_others(k, place) for k in place)
-            if negated and any("prevent" in self.classes[k] for k in place):
-                return True
-            if "kept" in symbols and symbols & {"out", "away", "in"}:
-                return True
-        return False
-
-    def _is_forbidden(self, k: int) -> bool:
-        """Whether robots are told not to do it: "and do not block it"."""
-        clause = next((c for c in self.clauses if k in c), range(0))
-        before = [j for j in clause if j < k and self.items[j].symbol in NEGATIONS]
-        return any(not self._forbids_others(j, clause) for j in before)
-
-    def _forbids_others(self, k: int, sentence: Sequence[int]) -> bool:
-        """Whether a negation is about somebody else: "nobody", but not "they must not touch it"."""
-        symbol = self.items[k].symbol
-        if symbol not in NEGATIONS or symbol == "without":
-            return False
-        clause = next(c for c in self.clauses if k in c)
-        before = [j for j in sentence if j in clause and j < k]
-        told = {self.items[j].symbol for j in before}
-        orders = not told - {"and", "but", "so", "please", "they", "do"}
-        to_robots = bool(told & {"they", "you"}) or any("robot" in self.classes[j] for j in before)
-        return symbol in SUBJECTS or not (orders or to_robots)
+        lengths = [range(d.first, d.last) for d in self.demands if d.sets in LENGTHS]
+        return any(
+            item.symbol == "between"
+            and item.label == "command"
+            and not any(k in r for r in lengths)
+            for k, item in enumerate(self.items)
+        ) and (dict(self.reading.meanings).get("between", 0) >= MAY_BE)
 
     def _refer(self) -> None:
         """Phrases for things: the arrangement is about those that no demand took."""
@@ -290,7 +260,8 @@ class _Reader:
         free = [k for k, i in enumerate(self.items) if i.symbol == "<n>" and not self.taken[k]]
         aside = ("background", "thing")
         free = [k for k in free if all(i.label not in aside for i in self.items[k : k + 2])]
-        if self.reading.robots is None and not self.reading.odd_count and len(free) == 1:
+        known = self.reading.robots is not None or self.reading.one_a_corner
+        if not (known or self.reading.odd_count) and len(free) == 1:
             quantity = self.items[free[0]].quantity
             if quantity is not None and quantity.whole is not None:
                 self.reading.robots = quantity.whole
@@ -313,14 +284,31 @@ class _Reader:
 
     def _account_unread(self, first: int, last: int) -> None:
         """A reason changes nothing; what stands after "around the" is the thing, if no other is."""
-        reading, words = self.reading, [i.symbol for i in self.items[first:last]]
+        reading = self.reading
+        at = next((k for k in range(first, last) if self.items[k].symbol in BEFORE_NOUNS), first)
+        if "unread" not in map(self._kind, range(first, at)):
+            first = at  # "ring" is known in "ring around fountain"
+        words = [i.symbol for i in self.items[first:last]]
         named = words[0] in PREPOSITIONS and len(words) > 2 and words[1] in DEFINITE
-        if self._gives_reason(first, last):
+        named = named or (words[0] in BEFORE_NOUNS and self._is_bare(first + 1, last))
+        known = {w for thing in reading.things for w in thing.lower().split()}
+        if words[0] in ("from", "at", "to", "of") and {*words[1:]} and {*words[1:]} <= known:
+            return
+        if words[0] == "between" and words[-1] == "and" and self._is_bare(first + 1, last - 1):
+            reading.things.insert(0, self._quote(first + 1, last - 1))
+        elif self._gives_reason(first, last):
             reading.background.append(self._quote(first, last))
         elif named and not reading.things and self._only_names(first + 1, last):
             reading.things.append(self._quote(first + 1, last))
         else:
             reading.unread.append(self._quote(first, last))
+
+    def _is_bare(self, first: int, last: int) -> bool:
+        """Whether words are a noun, perhaps with adjectives, that stand without an article."""
+        words = [i.symbol for i in self.items[first:last]]
+        plain = all(w.isalpha() and w not in WEIGHTY | fillers() for w in words)
+        telling = any(self.classes[k] & ASKED_CLASSES - {"motion"} for k in range(first, last))
+        return plain and not telling and 0 < len(words) <= LONGEST_NAME
 
     def _only_names(self, first: int, last: int) -> bool:
         """Whether words can be a phrase for a thing that says nothing else."""

@@ -5,15 +5,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from .demands import Demand, Item
+from .demands import Demand, Item, is_part
 from .drawn_forms import Form
 from .lexicon import fillers
+from .portions import OPPOSITE, Portions
 from .reading import Reading
 from .tagging import tokens, word_classes
 
 FARTHEST = 100_000
 """Stands for no upper bound of a clearance, px."""
-OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
 OPENS = {side: side for side in ("left", "right", "up", "down")} | {"top": "up", "bottom": "down"}
 COUNTING = frozenset(
     ("of", "in", "with", "using", "by", "use", "total", "altogether", "strong", "number")
@@ -27,13 +27,14 @@ SEVERAL = re.compile(r"\b(?:two|three|four|five|six|both|pair|[a-z]+[^s\W]s)\b")
 LENGTHS = ("clearance", "pitch", "min_spacing", "max_gap", "radius", "diameter", "opening")
 
 
-class Fields:
+class Fields(Portions):
     """Carries demands over into a reading."""
 
     def __init__(
         self, text: str, items: Sequence[Item], reading: Reading, metres_per_pixel: float | None
     ) -> None:
-        self.text, self.items, self.reading = text, items, reading
+        super().__init__(items, reading)
+        self.text = text
         self.scale = metres_per_pixel
         self.corners: list[int] = []  # how many corners the words name
         self.mentioned: list[int] = []  # items of demands whose phrases name it
@@ -45,14 +46,6 @@ class Fields:
             return self._length(demand)
         rule = getattr(self, f"_{demand.sets}", None)
         return rule is not None and bool(rule(demand))
-
-    def _set(self, name: str, value: Any) -> bool:
-        """Set a field, unless the words said something else of it before."""
-        group = self.reading.group
-        if group.get(name, value) != value:
-            return False
-        group[name] = value
-        return True
 
     def _replace(self, name: str, value: Any) -> bool:
         self.reading.group[name] = value
@@ -70,7 +63,8 @@ class Fields:
             return False
         low, high = (quantity.least, quantity.most) if bare else quantity.px(self.scale) or (0, 0)
         among = [i for i in self.items if i.symbol == "<t>"]
-        if len(among) > 1 and self._other(demand) is not None:
+        other = self._other(demand) if len(among) > 1 else None
+        if other is not None and not is_part(other):
             return False
         if low <= 0 and demand.sets != "clearance":
             return False
@@ -90,6 +84,12 @@ class Fields:
         """A length that ends the words about a ring is its distance from the thing."""
         rings = self.reading.relation in ("around", "cage", "corners")
         return rings and self._length(replace(demand, sets="clearance"))
+
+    def _every(self, demand: Demand) -> bool:
+        """One robot every so many pixels."""
+        if any(q.kind == "number" and q.whole != 1 for q in demand.numbers):
+            return False
+        return self._length(replace(demand, sets="pitch"))
 
     def _spaced(self, demand: Demand, low: float, high: float) -> bool:
         name = demand.sets
@@ -140,10 +140,6 @@ class Fields:
             return False
         return self._only([f"{demand.sides[0]} half"])
 
-    def _only(self, sides: list[str]) -> bool:
-        self.reading.meanings = [("around", 1.0), *self.reading.meanings]
-        return self._set("sides", sides)
-
     def _heading(self, demand: Demand) -> bool:
         sole = [i.symbol for i in self.items].count("<t>") < 2
         return (sole or self._other(demand) is None) and self._set("heading", demand.value)
@@ -191,36 +187,6 @@ class Fields:
         words = {w.text for w in tokens(self.text[item.start : item.end]) if w.text.isalpha()}
         return words - fillers()
 
-    def _groups(self, demand: Demand) -> bool:
-        sides, counts = dict.fromkeys(demand.sides), [q.whole or 0 for q in demand.numbers]
-        if demand.value == "each" and not any(n > 1 for n in counts):
-            counts = [1] * len(sides)
-        counts = counts or [0] * len(sides)
-        if len(sides) != len(counts) or self.reading.shares or not sides.keys() <= OPPOSITE.keys():
-            return False
-        self.reading.shares = list(zip(sides, counts, strict=True))
-        return not all(counts) or self._robots_are(sum(counts))
-
-    def _rings(self, demand: Demand) -> bool:
-        count = next((q.whole for q in demand.numbers), 2)
-        if count is None or self.reading.rings > 1:
-            return False
-        self.reading.rings = count
-        return self.reading.relation in ("around", "cage", "along")
-
-    def _rings_of(self, demand: Demand) -> bool:
-        """Two rings of six, or four in the inner ring and six in the outer one."""
-        counts = [q.whole or 0 for q in demand.numbers]
-        if demand.value == "alike":
-            rings, counts = (2, counts * 2) if len(counts) == 1 else (counts[0], counts[1:] * 2)
-        else:
-            rings, counts = 2, counts[1:3] if counts[0] == 2 < len(counts) else counts[:2]
-        known = self.reading.ring_counts or (self.reading.rings > 1 and rings != self.reading.rings)
-        if known or rings != 2 or len(counts) != 2 or 0 in counts:
-            return False
-        self.reading.rings, self.reading.ring_counts = rings, counts
-        return self.reading.relation in ("around", "cage") and self._robots_are(sum(counts))
-
     def _robots(self, demand: Demand) -> bool:
         number = next((q for q in demand.numbers if q.kind in ("number", "compound")), None)
         if number is None:
@@ -249,17 +215,17 @@ class Fields:
         if kept:
             self.reading.background.append(self._quote(kept[0], kept[-1] + 1))
 
-    def _robots_are(self, count: int) -> bool:
-        if self.reading.robots not in (None, count):
-            return False
-        self.reading.robots = count
-        return True
-
     def _located(self, demand: Demand) -> bool:
         return self._follows_thing(demand)
 
     def _all_round(self, demand: Demand) -> bool:
         return self.reading.relation in ("around", "cage")
+
+    def _ring(self, demand: Demand) -> bool:
+        return self._all_round(demand)
+
+    def _purpose(self, demand: Demand) -> bool:
+        return self._left_alone(demand)
 
     def _all_of(self, demand: Demand) -> bool:
         return self.reading.relation == "inside"

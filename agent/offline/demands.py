@@ -21,6 +21,8 @@ ALWAYS = ("a negation", "a cancellation", "something past", "another task", "a s
 """Kinds of stops that also count in words that look like background beside an order."""
 SURE_SCENIC = 0.8
 """Least probability of each word of a sentence that only tells something."""
+TOLD_OF = ("nobody", "no", "none", "there", "we", "i", "they", "it", "it's", "there's")
+"""What a sentence is about that gives robots no time."""
 OPENING_CONDITIONS = ("unless", "until", "if", "once", "as", "provided")
 """First words of a sentence that makes all of them conditional."""
 WRAPPED = re.compile(r"\s*\|\s*")
@@ -140,6 +142,8 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
                 meant = any(i.label != "background" for i in sentence[first:last])
                 opens = first == 0 and sentence[0].symbol in OPENING_CONDITIONS
                 told = scenic and last - first < len(words)
+                told |= kind == "a time" and len(parts) > 1 and sentence[0].symbol in TOLD_OF
+                meant &= not (told and kind == "a time")
                 stops = meant or opens or (kind in ALWAYS and not told)
                 stops = stops and (kind != "a question" or asked_only)
                 orders = len(parts) == 1 or any(i.quantity for i in sentence)
@@ -166,6 +170,12 @@ def says_others(phrase: str) -> bool:
 def says_inside(phrase: str) -> bool:
     """Whether a phrase for a thing is about its inside: "the inside of the box"."""
     return any(pattern.search(phrase.lower()) for pattern in _patterns("insides"))
+
+
+def is_part(phrase: str) -> bool:
+    """Whether a phrase names a part by which a distance from a thing is told: "the wings"."""
+    parts = re.sub(WRAPPED, "|", _table()["words"]["SURFACE"])
+    return re.fullmatch(f"(?:(?:the|its|their) )?(?:{parts})", phrase.lower()) is not None
 
 
 @cache

@@ -1,5 +1,6 @@
 """From what was read to a contract, or to the question that has to be asked first."""
 
+from dataclasses import replace
 from typing import Any
 
 from ...tools.formation.contract import MAX_ROBOTS
@@ -9,6 +10,7 @@ from .reading import Reading
 
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
+LEAST_CAGE = 3
 LIKELY_PLACE = 0.3
 """Least probability of another arrangement for it to say where a form is drawn."""
 NAMES = {
@@ -33,13 +35,15 @@ def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
         or _not_understood(reading, robots)
         or _unsettled(reading)
         or _how_many(reading, robots)
+        or (None if task.robots else _too_few(reading, robots))
         or which_things(task, reading)
     )
 
 
-def would_do(task: Task, reading: Reading) -> bool:
+def would_do(task: Task, reading: Reading, robots: int) -> bool:
     """Whether all but words that were left unread is settled, so that a contract can be shown."""
     settled = not (reading.stops or reading.unscaled or _unsettled(reading))
+    settled = settled and _too_few(reading, robots) is None
     settled = settled and not (reading.others or reading.faced or which_things(task, reading))
     return settled and bool(reading.unread)
 
@@ -78,6 +82,14 @@ def _groups(
     reading: Reading, robots: int, basics: dict[str, Any], attempt: int
 ) -> list[dict[str, Any]]:
     relation = reading.relation
+    if reading.further:
+        aside = sum(count for _, count in reading.further)
+        whole = reading.one_a_corner and reading.robots is not None
+        main = replace(reading, further=[])
+        return [
+            *_groups(main, robots - aside if whole else robots, basics, attempt),
+            *(_group_aside(side, count, basics["targets"]) for side, count in reading.further),
+        ]
     if reading.shares:
         counts = [count or robots // 2 for _, count in reading.shares]
         if sum(counts) != robots and len(counts) == 2:
@@ -96,6 +108,11 @@ def _groups(
         drawn = _drawn(reading, basics, attempt)
         return [basics | {"relation": "shape", "robots": robots} | drawn]
     return [_related(reading, basics | {"robots": robots})]
+
+
+def _group_aside(side: str, robots: int, targets: list[str]) -> dict[str, Any]:
+    place = {"relation": "centre"} if side == "centre" else {"relation": "along", "side": side}
+    return place | {"targets": targets, "robots": robots}
 
 
 def _related(reading: Reading, basics: dict[str, Any]) -> dict[str, Any]:
@@ -194,6 +211,12 @@ def _how_many(reading: Reading, robots: int | None) -> str | None:
             f"{form.wording} takes {form.robots} robots, {robots} were named. Which?".capitalize()
         )
     return None if robots else "How many robots? Say a number."
+
+
+def _too_few(reading: Reading, robots: int | None) -> str | None:
+    if reading.relation != "cage" or robots is None or robots >= LEAST_CAGE:
+        return None
+    return f"A closed ring takes {LEAST_CAGE} robots or more, not {robots}. How many robots?"
 
 
 def which_things(task: Task, reading: Reading) -> str | None:

@@ -24,12 +24,16 @@ from .pointed import chosen_by_answer, narrowed
 from .reading import Reading
 from .references import described
 from .restated import LEFT_OUT, Restated, is_question, restated
-from .sequences import in_stages
+from .sequences import in_stages, stages_of
 from .several import about_several
 from .spelling import spelled
 
 MAX_LABEL = 100
 NOTHING_YET = "Nothing stands yet, so there is nothing to tell of it. "
+ONE_AT_A_TIME = (
+    "Those are formations one after the other, each from where robots arrived in the one before: "
+    "only one can be planned without moving robots. Say that one alone."
+)
 USUAL_CORNERS = 4
 READING = "The rules account for every word; the rest of them says which thing is meant."
 """Answers a doubt, which comes of single words."""
@@ -114,12 +118,14 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     reading = replace(reading, unread=[*still_open, *reading.unread])
     robots = _robot_count(task, reading, history)
     question = question_of(task, reading, robots)
+    if not task.deploy and len(stages_of(replace(task, deploy=True))) > 1:
+        question = ONE_AT_A_TIME
     if question or robots is None:
         back = [answer for _, answer in _answered(history)[-1:]]
         untold = NOTHING_YET if any(is_question(a, task.metres_per_pixel) for a in back) else ""
         asked: dict[str, Any] = {"question": f"{untold}{question or 'How many robots?'}"}
         ids = _target_ids(task)
-        if robots and ids and would_do(task, reading):
+        if robots and ids and would_do(task, reading, robots):
             asked["contract"] = _in_unit(task, contract_of(reading, robots, ids, []))
         return _call("ask_user", asked)
     needed = things_needed(reading)
@@ -304,7 +310,8 @@ def _after_proposal(task: Task, result: Result, history: History, before: Histor
         return _impossible(history, facts.get("plain", result.text), facts.get("partial_plan"))
     plan = json.loads(result.text)
     reading = read_instruction(task.instruction, task.metres_per_pixel)
-    counts = _counts_corners(reading) and plan["robots"] != _robot_count(task, reading, history)
+    main = plan["robots"] - sum(count for _, count in reading.further)
+    counts = _counts_corners(reading) and main != _robot_count(task, reading, history)
     if counts and not task.standing:
         return _begin(task, history, before)
     if not plan["certified"]:

@@ -22,6 +22,7 @@ class Reading:
         group: fields of the contract's group beside relation, targets and robots. Lengths px.
         robot_radius: px, where the words state it.
         shares: numbers of robots on sides, where the words part them so; 0 for an equal share.
+        further: robots on a side, or at the "centre", beside the arrangement.
         one_a_corner: whether each corner takes one.
         rings: how many rings or rows, one outside the other.
         ring_counts: how many robots stand in each of them, the inner one first, where that is said.
@@ -43,6 +44,7 @@ class Reading:
     group: dict[str, Any] = field(default_factory=dict[str, Any])
     robot_radius: float | None = None
     shares: list[tuple[str, int]] = field(default_factory=list[tuple[str, int]])
+    further: list[tuple[str, int]] = field(default_factory=list[tuple[str, int]])
     one_a_corner: bool = False
     rings: int = 1
     ring_counts: list[int] = field(default_factory=list[int])

@@ -15,12 +15,27 @@ import yaml
 from ...tools.formation.number_words import numbers_in
 
 SIDE = "(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?"
-ONLY_SIDE = re.compile(f"(?:(?:the|its) )?{SIDE}(?: side| end| edge)?")
+ONLY_SIDE = re.compile(f"it|(?:(?:the|its) )?{SIDE}(?: side| end| edge)?")
 """Where at a thing, not which thing."""
 SIDE_OF = re.compile(
-    f"(?:the |its )?{SIDE}(?: side| edge| end| flank)? of "
-    r"(?=it|this|that|the (?!two|three|four|\w+s\b))"
+    f"(?:the |its )?(?:{SIDE}|(?:two |both )?(?:long|short)(?:er)?)"
+    "(?: sides?| edges?| end| flanks?)? of "
+    r"(?=it|this|that|the (?!two|three|four|\w+[^\Wsu]s\b))"
 )
+FURTHER = re.compile(
+    r"(?:(?:,|;|and|plus|with|then|also|put|another|a further|the other) )+(?:\w+(?: - \w+)? )"
+    r"(?:(?:more|others?|further|extra|robots?|bots?|drones?|units?|ones?|of them|go|stand) )*"
+    r"(?:on|at|to|along|in|above|below|over|under|beneath|underneath|left|right|by|around)\b"
+)
+"""How further robots begin that stand elsewhere: "and another two on the left"."""
+LONGEST_LEAD = 12
+"""Words of the longest such beginning."""
+COUNTED = re.compile(
+    r"(?:the (?:exact |very )?middle(?= between )|"
+    r"(?!one)(\w+) (?:to|at|on|in|around|round|along|inside)(?= ))"
+)
+"""What stands before a thing that is named last: "five to the lid", "the middle between"."""
+MIDDLE = re.compile("(?:the |its )(?:very |exact )?(?:centre|center|middle)")
 OWNED_SIDE = re.compile(f"'s ({SIDE} (?:side|edge)|corners)$")
 
 
@@ -28,8 +43,15 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
     """The labels, without what is no phrase for a thing, or no part of one."""
     found = list(labels)
     for start, end in _runs(found, "thing"):
-        while start < end - 1 and (words[start] in _lists()["leading"] or _is_verb(words, start)):
-            found[start], start = "command", start + 1
+        began = start
+        start = min(_behind_number(words, start, end), end)
+        while start < end and (words[start] in _lists()["leading"] or _is_verb(words, start)):
+            start += 1
+        found[began:start] = ["command"] * (start - began)
+        if words[start : start + 1] == ["its"] and numbers_in(
+            " ".join(words[max(start - 2, 0) : start])
+        ):
+            found[start:end], start = ["demand"] * (end - start), end  # "and one at its centre"
         headed = _after_verb(words, start, end)
         found[start:headed], start = ["command"] * (headed - start), headed
         while end > start and words[end - 1] in _lists()["trailing"]:
@@ -66,9 +88,24 @@ def _mark_beside(words: Sequence[str], found: list[str]) -> None:
             found[k:stop] = ["thing"] * (stop - k)
 
 
+def _further(words: Sequence[str], at: int) -> int:
+    """Past-the-last of the words that begin further robots at a place; 0 where none do."""
+    more = FURTHER.match(" ".join(words[at : at + LONGEST_LEAD]))
+    return at + len(more[0].split()) if more is not None and numbers_in(more[0]) else 0
+
+
+def _behind_number(words: Sequence[str], start: int, end: int) -> int:
+    """Where a phrase for a thing begins behind a number of robots, or "the middle" between two."""
+    more = _further(words, start) or _further(words, max(start - 1, 0))
+    counted = COUNTED.match(" ".join(words[start:end]))
+    if counted is not None and (counted[1] is None or numbers_in(counted[1])):
+        more = start + len(counted[0].split())
+    return more or start
+
+
 def _is_verb(words: Sequence[str], at: int) -> bool:
     """Whether a word before a determiner is no noun: "circle the" at the very beginning."""
-    return at == 0 and not may_open(words[0]) and may_open(words[1])
+    return at == 0 and len(words) > 1 and not may_open(words[0]) and may_open(words[1])
 
 
 def _after_verb(words: Sequence[str], start: int, end: int) -> int:
@@ -93,7 +130,8 @@ def _ends_thing(word: str) -> bool:
 def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
     """What the words of a phrase for a thing are, up to a purpose or a further number."""
     phrase, count = " ".join(words[start:end]), end - start
-    if phrase.startswith(tuple(_lists()["no_thing"])) or ONLY_SIDE.fullmatch(phrase):
+    none = (*_lists()["no_thing"], *_lists()["begin_demand"])
+    if phrase.startswith(none) or ONLY_SIDE.fullmatch(phrase):
         return ["demand"] * count
     found = ["thing"] * count
     if count > 2 and words[end - 2] == "and" and numbers_in(words[end - 1]):
@@ -110,13 +148,32 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
         last = end if ONLY_SIDE.fullmatch(" ".join(words[turned + 1 : end])) else turned + 1
         for k in range(turned - (words[turned - 1] in ("that", "which")), min(last, end)):
             found[k - start] = "demand"
+    return _up_to_next(words, start, end, found)
+
+
+def _up_to_next(words: Sequence[str], start: int, end: int, found: list[str]) -> list[str]:
+    """The labels of a phrase for a thing, up to where it goes on with something else."""
+    count = end - start
     for k in range(1, count):
         rest = " ".join(words[start + k : end])
+        more = min(_further(words, start + k), end)
+        if more:
+            between = ["command"] * (more - start - k)
+            return [*_thing_labels(words, start, start + k), *between, *_place(words, more, end)]
         for label in ("background", "demand"):
             if rest.startswith(tuple(_lists()[f"begin_{label}"])):
                 k -= not words[start + k - 1][0].isalnum()
                 return found[:k] + [label] * (count - k)
     return found
+
+
+def _place(words: Sequence[str], start: int, end: int) -> list[str]:
+    """What the words are that say where further robots stand."""
+    if start == end or MIDDLE.match(" ".join(words[start:end])) is not None:
+        return ["demand"] * (end - start)
+    if words[start] in _lists()["leading"]:
+        return ["command", *_place(words, start + 1, end)]
+    return _thing_labels(words, start, end)
 
 
 def _passive(words: Sequence[str], start: int, end: int) -> int:

@@ -279,6 +279,13 @@ def test_forms_are_drawn(words: str, kind: str, robots: int) -> None:
         ("Put 4 robots on the left and 2 on the right of it", [("left", 4), ("right", 2)]),
         ("Two robots on its top side and three on its bottom side", [("top", 2), ("bottom", 3)]),
         ("Stand half of the 6 robots on the left of it, the other half on the right", None),
+        ("6 robots to the left of the van and another 4 at its top", [("left", 6), ("top", 4)]),
+        ("5 robots along the top of the shed, then 3 more below it", [("top", 5), ("bottom", 3)]),
+        ("One robot left of the vase plus two right of the vase", [("left", 1), ("right", 2)]),
+        ("8 robots on both sides of the bench, four a side", [("long", 4), ("other long", 4)]),
+        ("Two robots on each short side of the rug", [("short", 2), ("other short", 2)]),
+        ("Three robots on either side of the hedge", [("long", 3), ("other long", 3)]),
+        ("4 robots, one on each side of it", [(s, 1) for s in ("left", "right", "top", "bottom")]),
     ],
 )
 def test_several_groups_have_their_numbers(
@@ -320,6 +327,13 @@ def test_two_rings_or_rows_are_two_groups(words: str, relation: str) -> None:
         ("My cousin lost a bet. Ring the lid with 8 robots, cheers", "My cousin lost a bet"),
         ("Ring the lid with 8 robots because the inspector is coming", "inspector"),
         ("Good morning, team. Ring the lid with 8 robots.", "Good morning"),
+        ("Ring the lid with 8 robots like they are guarding a bank", "like they are guarding"),
+        (
+            "Ring the lid with 8 robots before the mayor arrives at four",
+            "the mayor arrives at four",
+        ),
+        ("We close early tonight. Ring the lid with 8 robots.", "tonight"),
+        ("Keep visitors away from the lid: 8 robots round it", "Keep visitors away"),
     ],
 )
 def test_background_changes_nothing_and_is_repeated(words: str, background: str) -> None:

@@ -94,6 +94,21 @@ def test_sides_have_one_name_each(words: str, sets: str, sides: tuple[str, ...])
 
 
 @pytest.mark.parametrize(
+    "words",
+    [
+        "If it would not be too much bother, ring it with 6 robots",
+        "Ring it with 6 robots if that is fine with you",
+        "Ring it with 6 robots as if they were statues",
+        "We eat late tonight. Ring it with 6 robots",
+        "Put 6 robots on its left and then 2 more at its top",
+        "Ring it with 6 robots and hold off 30 px",
+    ],
+)
+def test_courtesy_and_what_only_tells_stop_nothing(words: str) -> None:
+    assert not stops_in(items(words))
+
+
+@pytest.mark.parametrize(
     ("words", "kind"),
     [
         ("Ring it with 6 robots if it snows", "a condition"),
@@ -102,6 +117,8 @@ def test_sides_have_one_name_each(words: str, sets: str, sides: tuple[str, ...])
         ("Cancel the ring of 6 robots", "a cancellation"),
         ("Ring it with 6 robots and follow it", "an ongoing movement"),
         ("Ring it with 6 robots, led by robot 3", "robots by name"),
+        ("Ring it with 6 robots tonight", "a time"),
+        ("Ring it with 6 robots. Tomorrow.", "a time"),
         ("Ring it with 6 robots, most of them clusters", "an uneven spread"),
     ],
 )

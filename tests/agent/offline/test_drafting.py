@@ -131,7 +131,6 @@ def test_nothing_is_placed_where_nobody_said_to(words: str) -> None:
         "Fill the upper half of it with 8 robots",
         "Cover the left side of the lawn with 8 robots",
         "Line up 8 robots along its left side and along its top",
-        "Flank it with 8 robots on both long sides",
     ],
 )
 def test_what_is_more_than_one_arrangement_of_one_thing_is_asked_about(words: str) -> None:

@@ -140,6 +140,24 @@ def test_a_cage_of_two_is_impossible_and_it_says_why() -> None:
     assert report.message == "a cage takes 3 or more robots, got 2."
 
 
+@pytest.mark.parametrize("words", ["Cage it with 2 robots", "Cage it with one robot, zigzag"])
+def test_a_cage_of_too_few_that_words_ask_for_is_asked_about_in_plain_words(words: str) -> None:
+    report = run(words, pointed=[COIN])
+    assert report.status == "question"
+    assert "contract" not in report.message
+    assert "groups" not in report.message
+
+
+def test_corners_and_one_at_the_centre_are_two_groups_of_one_plan() -> None:
+    report = run("A robot at each corner of it and one at its centre", pointed=[COIN])
+    assert report.verdict is not None
+    assert report.verdict.certified
+    assert report.contract is not None
+    corners, centre = report.contract.groups
+    assert (corners.relation, centre.relation, centre.robots) == ("corners", "centre", 1)
+    assert corners.robots >= 4
+
+
 LOOKS_LIKE = "Insufficient segmentation accuracy, no room above p-0123456789"
 PARTIAL = {"plain": "y", "partial_plan": "p-1"}
 

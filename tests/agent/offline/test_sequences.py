@@ -79,3 +79,10 @@ def test_real_robots_wait_for_a_yes_to_each_plan(picture: Picture) -> None:
     assert second.report.plan_id != run.report.plan_id
     assert list(second.world.arrivals) == [run.report.plan_id]
     assert Agent().resume(second, approve=True).report.status == "deployed"
+
+
+def test_formations_in_sequence_are_not_planned_where_nothing_may_move(picture: Picture) -> None:
+    words = "First surround the red disc with 6 robots, then line up left of it"
+    report = Agent().run(picture, words, settings=Settings(may_deploy=False)).report
+    assert report.status == "question"
+    assert "only one can be planned without moving robots" in report.message

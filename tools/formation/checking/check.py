@@ -20,7 +20,7 @@ from ..contract import CENTRE_SHARE, PITCH_PX, Contract
 from ..headings import headings_of, off_heading
 from ..placement import spacing
 from ..placement.caging import escape_proof
-from ..placement.figure import figure_of
+from ..placement.figure import drawn_by, figure_of
 from ..placement.place import Site, curve_between, reference_curve, side_direction
 from . import gaps
 from .cage_verdict import judge
@@ -221,17 +221,22 @@ def _check_shape(part: Part, audit: Audit) -> None:
     if shape is None:
         _check_line(part, audit)
         return
+    figure = figure_of(part.group, shape, part.site, part.radius)
     if not part.group.enters:
         _check_off_targets(part, audit)
     if shape.where == "inside":
         _check_depth(part, audit)
     elif part.group.clearance is not None:
         clearance = distances(part.outline.filled, part.points) - part.radius
-        least, name = part.clearance[0], part.group.targets[0]
+        (least, greatest), name = part.clearance, part.group.targets[0]
         audit.least("min_clearance_px", clearance.min())
+        audit.greatest("max_clearance_px", clearance.max())
+        if drawn_by(figure).distance(part.outline.filled) > greatest + part.radius + TOLERANCE:
+            robot = part.first + int(clearance.argmin())
+            audit.find("too_far", clearance.min(), greatest, robot=robot, about=name)
         for i in np.flatnonzero(clearance < least - TOLERANCE):
             audit.find("too_near", clearance[i], least, robot=part.first + i, about=name)
-    on_figure(part, figure_of(part.group, shape, part.site, part.radius), audit)
+    on_figure(part, figure, audit)
     if part.group.pitch is not None:
         gaps.pitch_nearest(part, audit)
 

@@ -8,7 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 import shapely
-from shapely.geometry import GeometryCollection, LineString, MultiPoint, Point, Polygon
+from shapely.geometry import (
+    GeometryCollection,
+    LineString,
+    MultiLineString,
+    MultiPoint,
+    Point,
+    Polygon,
+)
 
 from ...errors import InputError, ToolError
 from ...geometry.curves import QUAD_SEGMENTS, ROUND_JOIN_DIP
@@ -95,6 +102,11 @@ def place_figure(group: Group, shape: ShapeSpec, site: Site, radius: float) -> F
 def robots_on(figure: Sketch, n: int) -> FloatArray:
     """N robots on a shape, (n, 2), image pixels."""
     return spread(figure.lines, n) if figure.places is None else figure.places
+
+
+def drawn_by(figure: Sketch) -> MultiLineString | MultiPoint:
+    """What a shape is made of: its lines, or the places of a grid."""
+    return MultiLineString(figure.lines) if figure.places is None else MultiPoint(figure.places)
 
 
 def _sketch(group: Group, shape: ShapeSpec) -> Sketch:
@@ -224,4 +236,25 @@ def _figure_beside(
     y = y0 - gap - half_y if dy < 0 else y1 + gap + half_y if dy > 0 else y
     x = min(max(x, left + half_x), right - half_x)
     y = min(max(y, top + half_y), bottom - half_y)
-    return sketch.at((x, y), scale)
+    return _brought_near(sketch, group, site, (x, y, scale), (dx, dy), radius)
+
+
+def _brought_near(
+    sketch: Sketch,
+    group: Group,
+    site: Site,
+    place: tuple[float, float, float],
+    beside: tuple[int, int],
+    radius: float,
+) -> Sketch:
+    """Beside the outline, not only its box: no further off than allowed."""
+    x, y, scale = place
+    solid, gap = site.outlines[group.targets[0]].filled, nominal(group.offsets()) + radius
+    placed = sketch.at((x, y), scale)
+    for _ in range(SEARCH):  # no step is longer than what is free
+        off = drawn_by(placed).distance(solid)
+        if off <= group.offsets(radius)[1]:
+            break
+        x, y = x - beside[0] * (off - gap), y - beside[1] * (off - gap)
+        placed = sketch.at((x, y), scale)
+    return placed

@@ -41,6 +41,8 @@ AT_CORNER = 0.5
 """As near to a corner, px, a robot's centre is on it."""
 ROUNDING = 2e-6
 """A place this much nearer than a clearance, px, is at it: corners are found to half of this."""
+LONG = 1.2
+"""Length over width from which a thing has two long sides."""
 DRAWN_BY_NUMBER = frozenset({"between", "centre"})
 """Where the places depend on how many there are, so that some of them are none for fewer."""
 
@@ -129,22 +131,31 @@ def reference_curve(group: Group, site: Site, radius: float, offset: float | Non
 
 
 def side_direction(group: Group, outline: Outline, site: Site) -> tuple[float, float]:
-    """Outward vector of a group's side; of the two long (short) sides the one with more room."""
+    """Outward vector of a group's side; of the two long (short) sides the one with more room.
+
+    Raises:
+        ToolError: both long sides are meant of what is about as wide as it is long.
+    """
     if group.facing is not None:
         return _facing(outline, site.outlines[group.facing])
     name = group.side or "bottom"
     if name in DIRECTIONS:
         return DIRECTIONS[name]
-    unit = outline.long_axis[0]
-    normal = np.array([-unit[1], unit[0]]) if name == "long" else unit
-    reach = (outline.long_axis[2] if name == "long" else outline.long_axis[1]) / 2
+    (unit, length, width), other = outline.long_axis, name.startswith("other ")
+    if other and length < LONG * width:
+        raise ToolError(
+            f"{group.targets[0]} is about as wide as it is long and has no two long sides: name "
+            "its sides, left and right or top and bottom."
+        )
+    normal = np.array([-unit[1], unit[0]]) if name.endswith("long") else unit
+    reach = (width if name.endswith("long") else length) / 2
     middle = shapely.get_coordinates(outline.polygon.centroid)[0]
 
     def room(way: FloatArray) -> float:
         x, y = middle + way * reach * 1.2
         return min(x, y, site.width - 1 - x, site.height - 1 - y)
 
-    best = max((normal, -normal), key=room)
+    best = max((normal, -normal), key=room) * (-1 if other else 1)
     return float(best[0]), float(best[1])
 
 

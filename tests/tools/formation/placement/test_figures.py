@@ -139,6 +139,18 @@ def test_a_form_by_a_target_keeps_off_it_or_stays_in_it() -> None:
     assert left.formation.points[:, 0] == pytest.approx(240, abs=0.3)
 
 
+@pytest.mark.parametrize("where", ["left", "right", "above", "below"])
+def test_a_form_beside_a_target_comes_as_near_as_is_demanded(where: str) -> None:
+    """A disc falls short of its box, so that a form beside the box alone would stand too far."""
+    plan = drawn(5, {"kind": "v", "where": where}, clearance=(20, 21))
+    assert plan.verdict.certified
+    assert 19.99 <= float(plan.verdict.measures["min_clearance_px"]) <= 21.01
+    further = plan.formation.contract.model_dump()
+    further["groups"][0]["clearance"] = (5.0, 6.0)
+    verdict = certify(plan.formation.points, Contract.model_validate(further), SITE)
+    assert not verdict.certified
+
+
 def test_what_has_no_room_says_so() -> None:
     with pytest.raises(ToolError, match="out of the 640 x 480 px picture"):
         drawn(20, {"kind": "star", "where": "around"}, clearance=(90, 90))
