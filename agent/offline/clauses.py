@@ -211,7 +211,7 @@ class Line:
         leads = word in rules()["questions"] and not polite
         marked = words.rstrip().endswith("?")
         either = word in ("can", "could", "would", "will", "may")
-        either = either or (not marked and word in ("have", "do", "is", "are", "any"))
+        either = either or (not marked and word in ("have", "do", "any"))
         open_ = re.match(r"(?:can|could) (?:it|they|any|some)", text) is not None
         return leads or marked or open_, leads and not either
 

@@ -31,6 +31,7 @@ EXACT = re.compile(
     rf"\bto (?:exactly |about |just |only |some )?(?:[0-9]|(?:{'|'.join(SMALL)})\b)", re.IGNORECASE
 )
 """The whole of it, not a change: "increase it to 60 px"."""
+IN_PICTURE = re.compile(r"\b(?:picture|image|photo|screen)\b", re.IGNORECASE)
 LESSER = re.compile(r"\W*(?:not (?:so|as|that|quite)|less)\b", re.IGNORECASE)
 """Takes a part of the last change back: "not so tight"."""
 LEAST_BARE = 5
@@ -65,6 +66,11 @@ class Said:
     denies: bool = False
     phrases: tuple[tuple[Chunk, str], ...] = ()
     line: str = ""
+
+    @property
+    def kinds(self) -> set[str]:
+        """Kinds of its phrases."""
+        return {kind for chunk, _ in self.phrases for kind in chunk.kinds}
 
     @property
     def last(self) -> list[Effect]:
@@ -321,6 +327,15 @@ def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Eff
     if others:
         return ask(f"Which thing is meant: {' or '.join(others)}?", *map(option.format, others))
     return OTHER
+
+
+def centre_of(slots: Slots, said: Said) -> tuple[float, float] | None:
+    """The centre of the thing that is named, else of what the robots stand about, px."""
+    if IN_PICTURE.search(said.words):
+        width, height = said.standing.size
+        return width / 2, height / 2
+    named = str(slots.get("thing", said.standing.targets[:1] or [""])[0])
+    return (said.standing.centre or {}).get(named)
 
 
 def listed(numbers: Sequence[object]) -> str:

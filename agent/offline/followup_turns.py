@@ -7,6 +7,7 @@ from .followup_edits import (
     Effects,
     Said,
     ask,
+    centre_of,
     refuse,
 )
 from .followup_frames import Slots
@@ -19,6 +20,24 @@ STATED, WIDEST = 2.0, 0.11
 """Widest range of a distance that was stated: so many px, or this share of it."""
 CHOSEN = re.compile(r"\bnot\b|\b(?:then|sorry|i mean(?:t)?|rather|instead)\W*$", re.IGNORECASE)
 """What says that something is chosen: "six then", "7, not 5"."""
+METRES = re.compile(r"\bmet(?:re|er)s?\b", re.IGNORECASE)
+AT_LEAST = re.compile(
+    r"\b(?:at least|minimum|no less|not less|(?:no|not) (?:closer|nearer)|"
+    r"(?<!no )(?<!not )(?:more|further|farther)(?: away| apart)? than)\b",
+    re.IGNORECASE,
+)
+AT_MOST = re.compile(
+    r"\b(?:at most|maximum|no more|not more|(?:no|not) (?:further|farther)|"
+    r"(?<!no )(?<!not )(?:less|closer|nearer)(?: together)? than)\b",
+    re.IGNORECASE,
+)
+CENTRE = re.compile(r"\b(?:middle|cent(?:re|er))\b", re.IGNORECASE)
+YES_OR_NO = re.compile(
+    r"(?:\W*\b(?:so|and|ok|okay|but|now|well|then|tell me|check|if|whether)\b)*"
+    r"\W*(?:is|are|do|does|has|have)\b(?! (?:them|you|it)\b)",
+    re.IGNORECASE,
+)
+SOME = re.compile(r"\b(?:any|anyone|anybody|some)\b", re.IGNORECASE)
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
@@ -187,18 +206,62 @@ def units(slots: Slots, said: Said) -> Effects:
     return [{"kind": "query", "about": "distance"}]
 
 
+def sides_free(slots: Slots, said: Said) -> Effects:
+    """Which sides no robots stand on."""
+    asks = "sideq" in slots or YES_OR_NO.match(said.line)
+    return [{"kind": "talk", "about": "sides"}] if asks else None
+
+
+def _bound(slots: Slots, said: Said) -> Effect:
+    """What a distance is compared with, where it is asked whether robots keep it."""
+    sign = ">" if AT_LEAST.search(said.words) else "<" if AT_MOST.search(said.words) else ""
+    neighbours = slots.has("apart", "spacing", "num")
+    of = "neighbour_px" if neighbours else "target_px"
+    some = SOME.search(said.words) is not None
+    return {"px": float(slots["px"][0]), "sign": sign, "of": of, "some": some}
+
+
 def asked(slots: Slots, said: Said, about: str) -> Effects:
     """A question of the person's, answered by measures."""
     robots = [r for named in slots.get("robots", ()) for r in named]
-    query: Effect = {"kind": "query", "about": about}
-    if about == "distance" and ("spacing" in slots or "apart" in slots):
-        query["about"] = "spacing"
-    if about == "compared":
-        query = {"kind": "query", "about": "distance", "each": True}
-    if about == "nearest":
-        query["most"] = (slots.get("nearest") or ["nearest"])[0]
+    metric = "unit" in slots and METRES.search(said.words)
+    if metric and said.standing.metres_per_pixel is None:
+        return units(slots, said)
+    if about in ("bound", "at") and not YES_OR_NO.match(said.line):
+        return None
+    if about == "near":
+        return _near(slots, said, robots)
+    thing = "thing" in slots and "each" not in slots
     return [
-        query
+        {"kind": "query", "about": about}
+        | _details(slots, said, about)
         | ({"robots": robots} if robots else {})
-        | ({"thing": slots["thing"][0]} if "thing" in slots else {})
+        | ({"thing": slots["thing"][0]} if thing else {})
     ]
+
+
+def _details(slots: Slots, said: Said, about: str) -> Effect:
+    """What else a question asks, and of what it is when that is not what its frame is called."""
+    if about == "distance":
+        return {"about": "spacing"} if slots.has("spacing", "apart") else {}
+    if about == "at":
+        return {"about": "distance"}
+    if about == "compared":
+        return {"about": "distance", "each": True}
+    if about in ("nearest", "pair"):
+        return {"most": (slots.get("nearest") or slots.get("pair") or ["nearest"])[0]}
+    if about == "touch":
+        of_thing = {"thing", "there", "current", "it"} & said.kinds
+        return {"about": "nearest" if of_thing else "pair", "most": "nearest", "touch": True}
+    return _bound(slots, said) if about == "bound" else {}
+
+
+def _near(slots: Slots, said: Said, robots: list[int]) -> Effects:
+    """Which robot is the nearest to another one, a point or a centre."""
+    query: Effect = {"kind": "query", "about": "near", "most": slots["nearest"][0]}
+    slots.has("relation", "inward")
+    if robots:
+        return [query | {"to": f"robot {robots[0]}"}]
+    centre = centre_of(slots, said) if CENTRE.search(said.words) else None
+    to = slots["point"][0] if "point" in slots else centre
+    return None if to is None else [query | {"to": list(to)}]

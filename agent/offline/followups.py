@@ -17,8 +17,9 @@ from .drawn_forms import form_in
 from .escorting import without_follow
 from .followup_edits import Effect, listed
 from .followup_last import RELATIVE, corrected
+from .followup_places import meant_by_place, numbered
 from .followup_things import impossible
-from .followup_words import Chunk, rules
+from .followup_words import Chunk, rules, word_set
 from .spelling import spelled
 from .standing import Standing
 
@@ -102,6 +103,27 @@ class Followup:
 
 def read_followup(words: str, standing: Standing | None) -> Followup:
     """What is meant by words that are said when a plan stands, or talk that fits at any time."""
+    if standing is None or not standing.places:
+        return _heard(words, standing)
+    told = numbered(standing)
+    robots = meant_by_place(words, told, lambda text: _is_settled(_heard(text, told)))
+    if robots.tied:
+        return Followup("ask", text=robots.question, options=robots.options)
+    meant = _heard(robots.words, told)
+    moved = meant.rest or (len(meant.edits) > 1 and any("robot" not in e for e in meant.edits))
+    if moved and words != robots.words:
+        text = f'Which robot is meant in "{words}" may change on the way. Say it in two turns.'
+        return Followup("ask", text=text)
+    return meant
+
+
+def _is_settled(followup: Followup) -> bool:
+    """Whether it is understood, and about nothing that has to be found."""
+    return followup.kind not in ("ask", "refuse", "instruction") and not followup.things
+
+
+def _heard(words: str, standing: Standing | None) -> Followup:
+    """What is meant by words in which robots have their numbers."""
     if standing is not None:
         words, _ = without_follow(words, standing.stood_about, standing.metres_per_pixel)
     meant = _read(words, standing)
@@ -140,7 +162,10 @@ def _read(words: str, standing: Standing | None) -> Followup:
 
 
 def commands(words: str, standing: Standing) -> bool:
-    """Whether words are a command of their own, not only what another one leaves open."""
+    """Whether words are a command or question, not only what another one leaves open."""
+    lead = next(iter(re.findall(r"[a-z']+", words.lower())), "")
+    if lead in word_set("questions") and words.rstrip().endswith("?"):
+        return True
     line = Line(words, standing)
     verbs = (c for c in line.chunks if {"make", "move"} & set(c.kinds) or not is_part(c))
     return any(verbs) and read_followup(words, standing).kind not in (

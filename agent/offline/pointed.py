@@ -75,6 +75,13 @@ def heeded(task: Task, followup: Followup) -> Followup:
     return Followup("refuse", text=text)
 
 
+def labelled(prompts: list[dict[str, Any]], things: Sequence[str]) -> list[dict[str, Any]]:
+    """What was pointed at, called as the words call it where they name one thing."""
+    label = re.sub(r"^(?:the|this|that) ", "", things[0]) if len(things) == 1 else ""
+    named = set(label.lower().split()) - {"thing", "one", "object", "target"}
+    return [{"label": label[:100], **prompts[0]}] if named and len(prompts) == 1 else prompts
+
+
 def narrowed(task: Task, history: History) -> Task | Step:
     """The task about the one of the things pointed at that its words name, or what to do first.
 

@@ -30,6 +30,8 @@ def standing(scene: str) -> Standing:
         if name in given:
             given[name] = tuple(given[name])
     given["centre"] = {name: tuple(at) for name, at in given["centre"].items()}
+    if "places" in given:
+        given["places"] = {str(name): tuple(at) for name, at in given["places"].items()}
     robots = tuple(str(k + 1) for k in range(count))
     return Standing(contract={"groups": groups}, robots=robots, things=things, **given)
 
