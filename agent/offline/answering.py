@@ -154,6 +154,7 @@ def said_of_query(query: Mapping[str, Any], data: Mapping[str, Any], scale: floa
     if "nearest_px" in data:
         nearest, centres = (length_text(data[n], scale) for n in ("nearest_px", "centres_px"))
         which = [f"robot {robot}" for robot in query.get("robots", ())]
+        which += [str(query["thing"])] if which and "thing" in query else []
         lead = f"{listed(which).capitalize()}: " if which else ""
         return f"{lead}{nearest} (centre to centre {centres})."
     if data.get("robots", 0) > len(data["each"]) and query["about"] in ("extent", "pair", "near"):

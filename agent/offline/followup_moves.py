@@ -81,8 +81,8 @@ def approach(slots: Slots, said: Said) -> Effects:
 def place(slots: Slots, said: Said) -> Effects:
     """One robot elsewhere: to a point, at a thing, or some way on."""
     robots = [r for named in slots["robots"] for r in named]
-    if "relation" in slots:
-        to = centre_of(slots, said) if slots["relation"] == ["centre"] else None
+    if slots.has("relation", "inward"):
+        to = centre_of(slots, said)
         return to and place(Slots({"robots": slots["robots"], "point": [to]}), said)
     point = (
         slots["point"][0] if "point" in slots else said.standing.place if "there" in slots else None

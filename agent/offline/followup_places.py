@@ -19,7 +19,7 @@ from .standing import Standing
 AMOUNTS = {"two": 2, "2": 2, "three": 3, "3": 3, "four": 4, "4": 4}
 LEAST_APART, APART = 1.0, 0.02
 """Nearer to each other than so many px, or this share of all, no robot is more to one side."""
-MOST_OFFERED = 4
+MOST_OFFERED = 12
 TOWARDS = {
     **dict.fromkeys(("left", "west"), (-1, 0)),
     **dict.fromkeys(("right", "east"), (1, 0)),
@@ -29,7 +29,9 @@ TOWARDS = {
 BOT = r"(?:robot|bot|drone|rover|unit|machine)"
 END = r"(?:left|right|top|bottom|upper|lower|north|south|east|west)"
 MIDDLE = r"(?:middle|centre|center|central|cent(?:re|er)most|middlemost)"
-MOST = r"(?:(?:left|right|top|upper|bottom|lower|north|south|east|west)(?:ern)?most|highest|lowest)"
+MOST = (
+    r"(?:(?:left|right|top|upper|bottom|lower|north|south|east|west)(?:ern)?-?most|highest|lowest)"
+)
 WAY = rf"(?:{MOST}|{MIDDLE}|{END}(?:[- ]?hand)?(?:[- ]{END})?)"
 FAR = r"(?:(?:very|far|furthest|farthest|extreme|most|all the way|outer|exact) )"
 NOUN = rf"(?:{BOT}(?P<many>s)?|(?P<one>ones?))\b(?! [0-9]+\b(?! ?(?:px|pix|m\b|met|cm|%|deg|per)))"
@@ -45,10 +47,10 @@ AT = (
 PHRASES = tuple(
     re.compile(pattern, re.IGNORECASE)
     for pattern in (
-        rf"\b(?P<which>which|what|who)(?: of (?:them|the {BOT}s))?(?: (?:one|{BOT}))?"
-        rf"(?:'s| is| stands| sits) (?:the )?(?:{AT}|{FAR})?(?P<way>{WAY})(?: (?:one|{BOT}))?"
-        rf"{CORNER}(?=\W*$| now| at the moment)",
-        rf"\b(?:the |(?={MOST})){N}{RANK}{FAR}?(?P<way>{WAY})(?: corner| side)? {NOUN}"
+        rf"\b(?P<which>which|what|who)(?: of (?:them|the {BOT}s))?(?: (?:one|number|{BOT}))?"
+        rf"(?:'s| is| has| stands| sits)(?: the number of)? (?:the )?(?:(?:one|{BOT}) )?"
+        rf"(?:{AT}|{FAR})?(?P<way>{WAY})(?: (?:one|{BOT}))?{CORNER}(?=\W*$| now| at the moment)",
+        rf"\b(?:the |(?={MOST})){N}{RANK}{FAR}?(?P<way>{WAY})(?: corner| side| end)? {NOUN}"
         rf"(?! (?:of|(?:on|at|in) the {END})\b)",
         rf"\b(?:the |that ){N}{RANK}{NOUN} {STANDS}(?:(?:counted )?from (?:the )?|{AT})"
         rf"(?P<way>{WAY})\b{CORNER}(?! (?:of|{BOT}))",
@@ -59,8 +61,13 @@ PHRASES = tuple(
     )
 )
 """Phrases for robots, or with `one` for robots or things, by where they stand."""
+BOTH = re.compile(
+    rf"\bthe (?P<a>{FAR}?{WAY}) and (?:the )?(?P<b>{FAR}?{WAY}) (?P<noun>{BOT}|one)s?\b",
+    re.IGNORECASE,
+)
+"""Two robots of one noun: "the left and the right robot"."""
 LED = re.compile(
-    r"\b(?:around|round|about|to|towards?|inside|between|by|near|along|with|from|of|at|on|onto) $"
+    r"\b(?:around|round|about|to|towards?|inside|between|by|near|along|from|of|at|on|onto) $"
 )
 """Before "the left one", a thing is meant."""
 
@@ -118,6 +125,7 @@ def named(words: str, standing: Standing, *, ones: bool) -> Named:
         standing: with the places of its robots.
         ones: whether "the left one" is a robot too.
     """
+    words = BOTH.sub(r"the \g<a> \g<noun> and the \g<b> \g<noun>", words)
     for pattern in PHRASES:
         at = 0
         while (match := pattern.search(words, at)) is not None:
@@ -133,7 +141,7 @@ def named(words: str, standing: Standing, *, ones: bool) -> Named:
             fit = sorted({*chosen, *rivals}, key=lambda robot: (len(robot), robot))
             put = [f"{lead}{_called(chosen)}"] if chosen else []
             if rivals and len(chosen) == 1:
-                put = [f"{lead}{_called([robot])}" for robot in fit]
+                put = [f"{lead}{_called([robot])}" for robot in _in_places(fit)]
             texts = tuple(f"{words[: match.start()]}{p}{words[match.end() :]}" for p in put)
             if rivals or not chosen:
                 few = texts if 1 < len(texts) <= MOST_OFFERED else ()
@@ -173,6 +181,13 @@ def _ranked(
     others = [robot for robot in order if robot not in chosen]
     rivals = tuple(r for r in others if any(abs(far[r] - end) < least for end in ends))
     return (chosen, rivals) if len(chosen) == need else ((), rivals)
+
+
+def _in_places(robots: Sequence[str]) -> list[str]:
+    """Robots in an order in which the third option is robot 3, if that is one of them."""
+    own = {int(r): r for r in robots if r.isdecimal() and int(r) <= len(robots)}
+    rest = iter([robot for robot in robots if robot not in own.values()])
+    return [own.get(k) or next(rest) for k in range(1, len(robots) + 1)]
 
 
 def _scores(way: str, standing: Standing) -> dict[str, float]:

@@ -8,10 +8,12 @@ from .followup_edits import (
     Said,
     ask,
     centre_of,
+    is_noun,
     refuse,
 )
 from .followup_frames import Slots
 from .followup_teams import count
+from .followup_things import known
 from .followup_words import chunks_of
 
 BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
@@ -31,12 +33,12 @@ AT_MOST = re.compile(
     r"(?<!no )(?<!not )(?:less|closer|nearer)(?: together)? than)\b",
     re.IGNORECASE,
 )
-CENTRE = re.compile(r"\b(?:middle|cent(?:re|er))\b", re.IGNORECASE)
 YES_OR_NO = re.compile(
     r"(?:\W*\b(?:so|and|ok|okay|but|now|well|then|tell me|check|if|whether)\b)*"
     r"\W*(?:is|are|do|does|has|have)\b(?! (?:them|you|it)\b)",
     re.IGNORECASE,
 )
+NOBODY = re.compile(r"\b(?:nobody|no one|none|no robots?)\b", re.IGNORECASE)
 SOME = re.compile(r"\b(?:any|anyone|anybody|some)\b", re.IGNORECASE)
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
@@ -75,6 +77,13 @@ def returned(slots: Slots, said: Said) -> Effects:
         if named <= {*relations} and numbers in ([], [robots]) and BACK_TO.search(said.words):
             return [{"kind": "undo", "steps": steps}]
     return None
+
+
+def put_back(slots: Slots, said: Said) -> Effects:
+    """A robot where it was before the last change, if that was about no other."""
+    robots = {r for named in slots["robots"] for r in named}
+    moved = {e.get("robot") for e in said.last}
+    return undo(Slots(), said) if said.last and moved == robots and not said.before else None
 
 
 def unadded(slots: Slots, said: Said) -> Effects:
@@ -123,8 +132,8 @@ def go(slots: Slots, said: Said) -> Effects:
 
 
 def hold(slots: Slots, said: Said) -> Effects:
-    """Nothing moves until go."""
-    return [{"kind": "hold"}]
+    """Nothing moves until go; robots that are named stay."""
+    return stay(slots, said) if "robots" in slots else [{"kind": "hold"}]
 
 
 def stay(slots: Slots, said: Said) -> Effects:
@@ -214,10 +223,12 @@ def sides_free(slots: Slots, said: Said) -> Effects:
 
 def _bound(slots: Slots, said: Said) -> Effect:
     """What a distance is compared with, where it is asked whether robots keep it."""
-    sign = ">" if AT_LEAST.search(said.words) else "<" if AT_MOST.search(said.words) else ""
+    sign = ">" if AT_LEAST.search(said.line) else "<" if AT_MOST.search(said.line) else ""
+    if NOBODY.search(said.line):  # is nobody closer: are all as far
+        sign = {">": "<", "<": ">", "": ""}[sign]
     neighbours = slots.has("apart", "spacing", "num")
     of = "neighbour_px" if neighbours else "target_px"
-    some = SOME.search(said.words) is not None
+    some = SOME.search(said.line) is not None
     return {"px": float(slots["px"][0]), "sign": sign, "of": of, "some": some}
 
 
@@ -227,17 +238,37 @@ def asked(slots: Slots, said: Said, about: str) -> Effects:
     metric = "unit" in slots and METRES.search(said.words)
     if metric and said.standing.metres_per_pixel is None:
         return units(slots, said)
-    if about in ("bound", "at") and not YES_OR_NO.match(said.line):
+    changes = "radial" in said.phrases[0][0].kinds and about == "distance"  # "out. How far is it?"
+    if changes or (about in ("bound", "at") and not YES_OR_NO.match(said.line)):
+        return None
+    things = _things_asked(slots, said, about)
+    if things is None or (robots and len(things) > 1):
         return None
     if about == "near":
         return _near(slots, said, robots)
-    thing = "thing" in slots and "each" not in slots
     return [
         {"kind": "query", "about": about}
         | _details(slots, said, about)
         | ({"robots": robots} if robots else {})
-        | ({"thing": slots["thing"][0]} if thing else {})
+        | ({"thing": things[-1]} if things else {})
     ]
+
+
+def _things_asked(slots: Slots, said: Said, about: str) -> list[str] | None:
+    """The things asked about, of two the first stood about first; None where none can be told."""
+    slots.has("thing", "current")
+    named = [str(c.kinds.get("thing", c.kinds.get("current", ""))) for c, _ in said.phrases]
+    named = [known(name[1:], said.standing) if name[:1] == "?" else name for name in named]
+    things = [name for name in dict.fromkeys(named) if name]
+    if "each" in slots or about == "near":
+        strange = [t for t in things if t[:1] == "?" and not ("each" in slots and is_noun(t[1:]))]
+        return None if strange or len(things) > 1 else []
+    if len(things) < 2:
+        return things if any("thing" in c.kinds for c, _ in said.phrases) else []
+    first = said.standing.targets[:1]
+    if about != "distance" or len(things) > 2 or "team" in said.kinds or not {*first} & {*things}:
+        return None
+    return sorted(things, key=lambda thing: thing not in first)
 
 
 def _details(slots: Slots, said: Said, about: str) -> Effect:
@@ -262,6 +293,5 @@ def _near(slots: Slots, said: Said, robots: list[int]) -> Effects:
     slots.has("relation", "inward")
     if robots:
         return [query | {"to": f"robot {robots[0]}"}]
-    centre = centre_of(slots, said) if CENTRE.search(said.words) else None
-    to = slots["point"][0] if "point" in slots else centre
+    to = slots["point"][0] if "point" in slots else centre_of(slots, said)
     return None if to is None else [query | {"to": list(to)}]

@@ -34,6 +34,8 @@ INSTRUCTING = (
     *("distance", "shift"),
 )
 """Frames of what is an instruction when no plan stands."""
+ASKING = ("how", "what", "where", "who", "why")
+"""Words that no answer begins with."""
 ADDING = ("more", "less", "again", "toofar", "otherway", "corrected")
 """Frames that build on the last change also after "no"."""
 PLAIN = (
@@ -73,7 +75,8 @@ class Followup:
         stay: robots that do not move meanwhile.
         go, hold: whether robots move then, or not before "go".
         query: what is asked of the plan: about, and robots or a thing.
-        about: small talk: thanks, hello, help, did, why, status, already.
+        about: small talk: thanks, hello, help, did, why, status, already; or tied, where a robot's
+            place settles not which one is meant.
         text: a question or a refusal; the words of a whole new instruction.
         options: commands that answer the question.
         rest: what is to be done after that, once it is confirmed.
@@ -108,12 +111,12 @@ def read_followup(words: str, standing: Standing | None) -> Followup:
     told = numbered(standing)
     robots = meant_by_place(words, told, lambda text: _is_settled(_heard(text, told)))
     if robots.tied:
-        return Followup("ask", text=robots.question, options=robots.options)
+        return Followup("ask", text=robots.question, options=robots.options, about="tied")
     meant = _heard(robots.words, told)
     moved = meant.rest or (len(meant.edits) > 1 and any("robot" not in e for e in meant.edits))
     if moved and words != robots.words:
         text = f'Which robot is meant in "{words}" may change on the way. Say it in two turns.'
-        return Followup("ask", text=text)
+        return Followup("ask", text=text, about="tied")
     return meant
 
 
@@ -164,15 +167,12 @@ def _read(words: str, standing: Standing | None) -> Followup:
 def commands(words: str, standing: Standing) -> bool:
     """Whether words are a command or question, not only what another one leaves open."""
     lead = next(iter(re.findall(r"[a-z']+", words.lower())), "")
-    if lead in word_set("questions") and words.rstrip().endswith("?"):
+    if lead in ASKING or (lead in word_set("questions") and words.rstrip().endswith("?")):
         return True
-    line = Line(words, standing)
+    line, read = Line(words, standing), read_followup(words, standing)
     verbs = (c for c in line.chunks if {"make", "move"} & set(c.kinds) or not is_part(c))
-    return any(verbs) and read_followup(words, standing).kind not in (
-        "ask",
-        "refuse",
-        "instruction",
-    )
+    understood = read.kind not in ("ask", "refuse", "instruction") or read.about == "tied"
+    return any(verbs) and understood
 
 
 def _afresh(line: Line) -> str:
@@ -296,7 +296,10 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
             which = "which robots are to move, and which stay? Name them by number."
             return _questioned(line, f'"{line.words}": {which}')
         edits = [e | {"stay": True} if e["kind"] == "target" else e for e in edits]
-    query = next((e for e in effects if e["kind"] == "query"), None)
+    queries = _once([e for e in effects if e["kind"] == "query"])
+    if len(queries) > 1 or (queries and edits):
+        return _questioned(line, f'"{line.words}" says more than one thing. Which comes first?')
+    query = next(iter(queries), None)
     to = next((e["to"] for e in effects if e["kind"] == "undo" and "to" in e), "")
     others: tuple[Kind, ...] = ("go", "hold", "query")
     rest: tuple[Kind, ...] = tuple(k for k in others if k in kinds) or ("talk",)
