@@ -11,6 +11,8 @@ from .followup_edits import RINGS, ROWS, SIDES, listed
 from .followups import NO_PLAN, Followup
 from .standing import Standing
 
+PAIRWISE = ("extent", "pair", "near", "bound")
+"""Questions that take the places of all robots."""
 MOST_NAMED = 4
 """Robots of which each way is told."""
 HELP = (
@@ -157,7 +159,7 @@ def said_of_query(query: Mapping[str, Any], data: Mapping[str, Any], scale: floa
         which += [str(query["thing"])] if which and "thing" in query else []
         lead = f"{listed(which).capitalize()}: " if which else ""
         return f"{lead}{nearest} (centre to centre {centres})."
-    if data.get("robots", 0) > len(data["each"]) and query["about"] in ("extent", "pair", "near"):
+    if data.get("robots", 0) > len(data["each"]) and query["about"] in PAIRWISE:
         return f"Only {len(data['each'])} robots are measured one by one; ask about one by number."
     rows = [r for r in data["each"] if int(r["robot"]) in query.get("robots", [int(r["robot"])])]
     return ANSWERS[query["about"]](query, data, rows, scale)

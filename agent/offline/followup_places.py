@@ -162,8 +162,9 @@ def with_places(task: Task, turn: History) -> Reply | tuple[Task, History]:
     kept = tuple(
         m for m in turn if m is not measured and not (isinstance(m, Reply) and asked in m.calls)
     )
-    each: list[dict[str, Any]] = [] if measured.error else json.loads(measured.text)["each"]
-    places = {row["robot"]: row["place"] for row in each}
+    data: dict[str, Any] = {} if measured.error else json.loads(measured.text)
+    each = data.get("each", ())  # of many robots only the first are told
+    places = {row["robot"]: row["place"] for row in each if len(each) == data["robots"]}
     return replace(task, standing=task.standing | {"places": places}), kept
 
 

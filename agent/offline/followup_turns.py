@@ -35,7 +35,7 @@ AT_MOST = re.compile(
 )
 YES_OR_NO = re.compile(
     r"(?:\W*\b(?:so|and|ok|okay|but|now|well|then|tell me|check|if|whether)\b)*"
-    r"\W*(?:is|are|do|does|has|have)\b(?! (?:them|you|it)\b)",
+    r"\W*(?:is|are|does|has|do(?= (?:they|any|all|the|robots|we|both|two|some|these|those)\b))\b",
     re.IGNORECASE,
 )
 NOBODY = re.compile(r"\b(?:nobody|no one|none|no robots?)\b", re.IGNORECASE)
@@ -239,7 +239,9 @@ def asked(slots: Slots, said: Said, about: str) -> Effects:
     if metric and said.standing.metres_per_pixel is None:
         return units(slots, said)
     changes = "radial" in said.phrases[0][0].kinds and about == "distance"  # "out. How far is it?"
-    if changes or (about in ("bound", "at") and not YES_OR_NO.match(said.line)):
+    sided = about == "count" and re.search(r"\bleft of\b", said.words.lower())
+    asks = about not in ("bound", "at", "touch") or YES_OR_NO.match(said.line)
+    if changes or sided or not asks:
         return None
     things = _things_asked(slots, said, about)
     if things is None or (robots and len(things) > 1):

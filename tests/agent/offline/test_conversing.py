@@ -204,7 +204,7 @@ def test_questions_of_what_stands_are_answered_by_measures(ring: Run) -> None:
         "is nobody closer than 2 px to it": "Yes: the robots are ",
         "are they touching it": "No: robot ",
         "which side is free": "Robots stand on all sides of t1.",
-        "how big is it": "t1 is 9",
+        "how big is it": "t1 is 89",
     }
     for words, part in told.items():
         answered = say(ring, words)
