@@ -297,7 +297,7 @@ def _extent(
     return f"{_pair(query, data, rows, scale)} All of it is {wide} wide and {high} high."
 
 
-def _near(
+def _nearest_of(
     query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
 ) -> str:
     places = {f"robot {row['robot']}": row["place"] for row in rows}
@@ -356,7 +356,7 @@ ANSWERS: dict[str, Answer] = {
     "pair": _pair,
     "extent": _extent,
     "size": _extent,
-    "near": _near,
+    "near": _nearest_of,
     "arrived": _arrival,
     "place": _where,
     "certified": _certified,

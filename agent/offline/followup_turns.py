@@ -247,7 +247,7 @@ def asked(slots: Slots, said: Said, about: str) -> Effects:
     if things is None or (robots and len(things) > 1):
         return None
     if about == "near":
-        return _near(slots, said, robots)
+        return _nearest_to_what(slots, said, robots)
     return [
         {"kind": "query", "about": about}
         | _details(slots, said, about)
@@ -289,7 +289,7 @@ def _details(slots: Slots, said: Said, about: str) -> Effect:
     return _bound(slots, said) if about == "bound" else {}
 
 
-def _near(slots: Slots, said: Said, robots: list[int]) -> Effects:
+def _nearest_to_what(slots: Slots, said: Said, robots: list[int]) -> Effects:
     """Which robot is the nearest to another one, a point or a centre."""
     query: Effect = {"kind": "query", "about": "near", "most": slots["nearest"][0]}
     slots.has("relation", "inward")
