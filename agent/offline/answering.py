@@ -1,14 +1,19 @@
 """What the offline planner says in a conversation: who moves, what is measured, small talk."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
 from typing import Any
 
 from ...tools.formation.units import length_text
 from ..messages import History, Reply
-from .followup_edits import listed
-from .followups import NO_PLAN, Followup
+from .followup import Followup
+from .followup_edits import RINGS, ROWS, SIDES, listed
+from .followups import NO_PLAN
 from .standing import Standing
 
+PAIRWISE = ("extent", "pair", "near", "bound")
+"""Questions that take the places of all robots."""
 MOST_NAMED = 4
 """Robots of which each way is told."""
 HELP = (
@@ -43,6 +48,9 @@ def talk(followup: Followup, standing: Standing | None, before: History) -> str:
     if about == "steps":
         n = standing.changes
         return f"{n} change{'s' * (n != 1)} can be taken back."
+    if about == "sides":
+        told = [_free_sides(g) for g in standing.groups if g["relation"] in (*RINGS, *ROWS)]
+        return " ".join(told) or "The plan keeps no side free: no robots stand around or along it."
     if about == "already":
         return f"That is so already; plan {standing.plan} stands as it is."
     groups = "; ".join(
@@ -51,6 +59,19 @@ def talk(followup: Followup, standing: Standing | None, before: History) -> str:
     )
     driven = "the robots stand there" if standing.deployed else "the robots are not there yet"
     return f"Plan {standing.plan}: {groups}; {driven}."
+
+
+def _free_sides(group: Mapping[str, Any]) -> str:
+    """Which sides of its thing a group leaves free, as the plan has it."""
+    thing, taken = listed(group.get("targets", ())), group.get("sides") or [group.get("side")]
+    if not {*SIDES} >= {*taken} - {None}:
+        return f"The plan keeps no side of {thing} free by name."
+    opened = group.get("opening_towards")
+    gap = f" There is a gap towards {opened}." if opened else ""
+    free = [side for side in SIDES if taken != [None] and side not in taken]
+    if not free:
+        return f"Robots stand on all sides of {thing}.{gap}"
+    return f"Free at {thing}: {listed(free)}; robots stand {listed(taken)}.{gap}"
 
 
 def _why(before: History) -> str:
@@ -130,9 +151,17 @@ def said_of_heading(standing: Standing) -> str:
 
 def said_of_query(query: Mapping[str, Any], data: Mapping[str, Any], scale: float | None) -> str:
     """The answer to a question about the plan, of what was measured."""
+    if "length_px" in data:
+        length, width = (length_text(data[name], scale) for name in ("length_px", "width_px"))
+        return f"{data['target']} is {length} long and {width} wide."
     if "nearest_px" in data:
         nearest, centres = (length_text(data[n], scale) for n in ("nearest_px", "centres_px"))
-        return f"{nearest} (centre to centre {centres})."
+        which = [f"robot {robot}" for robot in query.get("robots", ())]
+        which += [str(query["thing"])] if which and "thing" in query else []
+        lead = f"{listed(which).capitalize()}: " if which else ""
+        return f"{lead}{nearest} (centre to centre {centres})."
+    if data.get("robots", 0) > len(data["each"]) and query["about"] in PAIRWISE:
+        return f"Only {len(data['each'])} robots are measured one by one; ask about one by number."
     rows = [r for r in data["each"] if int(r["robot"]) in query.get("robots", [int(r["robot"])])]
     return ANSWERS[query["about"]](query, data, rows, scale)
 
@@ -179,7 +208,9 @@ def _nearest(
         return "They stand about no thing."
     choose = max if query.get("most") == "furthest" else min
     row = choose(measured, key=lambda r: r["target_px"])
-    return f"Robot {row['robot']}: {length_text(row['target_px'], scale)} from {row['target']}."
+    touching = f"{'Yes' if row['target_px'] <= 0 else 'No'}: " if query.get("touch") else ""
+    way = length_text(row["target_px"], scale)
+    return f"{touching}{'r' if touching else 'R'}obot {row['robot']}: {way} from {row['target']}."
 
 
 def _closed(
@@ -218,9 +249,68 @@ def _enough(group: Mapping[str, Any]) -> str:
 def _count(
     query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
 ) -> str:
-    names = [str(r["robot"]) for r in data["each"]]
-    which = f": {listed(names)}" if len(names) == data["robots"] else ""
-    return f"{data['robots']} robots{which}."
+    if len(data["each"]) < data["robots"]:
+        return f"{data['robots']} robots."
+    at: dict[str, list[str]] = {}
+    for row in data["each"]:
+        at.setdefault(row.get("target", "no thing"), []).append(str(row["robot"]))
+    if "thing" in query:
+        names = at.get(query["thing"], [])
+        return (
+            f"{len(names)} at {query['thing']}{': ' if names else ''}{listed(names or ['none'])}."
+        )
+    told = f"{data['robots']} robots: {listed([str(r['robot']) for r in data['each']])}."
+    each = (f"{len(names)} at {thing}: {listed(names)}" for thing, names in at.items())
+    return f"{told} {'; '.join(each)}." if len(at) > 1 else told
+
+
+def _bound(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    ways = [row[query["of"]] for row in rows if query["of"] in row]
+    told = (_spacing if query["of"] == "neighbour_px" else _distance)(query, data, rows, scale)
+    if not ways or not query["sign"]:
+        return told
+    lowest = (query["sign"] == ">") != query["some"]
+    end = min(ways) if lowest else max(ways)
+    holds = end >= query["px"] if query["sign"] == ">" else end <= query["px"]
+    return f"{'Yes' if holds else 'No'}: {told[0].lower()}{told[1:]}"
+
+
+def _pair(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    pairs = [(math.dist(a["place"], b["place"]), a, b) for a, b in combinations(rows, 2)]
+    if not pairs:
+        return "There is one robot only."
+    closest = query.get("most") == "nearest"
+    way, a, b = (min if closest else max)(pairs, key=lambda pair: pair[0])
+    which = "closest" if closest else "furthest apart"
+    length = length_text(round(way, 1), scale)
+    return f"Robots {listed([a['robot'], b['robot']])} are the {which}: {length}, centre to centre."
+
+
+def _extent(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    spans = (max(v) - min(v) for v in zip(*(row["place"] for row in rows), strict=True))
+    wide, high = (length_text(round(span, 1), scale) for span in spans)
+    return f"{_pair(query, data, rows, scale)} All of it is {wide} wide and {high} high."
+
+
+def _nearest_of(
+    query: Mapping[str, Any], data: Mapping[str, Any], rows: Rows, scale: float | None
+) -> str:
+    places = {f"robot {row['robot']}": row["place"] for row in rows}
+    to = query["to"]
+    at = places.pop(to) if isinstance(to, str) else to
+    ways = {robot: math.dist(place, at) for robot, place in places.items()}
+    if not ways:
+        return "There is no other robot."
+    end = (max if query["most"] == "furthest" else min)(ways.values())
+    fit = [robot for robot, way in ways.items() if abs(way - end) < 1]
+    place = to if isinstance(to, str) else f"({to[0]:g}, {to[1]:g})"
+    return f"{listed(fit).capitalize()}: {length_text(round(end, 1), scale)} from {place}."
 
 
 def _arrival(
@@ -263,6 +353,11 @@ ANSWERS: dict[str, Answer] = {
     "closed": _closed,
     "needed": _needed,
     "count": _count,
+    "bound": _bound,
+    "pair": _pair,
+    "extent": _extent,
+    "size": _extent,
+    "near": _nearest_of,
     "arrived": _arrival,
     "place": _where,
     "certified": _certified,

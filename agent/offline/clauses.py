@@ -211,7 +211,7 @@ class Line:
         leads = word in rules()["questions"] and not polite
         marked = words.rstrip().endswith("?")
         either = word in ("can", "could", "would", "will", "may")
-        either = either or (not marked and word in ("have", "do", "is", "are", "any"))
+        either = either or (not marked and word in ("have", "do", "any"))
         open_ = re.match(r"(?:can|could) (?:it|they|any|some)", text) is not None
         return leads or marked or open_, leads and not either
 
@@ -237,7 +237,8 @@ class Line:
     def _corrected(self) -> list[Clause] | None:
         """What is meant after "no wait", or of what was said last, if this corrects or adds."""
         own = self.clauses(self.chunks) if self.denies else None
-        if own and all(c.frame == "allotted" and c.settled for c in own):
+        asked, verb = self.standing.said[-1:] == "?", any("move" in c.kinds for c in self.chunks)
+        if own and all(((asked and verb) or c.frame == "allotted") and c.settled for c in own):
             return own
         marks = [k for k, c in enumerate(self.chunks) if k and {"correction", "no"} & set(c.kinds)]
         if marks and marks[-1] < len(self.chunks) - 1:
@@ -357,9 +358,9 @@ def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
     chunks, changed = list(clause.chunks), False
     for new in after:
         fits = [k for k in range(len(chunks) - 1, -1, -1) if _stands_for(new, chunks[k])]
-        fits.sort(key=lambda k: "much" in chunks[k].kinds)  # "a bit" is no number
+        kinds = set(new.kinds)  # "a bit" is no number, and a number rather one than a length
+        fits.sort(key=lambda k: ("much" in chunks[k].kinds, kinds.isdisjoint(chunks[k].kinds)))
         at = next(iter(fits), None)
-        kinds = set(new.kinds)
         if at is not None:
             unit = next((u for u in ("px", "angle", "robots") if u in chunks[at].kinds), "")
             bare = unit if "num" in kinds else ""

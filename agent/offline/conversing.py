@@ -16,8 +16,9 @@ from .amending import typed
 from .answering import arrived, said_of_edit, said_of_heading, said_of_query, said_of_undo, talk
 from .choosing import Step, agrees, calls_in, chosen_candidates, declines, prompts_of
 from .finding import found_thing, known_thing, measured_at
+from .followup import Followup
 from .followup_things import UNNAMED, pointing_at
-from .followups import Followup, commands, read_followup
+from .followups import commands, read_followup
 from .pointed import heeded, shown_now
 from .sharing import shared
 from .standing import Standing
@@ -124,13 +125,14 @@ def _answer_to(messages: History) -> tuple[str | None, History]:
 
 
 def _goes_on(messages: History, standing: Standing | None) -> bool:
-    """Whether the answer to which thing is meant chooses none, and is a command of its own."""
+    """Whether an answer to which thing is meant chooses none, and is a command of its own."""
     answer, later = _answer_to(messages)
     until = messages[: len(messages) - len(later)]
     asked = [c for c in calls_in(until) if c.name == "ask_user"]
     if answer is None or standing is None or not asked[-1].arguments.get("candidates"):
         return False
-    return not chosen_candidates(until, 1) and commands(answer, standing)
+    own = not chosen_candidates(until, 1) and commands(answer, standing)
+    return own or _goes_on(later, standing)
 
 
 def _question(followup: Followup) -> str:
@@ -206,7 +208,8 @@ class _Steps:
         results = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"]
         if query["about"] == "heading":
             return Reply(text=said_of_heading(standing))
-        measured, scale = results[0] if results else None, self.task.metres_per_pixel
+        shape, scale = self.done.get("describe_shape"), self.task.metres_per_pixel
+        measured = results[0] if results else shape
         robots, thing = query.get("robots", []), str(query.get("thing", ""))
         unnamed = all(label.startswith(UNNAMED) for _, label in standing.things)
         if thing.startswith("?") and unnamed and len(standing.things) == 1:
@@ -221,10 +224,12 @@ class _Steps:
                 return self._nearest_to(thing, data, standing, query)
             return Reply(text=said_of_query(query, data, scale))
         two = len(robots) == 2 and "each" not in query
-        if (thing or two) and query["about"] != "nearest":
+        if (thing or two) and query["about"] in ("distance", "spacing"):
             ends = [*(f"r{r}" for r in robots), *([thing] if thing else [])]
             ends = ends if len(ends) > 1 else [standing.targets[0], *ends]
             return _calling("measure", {"a": ends[0], "b": ends[1]})
+        if query["about"] == "size" and (thing or standing.targets):
+            return _calling("describe_shape", {"target": thing or standing.targets[0]})
         return _calling("measure", {"a": "plan"})
 
     def _nearest_to(
@@ -382,17 +387,12 @@ def _by_way(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) 
     centre = (standing.centre or {}).get(row.get("target", ""), (0.0, 0.0))
     x, y = row["place"][0] - centre[0], row["place"][1] - centre[1]
     length = max((x * x + y * y) ** 0.5, 1e-9)
-    way = _signed(by) / length
+    way = by.get("out", -by.get("in", 0.0)) / length
     if "factor" in by:  # "a bit": a share of its distance
         least = LEAST_WAY * min(standing.size)
         share = max((by["factor"] - 1) * row.get("target_px", 0.0), least)
         way = math.copysign(min(abs(way * length), share), way) / length
     return edit | {"by": [round(x * way, 2), round(y * way, 2)]}
-
-
-def _signed(by: dict[str, float]) -> float:
-    """How far out, px; in is below 0."""
-    return by["out"] if "out" in by else -by["in"]
 
 
 def _calling(name: str, arguments: dict[str, Any]) -> Reply:

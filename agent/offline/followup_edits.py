@@ -35,6 +35,8 @@ EXACT = re.compile(
     re.IGNORECASE,
 )
 """The whole of it, not a change: "increase it to 60 px"."""
+CENTRE = re.compile(r"\b(?:middle|cent(?:re|er))\b", re.IGNORECASE)
+IN_PICTURE = re.compile(r"\b(?:picture|image|photo|screen)\b", re.IGNORECASE)
 LESSER = re.compile(r"\W*(?:not (?:so|as|that|quite)|less)\b", re.IGNORECASE)
 """Takes a part of the last change back: "not so tight"."""
 SAME_WAY = re.compile(r"\bsame (?:way|direction|sense)\b", re.IGNORECASE)
@@ -71,6 +73,11 @@ class Said:
     denies: bool = False
     phrases: tuple[tuple[Chunk, str], ...] = ()
     line: str = ""
+
+    @property
+    def kinds(self) -> set[str]:
+        """Kinds of its phrases."""
+        return {kind for chunk, _ in self.phrases for kind in chunk.kinds}
 
     @property
     def last(self) -> list[Effect]:
@@ -142,8 +149,14 @@ def offset(slots: Slots, said: Said) -> Effects:
 
 def _is_mine(names: Sequence[Any], said: Said) -> bool:
     """Whether one known noun alone is the thing they stand about: "further from the car"."""
-    found = phrase([str(names[0])[1:]], 0) if len(names) == 1 and names[0][:1] == "?" else None
-    return found is not None and found.kind == "noun" and len(said.standing.targets) == 1
+    strange = len(names) == 1 and names[0][:1] == "?"
+    return strange and is_noun(str(names[0])[1:]) and len(said.standing.targets) == 1
+
+
+def is_noun(word: str) -> bool:
+    """Whether one word is a noun for a thing."""
+    found = phrase([word], 0)
+    return found is not None and found.kind == "noun"
 
 
 def ratio(slots: Slots, said: Said) -> Effects:
@@ -171,7 +184,8 @@ def distance(slots: Slots, said: Said) -> Effects:
 
 
 def spacing(slots: Slots, said: Said) -> Effects:
-    """So far from one robot to the next, or further apart."""
+    """So far from one robot to the next, at least or exactly, or further apart."""
+    slots.has("bound")
     if "spacing" in slots or "ratio_apart" in slots:
         value = {"px": float(slots["px"][0])} if "px" in slots else {"factor": factor_of(slots)}
         return [{"kind": "spacing", **value}]
@@ -336,6 +350,17 @@ def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Eff
     if others:
         return ask(f"Which thing is meant: {' or '.join(others)}?", *map(option.format, others))
     return OTHER
+
+
+def centre_of(slots: Slots, said: Said) -> tuple[float, float] | None:
+    """The centre that is named: of a thing, the picture, or what the robots stand about; px."""
+    if not CENTRE.search(said.words):
+        return None
+    if IN_PICTURE.search(said.line):
+        width, height = said.standing.size
+        return width / 2, height / 2
+    named = str(slots.get("thing", said.standing.targets[:1] or [""])[0])
+    return (said.standing.centre or {}).get(named)
 
 
 def listed(numbers: Sequence[object]) -> str:

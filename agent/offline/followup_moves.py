@@ -9,6 +9,7 @@ from .followup_edits import (
     Said,
     ask,
     bare_length,
+    centre_of,
     listed,
     much_of,
     where,
@@ -81,6 +82,9 @@ def approach(slots: Slots, said: Said) -> Effects:
 def place(slots: Slots, said: Said) -> Effects:
     """One robot elsewhere: to a point, at a thing, or some way on."""
     robots = [r for named in slots["robots"] for r in named]
+    if slots.has("relation", "inward"):
+        to = centre_of(slots, said)
+        return to and place(Slots({"robots": slots["robots"], "point": [to]}), said)
     point = (
         slots["point"][0] if "point" in slots else said.standing.place if "there" in slots else None
     )

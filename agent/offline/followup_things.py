@@ -53,6 +53,14 @@ def known(phrase: str, standing: Standing) -> str:
     return _id_of(phrase, False, replace(standing, contract={"groups": []}))
 
 
+def stood_about(things: Sequence[str], standing: Standing) -> list[str]:
+    """Ids of the measured things that phrases name, if all do; of the first group's with none."""
+    if not things:
+        return list(standing.groups[0].get("targets", ()))
+    names = [known(re.sub(r"^(?:the|this|that) ", "", words), standing) for words in things]
+    return [] if any(name.startswith("?") for name in names) else names
+
+
 def _is_shown(chunk: Chunk, text: str) -> bool:
     """Whether a phrase means what is pointed at: "this house", "the house over here"."""
     first, *rest = text[chunk.start : chunk.end].lower().split()

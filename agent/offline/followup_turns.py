@@ -8,11 +8,14 @@ from .followup_edits import (
     Effects,
     Said,
     ask,
+    centre_of,
+    is_noun,
     listed,
     refuse,
 )
 from .followup_frames import Slots
 from .followup_teams import count
+from .followup_things import known
 from .followup_words import chunks_of
 
 BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
@@ -41,6 +44,24 @@ CALLED = {
 }
 """What changes are called, by the kinds of phrases that say it, and of which kinds they are."""
 OF_THEM = re.compile(r"\bof them\b|\b(?:robots|bots|drones|units)\b", re.IGNORECASE)
+METRES = re.compile(r"\bmet(?:re|er)s?\b", re.IGNORECASE)
+AT_LEAST = re.compile(
+    r"\b(?:at least|minimum|no less|not less|(?:no|not) (?:closer|nearer)|"
+    r"(?<!no )(?<!not )(?:more|further|farther)(?: away| apart)? than)\b",
+    re.IGNORECASE,
+)
+AT_MOST = re.compile(
+    r"\b(?:at most|maximum|no more|not more|(?:no|not) (?:further|farther)|"
+    r"(?<!no )(?<!not )(?:less|closer|nearer)(?: together)? than)\b",
+    re.IGNORECASE,
+)
+YES_OR_NO = re.compile(
+    r"(?:\W*\b(?:so|and|ok|okay|but|now|well|then|tell me|check|if|whether)\b)*"
+    r"\W*(?:is|are|does|has|do(?= (?:they|any|all|the|robots|we|both|two|some|these|those)\b))\b",
+    re.IGNORECASE,
+)
+NOBODY = re.compile(r"\b(?:nobody|no one|none|no robots?)\b", re.IGNORECASE)
+SOME = re.compile(r"\b(?:any|anyone|anybody|some)\b", re.IGNORECASE)
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
@@ -87,8 +108,10 @@ def returned(slots: Slots, said: Said) -> Effects:
 
 
 def put_back(slots: Slots, said: Said) -> Effects:
-    """Robots as they stood before the last change."""
-    return stay(slots, said) if said.standing.edits else None
+    """Robots as they stood before the last change, which was about them too."""
+    named = {r for row in slots["robots"] for r in row}
+    moved = {e.get("robot") for e in said.standing.edits}
+    return stay(slots, said) if {None, *named} & moved else None
 
 
 def undone(slots: Slots, said: Said) -> Effects:
@@ -110,6 +133,13 @@ def kept(slots: Slots, said: Said) -> Effects:
         return None  # on a ring, that would take another distance
     keeps = {"kind": "spacing", "factor": 1.0} if of == "spacing" else None
     return [keeps or {"kind": "talk", "about": "already"}]
+
+
+def moved_back(slots: Slots, said: Said) -> Effects:
+    """A robot where it was before the last change, if that was about no other."""
+    robots = {r for named in slots["robots"] for r in named}
+    moved = {e.get("robot") for e in said.last}
+    return undo(Slots(), said) if said.last and moved == robots and not said.before else None
 
 
 def unadded(slots: Slots, said: Said) -> Effects:
@@ -158,8 +188,8 @@ def go(slots: Slots, said: Said) -> Effects:
 
 
 def hold(slots: Slots, said: Said) -> Effects:
-    """Nothing moves until go."""
-    return [{"kind": "hold"}]
+    """Nothing moves until go; robots that are named stay."""
+    return stay(slots, said) if "robots" in slots else [{"kind": "hold"}]
 
 
 def stay(slots: Slots, said: Said) -> Effects:
@@ -250,18 +280,85 @@ def units(slots: Slots, said: Said) -> Effects:
     return [{"kind": "query", "about": "distance"}]
 
 
+def sides_free(slots: Slots, said: Said) -> Effects:
+    """Which sides no robots stand on."""
+    asks = "sideq" in slots or YES_OR_NO.match(said.line)
+    return [{"kind": "talk", "about": "sides"}] if asks else None
+
+
+def _bound(slots: Slots, said: Said) -> Effect:
+    """What a distance is compared with, where it is asked whether robots keep it."""
+    sign = ">" if AT_LEAST.search(said.line) else "<" if AT_MOST.search(said.line) else ""
+    if NOBODY.search(said.line):  # is nobody closer: are all as far
+        sign = {">": "<", "<": ">", "": ""}[sign]
+    neighbours = slots.has("apart", "spacing", "num")
+    of = "neighbour_px" if neighbours else "target_px"
+    some = SOME.search(said.line) is not None
+    return {"px": float(slots["px"][0]), "sign": sign, "of": of, "some": some}
+
+
 def asked(slots: Slots, said: Said, about: str) -> Effects:
     """A question of the person's, answered by measures."""
     robots = [r for named in slots.get("robots", ()) for r in named]
-    query: Effect = {"kind": "query", "about": about}
-    if about == "distance" and ("spacing" in slots or "apart" in slots):
-        query["about"] = "spacing"
-    if about == "compared":
-        query = {"kind": "query", "about": "distance", "each": True}
-    if about == "nearest":
-        query["most"] = (slots.get("nearest") or ["nearest"])[0]
+    metric = "unit" in slots and METRES.search(said.words)
+    if metric and said.standing.metres_per_pixel is None:
+        return units(slots, said)
+    changes = "radial" in said.phrases[0][0].kinds and about == "distance"  # "out. How far is it?"
+    sided = about == "count" and re.search(r"\bleft of\b", said.words.lower())
+    asks = about not in ("bound", "at", "touch") or YES_OR_NO.match(said.line)
+    if changes or sided or not asks:
+        return None
+    things = _things_asked(slots, said, about)
+    if things is None or (robots and len(things) > 1):
+        return None
+    if about == "near":
+        return _nearest_to_what(slots, said, robots)
     return [
-        query
+        {"kind": "query", "about": about}
+        | _details(slots, said, about)
         | ({"robots": robots} if robots else {})
-        | ({"thing": slots["thing"][0]} if "thing" in slots else {})
+        | ({"thing": things[-1]} if things else {})
     ]
+
+
+def _things_asked(slots: Slots, said: Said, about: str) -> list[str] | None:
+    """The things asked about, of two the first stood about first; None where none can be told."""
+    slots.has("thing", "current")
+    named = [str(c.kinds.get("thing", c.kinds.get("current", ""))) for c, _ in said.phrases]
+    named = [known(name[1:], said.standing) if name[:1] == "?" else name for name in named]
+    things = [name for name in dict.fromkeys(named) if name]
+    if "each" in slots or about == "near":
+        strange = [t for t in things if t[:1] == "?" and not ("each" in slots and is_noun(t[1:]))]
+        return None if strange or len(things) > 1 else []
+    if len(things) < 2:
+        return things if any("thing" in c.kinds for c, _ in said.phrases) else []
+    first = said.standing.targets[:1]
+    if about != "distance" or len(things) > 2 or "team" in said.kinds or not {*first} & {*things}:
+        return None
+    return sorted(things, key=lambda thing: thing not in first)
+
+
+def _details(slots: Slots, said: Said, about: str) -> Effect:
+    """What else a question asks, and of what it is when that is not what its frame is called."""
+    if about == "distance":
+        return {"about": "spacing"} if slots.has("spacing", "apart") else {}
+    if about == "at":
+        return {"about": "distance"}
+    if about == "compared":
+        return {"about": "distance", "each": True}
+    if about in ("nearest", "pair"):
+        return {"most": (slots.get("nearest") or slots.get("pair") or ["nearest"])[0]}
+    if about == "touch":
+        of_thing = {"thing", "there", "current", "it"} & said.kinds
+        return {"about": "nearest" if of_thing else "pair", "most": "nearest", "touch": True}
+    return _bound(slots, said) if about == "bound" else {}
+
+
+def _nearest_to_what(slots: Slots, said: Said, robots: list[int]) -> Effects:
+    """Which robot is the nearest to another one, a point or a centre."""
+    query: Effect = {"kind": "query", "about": "near", "most": slots["nearest"][0]}
+    slots.has("relation", "inward")
+    if robots:
+        return [query | {"to": f"robot {robots[0]}"}]
+    to = slots["point"][0] if "point" in slots else centre_of(slots, said)
+    return None if to is None else [query | {"to": list(to)}]

@@ -6,8 +6,8 @@ asked about, quoting what was not understood. Nothing said is left out.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any
 
 from .accounting import read_instruction
 from .asides import TELLS_OF, without_asides
@@ -15,14 +15,15 @@ from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty, is_part
 from .drafting import contract_of
 from .drawn_forms import form_in
 from .escorting import without_follow
+from .followup import Followup, Kind
 from .followup_edits import Effect, listed
 from .followup_last import RELATIVE, corrected
+from .followup_places import meant_by_place, numbered
 from .followup_things import impossible
-from .followup_words import Chunk, rules
+from .followup_words import Chunk, rules, word_set
 from .spelling import spelled
 from .standing import Standing
 
-Kind = Literal["edits", "undo", "go", "hold", "query", "talk", "ask", "refuse", "instruction"]
 WITHOUT_PLAN = (
     *(*TALK, "go", "hold", "undo", "redo", "first", "restart"),
     *("refuse_checks", "refuse_through"),
@@ -40,6 +41,8 @@ KEEPS = re.compile(
 )
 KEPT = {"distance": {"out", "in", "distance", "scale"}, "number": {"count", "add", "remove"}}
 """What may not be changed where it is to be kept, by the kinds of edits that change it."""
+ASKING = ("how", "what", "where", "who", "why")
+"""Words that no answer begins with."""
 ADDING = ("more", "less", "again", "toofar", "otherway", "corrected")
 """Frames that build on the last change also after "no"."""
 PLAIN = (
@@ -66,49 +69,29 @@ ASIDE = re.compile(
 DEFAULTS = (("spacing", "even"), ("fit", "normal"))
 
 
-@dataclass(frozen=True)
-class Followup:
-    """What is to be done in a turn.
-
-    Attributes:
-        kind: what it is above all.
-        undo: steps to take back first; below 0 to make again.
-        to: the plan to go back to instead, "first".
-        edits: then, in order, as edit_formation takes them. An id that begins with "?" is words
-            for a thing that has to be found; `by` may be {"out": px} or {"in": px}.
-        stay: robots that do not move meanwhile.
-        go, hold: whether robots move then, or not before "go".
-        query: what is asked of the plan: about, and robots or a thing.
-        about: small talk: thanks, hello, help, did, why, status, already.
-        text: a question or a refusal; the words of a whole new instruction.
-        options: commands that answer the question.
-        rest: what is to be done after that, once it is confirmed.
-        background: what was told beside it and changes nothing.
-    """
-
-    kind: Kind
-    undo: int = 0
-    to: str = ""
-    edits: tuple[Effect, ...] = ()
-    stay: tuple[int, ...] = ()
-    go: bool = False
-    hold: bool = False
-    query: Effect | None = None
-    about: str = ""
-    text: str = ""
-    options: tuple[str, ...] = ()
-    rest: str = ""
-    background: tuple[str, ...] = ()
-
-    @property
-    def things(self) -> list[str]:
-        """Words for things that have to be found, once each."""
-        named = re.findall(r"'\?([^']*)'", repr([*self.edits, self.query]))
-        return list(dict.fromkeys(named))
-
-
 def read_followup(words: str, standing: Standing | None) -> Followup:
     """What is meant by words that are said when a plan stands, or talk that fits at any time."""
+    if standing is None or not standing.places:
+        return _heard(words, standing)
+    told = numbered(standing)
+    robots = meant_by_place(words, told, lambda text: _is_settled(_heard(text, told)))
+    if robots.tied:
+        return Followup("ask", text=robots.question, options=robots.options, about="tied")
+    meant = _heard(robots.words, told)
+    moved = meant.rest or (len(meant.edits) > 1 and any("robot" not in e for e in meant.edits))
+    if moved and words != robots.words:
+        text = f'Which robot is meant in "{words}" may change on the way. Say it in two turns.'
+        return Followup("ask", text=text, about="tied")
+    return meant
+
+
+def _is_settled(followup: Followup) -> bool:
+    """Whether it is understood, and about nothing that has to be found."""
+    return followup.kind not in ("ask", "refuse", "instruction") and not followup.things
+
+
+def _heard(words: str, standing: Standing | None) -> Followup:
+    """What is meant by words in which robots have their numbers."""
     if standing is not None:
         words, _ = without_follow(words, standing.stood_about, standing.metres_per_pixel)
     meant = _read(words, standing)
@@ -148,14 +131,14 @@ def _read(words: str, standing: Standing | None) -> Followup:
 
 
 def commands(words: str, standing: Standing) -> bool:
-    """Whether words are a command of their own, not only what another one leaves open."""
-    line = Line(words, standing)
+    """Whether words are a command or question, not only what another one leaves open."""
+    lead = next(iter(re.findall(r"[a-z']+", words.lower())), "")
+    if lead in ASKING or (lead in word_set("questions") and words.rstrip().endswith("?")):
+        return True
+    line, read = Line(words, standing), read_followup(words, standing)
     verbs = (c for c in line.chunks if {"make", "move"} & set(c.kinds) or not is_part(c))
-    return any(verbs) and read_followup(words, standing).kind not in (
-        "ask",
-        "refuse",
-        "instruction",
-    )
+    understood = read.kind not in ("ask", "refuse", "instruction") or read.about == "tied"
+    return any(verbs) and understood
 
 
 def _afresh(line: Line) -> str:
@@ -305,7 +288,10 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
             which = "which robots are to move, and which stay? Name them by number."
             return _questioned(line, f'"{line.words}": {which}')
         edits = [e | {"stay": True} if e["kind"] == "target" else e for e in edits]
-    query = next((e for e in effects if e["kind"] == "query"), None)
+    queries = _once([e for e in effects if e["kind"] == "query"])
+    if len(queries) > 1 or (queries and edits):
+        return _questioned(line, f'"{line.words}" says more than one thing. Which comes first?')
+    query = next(iter(queries), None)
     to = next((e["to"] for e in effects if e["kind"] == "undo" and "to" in e), "")
     others: tuple[Kind, ...] = ("go", "hold", "query")
     rest: tuple[Kind, ...] = tuple(k for k in others if k in kinds) or ("talk",)

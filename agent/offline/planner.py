@@ -20,13 +20,16 @@ from .conversing import conversed
 from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, which_things, would_do
 from .escorting import following
-from .pointed import chosen_by_answer, narrowed
+from .followup_places import with_places
+from .followup_things import stood_about
+from .pointed import chosen_by_answer, labelled, narrowed
 from .reading import Reading
 from .references import described
 from .restated import LEFT_OUT, Restated, is_question, restated
 from .sequences import in_stages, stages_of
 from .several import about_several
 from .spelling import spelled
+from .standing import Standing
 
 MAX_LABEL = 100
 NOTHING_YET = "Nothing stands yet, so there is nothing to tell of it. "
@@ -66,7 +69,10 @@ def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
     """What to do next for one instruction, which may come later in a sequence of them."""
     if isinstance(turn[-1], Result) and _asks_of_outline(turn[:-1]):
         return _of_outline(turn[-1])
-    spoken = (task, turn) if later else conversed(task, turn, before)
+    placed = with_places(task, turn)
+    if isinstance(placed, Reply):
+        return placed
+    spoken = placed if later else conversed(*placed, before)
     if isinstance(spoken, Reply):
         return spoken
     task, turn = spoken
@@ -130,9 +136,9 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         return _call("ask_user", asked)
     needed = things_needed(reading)
     ids, others = _target_ids(task)[:needed], _target_ids(task)[needed:]
-    if not ids and not reading.things and task.standing:  # "it" is what they stand about
-        ids = list(task.standing["contract"]["groups"][0].get("targets", ()))[:needed]
-    prompts = [p for p in shown if p["id"] not in task.targets]
+    if not ids and task.standing:
+        ids = stood_about(reading.things, Standing.of(task.standing))[:needed]
+    prompts = labelled([p for p in shown if p["id"] not in task.targets], reading.things)
     named = [] if others else [*reading.others, *([reading.faced] if reading.faced else [])]
     found = _found(task, reading, named, history, pointed=bool(ids))
     if isinstance(found, Step):
@@ -214,6 +220,8 @@ def _agreed(task: Task, history: History) -> Reply | None:
     if _was_doubted(history):
         contract = contract | {"reading": READING}
     prompts = [p for p in task.pointed if p["id"] not in task.targets]
+    things = read_instruction(task.instruction, task.metres_per_pixel).things
+    prompts = labelled(prompts, things)
     return _call("propose_formation", {"contract": contract, "targets": prompts})
 
 

@@ -13,9 +13,9 @@ from ..messages import History, User
 from .accounting import read_instruction
 from .choosing import Step
 from .finding import one_at
+from .followup import Followup
 from .followup_things import UNNAMED, resolved
 from .followup_words import Chunk, chunks_of
-from .followups import Followup
 from .references import Reference, described
 from .standing import Standing
 
@@ -73,6 +73,13 @@ def heeded(task: Task, followup: Followup) -> Followup:
         "at with it. Say that, or say it again without pointing."
     )
     return Followup("refuse", text=text)
+
+
+def labelled(prompts: list[dict[str, Any]], things: Sequence[str]) -> list[dict[str, Any]]:
+    """What was pointed at, called as the words call it where they name one thing."""
+    label = re.sub(r"^(?:the|this|that) ", "", things[0]) if len(things) == 1 else ""
+    named = set(label.lower().split()) - {"thing", "one", "object", "target"}
+    return [{"label": label[:100], **prompts[0]}] if named and len(prompts) == 1 else prompts
 
 
 def narrowed(task: Task, history: History) -> Task | Step:

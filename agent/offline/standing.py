@@ -22,6 +22,7 @@ class Standing:
         past: of the plans that undo goes back to, latest first: arrangements, and how many robots.
         steps, redo: how many changes can be taken back, and how many made again.
         centre: of each thing, px.
+        places: of each robot by its id, px, where words speak of them; else None.
         pointed: ids of what this turn points at; `place`: the point, where it is one.
         size: of the picture, px.
         metres_per_pixel: of the picture; None where it has no scale.
@@ -43,6 +44,7 @@ class Standing:
     size: tuple[int, int] = (0, 0)
     metres_per_pixel: float | None = None
     said: str = ""
+    places: Mapping[str, tuple[float, float]] | None = None
 
     @classmethod
     def of(cls, facts: Mapping[str, Any], **told: Any) -> "Standing":
@@ -64,6 +66,7 @@ class Standing:
                 for t in facts.get("things", ())
                 if "centre" in t
             },
+            places=facts.get("places"),
             **told,
         )
 

@@ -7,7 +7,7 @@ from typing import Any
 from ..messages import Call, Reply, Result, turn_of
 from ..model import Request
 from ..offline.answering import arrived, said_of_edit, said_of_undo
-from ..offline.followups import Followup
+from ..offline.followup import Followup
 
 
 class Commands:

@@ -180,3 +180,87 @@ def test_an_answer_that_chooses_none_of_them_is_asked_about(picture: Picture) ->
     asked = Agent().run(picture, "surround the gizmo", settings=PLAN, pointed=pointed)
     done = Agent().resume(asked, answer="the purple hat")
     assert done.report.status == "question"
+
+
+@pytest.fixture
+def named(picture: Picture) -> Run:
+    """Five robots in a row below the red disc, which its person calls a plate."""
+    pointed = [TargetPrompt(points=(RED,))]
+    words = "line up 5 robots along the lower side of the plate, 12 px away"
+    return Agent().run(picture, words, settings=PLAN, pointed=pointed)
+
+
+def places(run: Run) -> np.ndarray:
+    return np.asarray(run.report.positions)
+
+
+def test_questions_of_what_stands_are_answered_by_measures(ring: Run) -> None:
+    wide, high = np.ptp(places(ring).round(1), axis=0)
+    told = {
+        "which two robots are closest to each other": " px, centre to centre.",
+        "how wide is the ring": f"All of it is {wide:.1f} px wide and {high:.1f} px high.",
+        "are they at least 5 px apart": "Yes: each is ",
+        "is anybody closer than 2 px to it": "No: the robots are ",
+        "is nobody closer than 2 px to it": "Yes: the robots are ",
+        "are they touching it": "No: robot ",
+        "which side is free": "Robots stand on all sides of t1.",
+        "how big is it": "t1 is 89",
+    }
+    for words, part in told.items():
+        answered = say(ring, words)
+        assert answered.report.status == "answered", words
+        assert part in str(answered.report.message), (words, answered.report.message)
+
+
+def test_a_robot_is_meant_by_where_it_stands(named: Run) -> None:
+    at = places(named)
+    left, right = int(at[:, 0].argmin()), int(at[:, 0].argmax())
+    down = say(named, "move the leftmost robot 6 px down")
+    both = say(down, "and the one on the far right too")
+    moved = places(both) - at
+    assert moved[[left, right]] == pytest.approx(np.array([[0.0, 6.0]] * 2), abs=0.1)
+    assert np.delete(moved, [left, right], axis=0) == pytest.approx(0.0, abs=0.1)
+    told = say(both, "which robot is furthest to the left?").report.message
+    assert str(told).startswith(f"Robot {left + 1} is to stand at ")
+
+
+def test_of_robots_that_stand_alike_one_is_chosen_by_its_number(ring: Run) -> None:
+    asked = say(ring, "the robot in the middle 5 px further out")
+    assert isinstance(asked.outcome, Paused)
+    assert "alike: name it by its number" in str(asked.report.message)
+    for answer in ("robot 3", "3"):
+        moved = Agent().resume(asked, answer=answer)
+        ways = [b - a for a, b in zip(distances(ring), distances(moved), strict=True)]
+        assert ways[2] == pytest.approx(5, abs=0.5)
+
+
+def test_two_robots_are_named_with_how_far_apart_they_stand(ring: Run) -> None:
+    told = str(say(ring, "how near are the two closest robots").report.message).split()
+    a, b, way = int(told[1]), int(told[3]), float(told[7])
+    assert np.linalg.norm(places(ring)[a - 1] - places(ring)[b - 1]) == pytest.approx(way, abs=0.2)
+    ways = np.linalg.norm(places(ring)[:, None] - places(ring)[None], axis=-1)
+    assert ways[ways > 0].min() == pytest.approx(way, abs=0.2)
+
+
+def test_what_was_pointed_at_keeps_the_name_it_was_given(named: Run) -> None:
+    assert [t.label for t in named.world.targets] == ["plate"]
+    faced = say(named, "turn them all to face the plate")
+    assert faced.report.status == "planned"
+    around = say(faced, "now around the plate instead of along it")
+    assert max(distances(around)) - min(distances(around)) < 3
+    assert len(around.world.targets) == 1
+    other = say(named, "how far is robot 2 from the cup").report.message
+    assert other == '"cup" is not measured yet: point at it, and ask again.'
+
+
+def test_a_question_about_a_thing_gives_way_to_a_command_or_a_question(picture: Picture) -> None:
+    pointed = [TargetPrompt(points=(RED,))]
+    run = Agent().run(picture, "8 robots around the plate", settings=PLAN, pointed=pointed)
+    asked = say(run, "now around the round one")
+    assert isinstance(asked.outcome, Paused)
+    still = Agent().resume(asked, answer="the shiny one")
+    assert isinstance(still.outcome, Paused)
+    told = Agent().resume(still, answer="how far apart are they?")
+    assert str(told.report.message).startswith("Each is ")
+    more = Agent().resume(still, answer="two more robots")
+    assert len(more.report.positions or ()) == 10

@@ -7,7 +7,8 @@ from typing import Any, get_args
 
 import pytest
 import yaml
-from formup.agent.offline.followups import Followup, read_followup
+from formup.agent.offline.followup import Followup
+from formup.agent.offline.followups import read_followup
 from formup.agent.offline.standing import Standing
 from formup.tools.formation.editing.edit_kinds import Edit
 from pydantic import TypeAdapter
@@ -30,6 +31,8 @@ def standing(scene: str) -> Standing:
         if name in given:
             given[name] = tuple(given[name])
     given["centre"] = {name: tuple(at) for name, at in given["centre"].items()}
+    if "places" in given:
+        given["places"] = {str(name): tuple(at) for name, at in given["places"].items()}
     robots = tuple(str(k + 1) for k in range(count))
     return Standing(contract={"groups": groups}, robots=robots, things=things, **given)
 

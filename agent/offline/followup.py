@@ -1,0 +1,51 @@
+"""What is meant by what is said when a plan stands, as a value."""
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from .followup_edits import Effect
+
+Kind = Literal["edits", "undo", "go", "hold", "query", "talk", "ask", "refuse", "instruction"]
+
+
+@dataclass(frozen=True)
+class Followup:
+    """What is to be done in a turn.
+
+    Attributes:
+        kind: what it is above all.
+        undo: steps to take back first; below 0 to make again.
+        to: the plan to go back to instead, "first".
+        edits: then, in order, as edit_formation takes them. An id that begins with "?" is words
+            for a thing that has to be found; `by` may be {"out": px} or {"in": px}.
+        stay: robots that do not move meanwhile.
+        go, hold: whether robots move then, or not before "go".
+        query: what is asked of the plan: about, and robots or a thing.
+        about: small talk: thanks, hello, help, did, why, status, already; or tied, where a robot's
+            place settles not which one is meant.
+        text: a question or a refusal; the words of a whole new instruction.
+        options: commands that answer the question.
+        rest: what is to be done after that, once it is confirmed.
+        background: what was told beside it and changes nothing.
+    """
+
+    kind: Kind
+    undo: int = 0
+    to: str = ""
+    edits: tuple[Effect, ...] = ()
+    stay: tuple[int, ...] = ()
+    go: bool = False
+    hold: bool = False
+    query: Effect | None = None
+    about: str = ""
+    text: str = ""
+    options: tuple[str, ...] = ()
+    rest: str = ""
+    background: tuple[str, ...] = ()
+
+    @property
+    def things(self) -> list[str]:
+        """Words for things that have to be found, once each."""
+        named = re.findall(r"'\?([^']*)'", repr([*self.edits, self.query]))
+        return list(dict.fromkeys(named))

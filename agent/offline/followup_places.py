@@ -1,0 +1,208 @@
+"""Which robot is meant by its place: "the leftmost robot", "the second one from the top".
+
+Its number is put in the place of the phrase, so that all that is said of robot 3 can be said of it.
+"""
+
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..first_message import Task
+from ..messages import Call, History, Reply, Result
+from .choosing import calls_in
+from .followup_edits import listed
+from .followup_words import table_of
+from .standing import Standing
+
+AMOUNTS = {"two": 2, "2": 2, "three": 3, "3": 3, "four": 4, "4": 4}
+LEAST_APART, APART = 1.0, 0.02
+"""Nearer to each other than so many px, or this share of all, no robot is more to one side."""
+MOST_OFFERED = 12
+TOWARDS = {
+    **dict.fromkeys(("left", "west"), (-1, 0)),
+    **dict.fromkeys(("right", "east"), (1, 0)),
+    **dict.fromkeys(("top", "upper", "upp", "high", "north"), (0, -1)),
+    **dict.fromkeys(("bottom", "lower", "low", "south"), (0, 1)),
+}
+BOT = r"(?:robot|bot|drone|rover|unit|machine)"
+END = r"(?:left|right|top|bottom|upper|lower|north|south|east|west)"
+MIDDLE = r"(?:middle|centre|center|central|cent(?:re|er)most|middlemost)"
+MOST = (
+    r"(?:(?:left|right|top|upper|bottom|lower|north|south|east|west)(?:ern)?-?most|highest|lowest)"
+)
+WAY = rf"(?:{MOST}|{MIDDLE}|{END}(?:[- ]?hand)?(?:[- ]{END})?)"
+FAR = r"(?:(?:very|far|furthest|farthest|extreme|most|all the way|outer|exact) )"
+NOUN = rf"(?:{BOT}(?P<many>s)?|(?P<one>ones?))\b(?! [0-9]+\b(?! ?(?:px|pix|m\b|met|cm|%|deg|per)))"
+N = rf"(?:(?P<n>{'|'.join(AMOUNTS)}) )?"
+RANKS = "second|2nd|third|3rd|fourth|4th|fifth|5th"
+RANK = rf"(?:(?:(?P<rank>{RANKS})|last|end|outermost) )?"
+CORNER = r"(?: (?:corner|side|end|edge))?+(?: of (?:all|them|them all))?+"
+STANDS = r"(?:(?:(?:that|which|who)(?:'s| is| stands| sits)?|standing|sitting|placed) )?"
+AT = (
+    rf"(?:(?:at|on|in) (?:the )?|to (?:the )?(?=very|far|extreme)|(?=furthest|farthest|most)){FAR}?"
+    rf"(?:(?:to|on|at|in) (?:the )?)?{FAR}?"
+)
+PHRASES = tuple(
+    re.compile(pattern, re.IGNORECASE)
+    for pattern in (
+        rf"\b(?P<which>which|what|who)(?: of (?:them|the {BOT}s))?(?: (?:one|number|{BOT}))?"
+        rf"(?:'s| is| has| stands| sits)(?: the number of)? (?:the )?(?:(?:one|{BOT}) )?"
+        rf"(?:{AT}|{FAR})?(?P<way>{WAY})(?: (?:one|{BOT}))?{CORNER}(?=\W*$| now| at the moment)",
+        rf"\b(?:the |(?={MOST})){N}{RANK}{FAR}?(?P<way>{WAY})(?: corner| side| end)? {NOUN}"
+        rf"(?! (?:of|(?:on|at|in) the {END})\b)",
+        rf"\b(?:the |that ){N}{RANK}{NOUN} {STANDS}(?:(?:counted )?from (?:the )?|{AT})"
+        rf"(?P<way>{WAY})\b{CORNER}(?! (?:of|{BOT}))",
+        rf"\bthe (?P<way>{MOST})(?P<one>)"
+        r"(?=\W*$|[,;.]| (?:[0-9]+|an? |by |should|must|has|further|farther|closer|out|in|up|down|"
+        r"away|to|from|is|goes|and (?:the|robot))\b)",
+        rf"\bthe (?P<rank>{RANKS})(?P<one>) from (?:the )?(?P<way>{END})\b{CORNER}",
+    )
+)
+"""Phrases for robots, or with `one` for robots or things, by where they stand."""
+BOTH = re.compile(
+    rf"\bthe (?P<a>{FAR}?{WAY}) and (?:the )?(?P<b>{FAR}?{WAY}) (?P<noun>{BOT}|one)s?\b",
+    re.IGNORECASE,
+)
+"""Two robots of one noun: "the left and the right robot"."""
+LED = re.compile(
+    r"\b(?:around|round|about|to|towards?|inside|between|by|near|along|from|of|at|on|onto) $"
+)
+"""Before "the left one", a thing is meant."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """Words with robots called by their numbers.
+
+    Attributes:
+        words: the text, unchanged where no robot is meant by its place.
+        tied: for the first phrase that two robots or more fit alike, the phrase.
+        options: the text with each of those, a few at most.
+        robots: those.
+    """
+
+    words: str
+    tied: str = ""
+    options: tuple[str, ...] = ()
+    robots: tuple[str, ...] = ()
+
+    @property
+    def question(self) -> str:
+        """Which of the robots that fit is meant."""
+        fitting = f'"{self.tied}" fits {listed(self.robots)} alike'
+        return f"Which robot is meant? {fitting}: name it by its number."
+
+
+def speaks_of_place(words: str) -> bool:
+    """Whether a robot may be meant by where it stands."""
+    return any(pattern.search(words) for pattern in PHRASES)
+
+
+def numbered(standing: Standing) -> Standing:
+    """What stands, with numbers for robots in the words that led to it."""
+    words, said = (
+        named(text, standing, ones=True).words for text in (standing.words, standing.said)
+    )
+    return replace(standing, words=words, said=said)
+
+
+def meant_by_place(words: str, standing: Standing, clear: Callable[[str], bool]) -> Named:
+    """The words with numbers for robots; "the top one" is one where words are `clear` only then."""
+    robots = named(words, standing, ones=False)
+    if robots.tied or clear(robots.words):
+        return robots
+    either = named(robots.words, standing, ones=True)
+    return either if clear((*either.options, either.words)[0]) else robots
+
+
+def named(words: str, standing: Standing, *, ones: bool) -> Named:
+    """The words with numbers for robots that are meant by their places in the plan.
+
+    Args:
+        words: what was said.
+        standing: with the places of its robots.
+        ones: whether "the left one" is a robot too.
+    """
+    words = BOTH.sub(r"the \g<a> \g<noun> and the \g<b> \g<noun>", words)
+    for pattern in PHRASES:
+        at = 0
+        while (match := pattern.search(words, at)) is not None:
+            said, at = match.groupdict(), match.end()
+            thing = said.get("one") is not None
+            some = str(said.get("many") or said.get("one") or "").endswith("s")
+            if (some and not said.get("n")) or (
+                thing and (not ones or LED.search(words[: match.start()].lower()))
+            ):
+                continue
+            chosen, rivals = _ranked(said, standing)
+            lead = "where is " if said.get("which") else ""
+            fit = sorted({*chosen, *rivals}, key=lambda robot: (len(robot), robot))
+            put = [f"{lead}{_called(chosen)}"] if chosen else []
+            if rivals and len(chosen) == 1:
+                put = [f"{lead}{_called([robot])}" for robot in _in_places(fit)]
+            texts = tuple(f"{words[: match.start()]}{p}{words[match.end() :]}" for p in put)
+            if rivals or not chosen:
+                few = texts if 1 < len(texts) <= MOST_OFFERED else ()
+                return Named(words, match[0], few, tuple(fit))
+            words, at = texts[0], match.start() + len(put[0])
+    return Named(words)
+
+
+def with_places(task: Task, turn: History) -> Reply | tuple[Task, History]:
+    """The task told where robots stand, where words speak of it; what to measure first, else."""
+    answers = [m.text for m in turn if isinstance(m, Result) and m.name == "ask_user"]
+    if task.standing is None or not any(map(speaks_of_place, [task.instruction, *answers])):
+        return task, turn
+    measured = next((m for m in turn if isinstance(m, Result) and m.name == "measure"), None)
+    if measured is None:
+        return Reply(calls=(Call(id="call", name="measure", arguments={"a": "plan"}),))
+    asked = next(c for c in calls_in(turn) if c.id == measured.call_id)
+    kept = tuple(
+        m for m in turn if m is not measured and not (isinstance(m, Reply) and asked in m.calls)
+    )
+    data: dict[str, Any] = {} if measured.error else json.loads(measured.text)
+    each = data.get("each", ())  # of many robots only the first are told
+    places = {row["robot"]: row["place"] for row in each if len(each) == data["robots"]}
+    return replace(task, standing=task.standing | {"places": places}), kept
+
+
+def _ranked(
+    said: Mapping[str, str | None], standing: Standing
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The robots that are meant, and others that fit as well."""
+    need = AMOUNTS.get((said.get("n") or "").lower(), 1)
+    skip = table_of("ordinals").get((said.get("rank") or "first").lower(), 1) - 1
+    far = _scores(str(said["way"]).lower(), standing)
+    order = sorted(far, key=lambda robot: -far[robot])
+    chosen = tuple(order[skip : skip + need])
+    least = max(LEAST_APART, APART * (far[order[0]] - far[order[-1]]))
+    ends = [far[robot] for robot in (*chosen[:1], *chosen[-1:])]
+    others = [robot for robot in order if robot not in chosen]
+    rivals = tuple(r for r in others if any(abs(far[r] - end) < least for end in ends))
+    return (chosen, rivals) if len(chosen) == need else ((), rivals)
+
+
+def _in_places(robots: Sequence[str]) -> list[str]:
+    """Robots in an order in which the third option is robot 3, if that is one of them."""
+    own = {int(r): r for r in robots if r.isdecimal() and int(r) <= len(robots)}
+    rest = iter([robot for robot in robots if robot not in own.values()])
+    return [own.get(k) or next(rest) for k in range(1, len(robots) + 1)]
+
+
+def _scores(way: str, standing: Standing) -> dict[str, float]:
+    """How far each robot is towards a side or corner, or in the middle, px."""
+    places = standing.places or {}
+    x, y = (sum(at[k] for at in places.values()) / max(len(places), 1) for k in (0, 1))
+    if re.fullmatch(MIDDLE, way):
+        return {r: -(((at[0] - x) ** 2 + (at[1] - y) ** 2) ** 0.5) for r, at in places.items()}
+    ends = re.findall(rf"{END}|high|low", way)
+    vectors = [TOWARDS[end] for end in ends]
+    dx, dy = (sum(v[k] for v in vectors) for k in (0, 1))
+    return {r: dx * at[0] + dy * at[1] for r, at in places.items()}
+
+
+def _called(robots: Sequence[str]) -> str:
+    """Robots by their numbers."""
+    return f"robot{'s' * (len(robots) > 1)} {listed(robots)}"
