@@ -192,9 +192,10 @@ class _Reader:
             return "along"
         if "atop" in sets and reading.relation in ("several", "along", "around"):
             return "inside"
-        if reading.relation in ("around", "inside") and self._stands_off():
+        if reading.relation in ("around", "cage", "inside") and self._stands_off():
             within = any(item.symbol in WITHIN for item in self.items)
-            return reading.relation if reading.sure and within else "around"
+            kept = reading.sure and (within or reading.relation != "inside")
+            return reading.relation if kept else "around"
         unsure = not reading.sure and reading.relation != "ask"
         return "along" if "side" in sets and unsure else None
 
