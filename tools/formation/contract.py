@@ -36,9 +36,7 @@ Relation = Literal[
     "around", "cage", "corners", "along", "inside", "between", "centre", "shape", "at"
 ]
 Unit = Literal["px", "m"]
-SideName = Literal[
-    "left", "right", "top", "bottom", "long", "short", "other long", "other short"
-]
+SideName = Literal["left", "right", "top", "bottom", "long", "short", "other long", "other short"]
 RingPart = Literal[
     "left", "right", "top", "bottom", "left half", "right half", "top half", "bottom half"
 ]
