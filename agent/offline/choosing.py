@@ -105,7 +105,7 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
 
 AGREEING = {"yes", "yep", "yeah", "ok", "okay", "sure", "right", "correct", "exactly", "go", "do"}
 SMALL = {"the", "one", "on", "at", "in", "of", "to", "them", "it", "please", "i", "mean", "is"} | {
-    "that", "a", "most", "and", "two", "ahead"
+    "that", "a", "most", "and", "two", "ahead", "then"
 }  # fmt: skip
 NUMBERING = {"number", "numbers", "no", "nr", "num", "candidate", "option", "choice", "thing"} | {
     "meant", "take", "pick", "choose", "think", "would", "say", "be", "was", "for", "with", "thanks"

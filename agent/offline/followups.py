@@ -246,7 +246,11 @@ def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
 
 def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
     """The question to ask where edits contradict each other."""
-    alone = [e["kind"] for e in edits if "group" not in e and not e.get("robots")]
+    alone = [
+        e["kind"]
+        for e in edits
+        if "group" not in e and (e["kind"] == "count" or not e.get("robots"))
+    ]
     kept = KEEPS.search(line.words)
     if kept and {*alone} & KEPT[kept["what"].lower()]:
         question = f'"{line.words}" both changes and keeps the {kept["what"]}. Which?'
@@ -354,14 +358,12 @@ def _not_framed(line: Line) -> Followup:
 def _not_understood(line: Line) -> Followup:
     """A question that says what is clear, and quotes what is not."""
     parts = _parts(line.chunks)
-    clear = [p for p in parts if _is_clear(line, p)]
-    unclear = [p for p in parts if p not in clear]
+    read = [p for p in parts if _is_clear(line, p)]
+    unclear = [p for p in parts if p not in read]
+    clear = [p for p in read if any(c.frame not in TALK for c in line.clauses(p) or ())]
     unknown = [c for p in unclear for c in p if {"unknown", "never"} & set(c.kinds)]
     quotes = [line.words_of([c]) for c in unknown] or [line.words_of(p) for p in unclear]
     quoted = " and ".join(f'"{q}"' for q in dict.fromkeys(quotes or [line.words]))
-    if not clear and unknown and not any("never" in c.kinds for c in unknown):
-        known = [c for c in line.chunks if c not in unknown]
-        clear = [known] if known and _is_clear(line, known) else []
     if not clear:
         options = ("undo", "a bit further out", "turn it 30 degrees")
         return _questioned(line, f"I do not know what to do with {quoted}. {PLAIN}", options)
