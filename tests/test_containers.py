@@ -53,6 +53,7 @@ def test_what_is_copied_is_there_and_is_all_that_is_installed() -> None:
     assert not copied & set(ignored)
     package = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]
     rooms = {name.split(".")[1] for name in package["packages"] if "." in name}
+    rooms |= {name.split("/")[0] for name in package["package-data"]["formup"] if "/" in name}
     assert rooms == {name for name in copied if (ROOT / name).is_dir()}
     assert {"pyproject.toml", "constraints.txt", "README.md", "LICENSE"} <= copied
     stages = {words.split()[-1] for words in given("FROM") if " AS " in words}

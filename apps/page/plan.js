@@ -111,7 +111,7 @@ const backed = () => turn("plan-problem", "/undo", { to: app.looking });
 const forked = async () => {
   try {
     const made = await call("POST", at("/forks"), { json: { turn: app.turns.get(app.looking) ?? null } });
-    tell("open", made);
+    tell("open", { id: made.id });
   } catch (problem) {
     fail("plan-problem", problem);
   }

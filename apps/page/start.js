@@ -57,7 +57,7 @@ const example = ({ name, words, robots, pointed }) => h("li", {}, h("button", {
 
 const row = (facts) => {
   const said = readable(facts.words), label = facts.name || said || facts.id;
-  return h("li", {}, h("button", { type: "button", className: "link", onclick: () => tell("open", facts) },
+  return h("li", {}, h("button", { type: "button", className: "link", onclick: () => tell("open", { id: facts.id }) },
     h("strong", {}, label), h("span", { className: "soft" }, ` ${said === label ? "" : said} · ${facts.turns === 1 ? "1 turn" : `${facts.turns} turns`} · ${new Date(facts.created).toLocaleString()}`)),
   h("button", { type: "button", ariaLabel: `Rename ${label}`, onclick: () => renamed(facts) }, "Rename"),
   h("button", { type: "button", ariaLabel: `Delete ${label}`, onclick: () => deleted(facts, label) }, "Delete"));

@@ -22,6 +22,7 @@ KEYS = [
     "image",
     "targets",
     "candidates",
+    "options",
     "contract",
     "plan_id",
     "parent",

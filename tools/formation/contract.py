@@ -54,13 +54,13 @@ OUTSIDE: frozenset[str] = frozenset({"around", "cage", "corners", "along"})
 class Group(Value):
     """One arrangement; lengths only if named.
 
-    around: even ring (surround, guard); opening: least width of a gap in it (0: any). cage: closed
+    around: even ring (surround, guard); opening: least gap in it (0: any). cage: closed
     ring ("no gap", "nobody gets in", "must stay put", "cannot be pushed off"); escape-proof, walls
-    (the picture's border is one): only if so said. corners: one at each, also if surrounded "at
-    the corners"; clearance [0, 0]: on them. along: one of side, edges (describe_shape's numbers),
-    facing an id. inside: spread over it (in, on). between: two targets. centre: gathered there.
+    (the picture's border is one): only if so said. corners: one at each ("surround at the
+    corners"); clearance [0, 0]: on them. along: one of side, edges (describe_shape's numbers),
+    facing an id. inside: spread (in, on). between: two targets. centre: gathered.
     shape: shape, line (x0, y0, x1, y1) or positions. at: points. clearance: from the outline
-    (inside: inwards) to robots' edges; 15 px away is [15, 15], at least 15 [15, 1000]; else fit:
+    (inside: inwards) to robots' edges; 15 px away: [15, 15], at least 15 [15, 1000]; else fit:
     normal also "next to". min_spacing, pitch (exact): of centres; max_gap: of edges. heading:
     towards, away, id or degrees; opening_towards: left, right, top, bottom, id or degrees.
     """

@@ -69,5 +69,5 @@ def test_a_mistake_is_found_before_a_broker_is_looked_for(
 
 
 def test_a_name_alone_does_not_do() -> None:
-    with pytest.raises(InputError, match=r"Robots on vda5050 are described by a file"):
+    with pytest.raises(InputError, match=r"The fleet 'vda5050' is described by a file"):
         fleet_named("vda5050")
