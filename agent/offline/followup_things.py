@@ -37,7 +37,9 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
     if one and len(standing.things) > 1:  # the plan, or the thing
         kinds["thing"] = standing.things[0][0]
     if "thing" in kinds:
-        name = _id_of(str(kinds["thing"]), bool(kinds.pop("other", False)), standing)
+        another = re.search(r"\banother $", text[: chunk.start], re.IGNORECASE)
+        other = bool(kinds.pop("other", False) or another)
+        name = _id_of(str(kinds["thing"]), other, standing)
         if name.startswith("?") and len(standing.pointed) == 1 and _is_shown(chunk, text):
             name = standing.pointed[0]
         kinds["thing"] = name
