@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
+from textwrap import shorten
 from typing import Any
 
 from ...tools.perception.referring.query import SINGLE
@@ -21,7 +22,7 @@ CROWDED, FAINT = 20, 0.6
 """More things than this, or fainter ones, are rather patches than what people speak of."""
 MOST_ASKED = 24
 """Candidates that one question offers: more cannot be told apart on a picture."""
-MOST_QUOTED = 40
+MOST_QUOTED = 200
 """Characters of an answer that a question repeats."""
 POINT = "point at it, with a point, a box or a rough outline"
 
@@ -53,7 +54,8 @@ def find(things: Sequence[Reference], needed: int, history: History) -> list[Fou
     if isinstance(found, list) or found.name != "ask_user" or not asked:
         return found
     answer = next((m.text for m in history if _answers(m, asked[-1])), "")
-    question = f'"{answer[:MOST_QUOTED]}" chooses none of them. {found.arguments["question"]}'
+    quoted = shorten(answer, MOST_QUOTED, placeholder=" ...")
+    question = f'"{quoted}" chooses none of them. {found.arguments["question"]}'
     return Step(found.name, found.arguments | {"question": question})
 
 

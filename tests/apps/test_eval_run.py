@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -21,7 +20,6 @@ from formup.tools.perception.detectors import candidates as detector
 from formup.tools.perception.referring.attributes import Candidate
 from numpy.typing import NDArray
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "evals"))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 
 GOOD, BAD = load_prompt("former").name, "former@draft-forgetful"

@@ -26,7 +26,6 @@ from formup.evals.experiments.journal import read_rows
 from formup.evals.experiments.simulated_model import SimulatedModel
 from formup.prompts import PromptLibrary, load_prompt
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "evals"))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 
 ROOT = Path(__file__).parents[2]

@@ -1,7 +1,6 @@
 """The report in a browser, on a desk and on a phone: it works, runs nothing else, loads nothing."""
 
 import io
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -12,7 +11,6 @@ from formup.apps.cli import app
 from PIL import Image
 from playwright.sync_api import Browser, Dialog, Page, Request, expect, sync_playwright
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "evals")]
 chromium = import_module("chromium")
 hostile = import_module("hostile")
 write_run: Callable[..., Path] = hostile.write_run

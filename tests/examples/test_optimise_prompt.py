@@ -14,7 +14,6 @@ from formup.apps.cli import app
 from formup.prompts import PromptLibrary
 
 pytest.importorskip("gepa", reason="needs gepa, which is among the extras for development")
-sys.path.insert(0, str(Path(__file__).parents[1] / "evals"))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 
 ROOT = Path(__file__).parents[2]

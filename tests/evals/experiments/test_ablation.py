@@ -1,6 +1,5 @@
 """What each part of the tools is worth, on models that need it, and that robots stay out of it."""
 
-import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -18,7 +17,6 @@ from formup.evals.tasks.suites import load_suite
 from formup.tools.builtin import TOOLS
 from formup.tools.fleet.simulated import SimulatedFleet
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 tried: Callable[..., list[TrialRow]] = import_module("trying").tried
 

@@ -1,7 +1,6 @@
 """Dialogues as tasks: how they are read, held with an agent, and written down."""
 
 import json
-import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -18,7 +17,6 @@ from formup.evals.experiments.trials import TrialRow, Turns
 from formup.evals.tasks.suites import load_suite
 from formup.tools.errors import InputError
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 work_of: Callable[..., Any] = import_module("trying").work_of
 
 TURNS = [

@@ -2,7 +2,6 @@
 
 import json
 import pickle
-import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -25,7 +24,6 @@ from formup.evals.tasks.suites import load_suite, write_suite
 from formup.prompts import load_prompt
 from formup.tools.errors import InputError, ModelError
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 work_of: Callable[..., Any] = import_module("trying").work_of
 

@@ -1,7 +1,6 @@
 """Conversations with somebody who saw what a model sees, replayed: every one comes out the same."""
 
 import json
-import sys
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
@@ -18,7 +17,6 @@ from formup.evals.experiments.trials import TrialRow
 from formup.evals.tasks.suites import load_suite
 from formup.tools.errors import InputError
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 trying = import_module("trying")
 tried: Callable[..., list[TrialRow]] = trying.tried
 

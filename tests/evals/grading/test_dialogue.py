@@ -1,11 +1,9 @@
 """Graders of dialogues: right answers pass every turn, policies without understanding fail."""
 
-import sys
 from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +15,6 @@ from formup.evals.tasks.dialogues import dialogue_task
 from formup.evals.tasks.suites import load_suite
 from formup.evals.tasks.task import Task, Turn
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 reference: Any = import_module("dialogue_reference")
 LUCKY = 0.15
 """Share of turns that a policy without understanding may get right, such as closing what is."""

@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 from collections import Counter
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -13,7 +12,6 @@ import pytest
 from formup.apps.cli import app
 from formup.tools.errors import InputError
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 hostile = import_module("hostile")
 write_run: Callable[..., Path] = hostile.write_run
 SECRET: str = hostile.SECRET

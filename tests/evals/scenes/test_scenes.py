@@ -2,7 +2,6 @@
 
 import math
 import string
-import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +28,6 @@ from formup.tools.geometry.outline import FloatArray
 from PIL import Image
 from shapely.geometry import Point, Polygon
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 trying = import_module("trying")
 tried: Callable[..., list[TrialRow]] = trying.tried
 

@@ -1,7 +1,6 @@
 """What may not be tabled: edited, dropped, repeated or moved rows, edited transcripts, others."""
 
 import json
-import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -20,7 +19,6 @@ from formup.evals.tables.checks import checked_rows
 from formup.evals.tasks.suites import load_suite
 from formup.tools.errors import InputError
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 write_folder: Callable[[Path, int], Path] = import_module("synthetic").write_folder
 work_of: Callable[..., Any] = import_module("trying").work_of
 

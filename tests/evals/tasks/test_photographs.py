@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
@@ -23,7 +22,6 @@ from formup.tools.errors import InputError
 from formup.tools.geometry.outline import FloatArray
 from formup.tools.perception.image import load_picture
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
 trying = import_module("trying")
 tried: Callable[..., list[TrialRow]] = trying.tried
 

@@ -1,15 +1,25 @@
-"""Deployments of robots elsewhere during which something happens, whatever the wire is."""
+"""Robots elsewhere that are simulated, and deployments of them in which something happens."""
 
 import asyncio
+import os
+import re
+import shlex
+import subprocess
+import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
+import yaml
 from formup.tools.fleet.arrival import Arrival
 from formup.tools.fleet.assigning import assign_robots
 from formup.tools.fleet.deploy import deploy
 from formup.tools.fleet.protocol import Fleet, Pose
+from formup.tools.fleet.wire.stand_in import StandIns
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.plan import make_plan
 from formup.tools.formation.site import Site
@@ -25,6 +35,10 @@ SURE = {"speed": 200, "pose_timeout": 1.0, "watchdog": 1.0}
 """Fast, and with time enough for a machine that does other things too."""
 PATIENCE = 10.0
 Act = Callable[[Any, Fleet], object]
+Robots = TypeVar("Robots", bound=StandIns)
+ROOT = Path(__file__).parents[3]
+STAYING = ("mosquitto", "formup fleet simulate")
+"""Commands of pages that go on beside the others."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +56,56 @@ def wait_for(what: Callable[[], object]) -> None:
     while not what():
         assert time.monotonic() < ends, "it has not come about"
         time.sleep(0.01)
+
+
+class Simulated(Generic[Robots]):
+    """A fleet's file, its stand-ins in a thread, and what they told."""
+
+    def __init__(self, path: Path, given: dict[str, Any]) -> None:
+        path.write_text(yaml.safe_dump(given))
+        self.path, self.told = path, list[str]()
+        self.done = threading.Event()
+        self._robots: Robots | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def robots(self) -> Robots:
+        assert self._robots is not None
+        return self._robots
+
+    def run(self, robots: Robots, joined: Callable[[], bool]) -> None:
+        """Let stand-ins go on once they are connected."""
+        self._robots = robots
+        wait_for(joined)
+        self._thread = threading.Thread(target=robots.run, args=(self.done.is_set,))
+        self._thread.start()
+
+    def was_told(self, what: str) -> bool:
+        return any(what in text for text in self.told)
+
+    def end(self) -> None:
+        self.done.set()
+        if self._thread is not None:
+            self._thread.join()
+        if self._robots is not None:
+            self._robots.close()
+
+
+Made = TypeVar("Made", bound=Simulated[Any])
+
+
+@contextmanager
+def ended(make: Callable[..., Made]) -> Generator[Callable[..., Made]]:
+    """What makes simulated fleets, which are ended after."""
+    made: list[Made] = []
+
+    def kept(*args: Any, **more: Any) -> Made:
+        made.append(make(*args, **more))
+        return made[-1]
+
+    yield kept
+    for one in made:
+        one.end()
 
 
 def deployed(lab: Any, fleet: Fleet, act: Act = lambda lab, fleet: None) -> Arrival:
@@ -66,9 +130,57 @@ def deployed(lab: Any, fleet: Fleet, act: Act = lambda lab, fleet: None) -> Arri
 
 def stand(lab: Any) -> bool:
     before = lab.robots.points.copy()
-    time.sleep(0.2)
+    time.sleep(0.3)
     return bool(abs(lab.robots.points - before).max() < 0.5)
 
 
 def stops(lab: Any, fleet: Fleet) -> None:
     asyncio.get_running_loop().create_task(fleet.stop())
+
+
+def commands_of(page: str) -> list[str]:
+    """What the blocks of a page of docs have one type."""
+    blocks = re.findall(r"```console\n(.*?)```", page, re.DOTALL)
+    return [line.removeprefix("$ ") for block in blocks for line in block.splitlines()]
+
+
+def keys_of(page: str) -> set[str]:
+    """The keys of a fleet's file that the table of a page of docs names."""
+    rows = page.partition("| key | |")[2].partition("\n\n")[0].splitlines()[2:]
+    return {key for row in rows for key in re.findall(r"`(\w+)`", row.split("|")[1])}
+
+
+def checkout(folder: Path, was: str, now: str, *examples: str) -> Path:
+    """A folder with the docs, and with examples that are at another port."""
+    (folder / "docs").symlink_to(ROOT / "docs")
+    (folder / "examples").mkdir()
+    for name in examples:
+        text = (ROOT / "examples" / name).read_text("utf-8")
+        assert was in text
+        (folder / "examples" / name).write_text(text.replace(was, now))
+    return folder
+
+
+def followed(commands: Sequence[str], folder: Path) -> dict[str, str]:
+    """What commands print that are run one after the other, by their first three words."""
+    path = f"{os.environ['PATH']}:/usr/sbin"
+    home = os.environ | {"XDG_DATA_HOME": str(folder), "PATH": path, "PYTHONUNBUFFERED": "1"}
+    said: dict[str, str] = {}
+    with ExitStack() as staying:
+        for command in commands:
+            parts = shlex.split(command)
+            parts = [sys.executable, "-m", *parts] if parts[0] == "formup" else parts
+            begun = subprocess.Popen(
+                parts, cwd=folder, env=home, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+            )
+            if command.startswith(STAYING):
+                staying.callback(begun.communicate)
+                staying.callback(begun.kill)
+                if command.startswith("formup"):
+                    assert begun.stdout is not None
+                    assert b"standing in for 6 robots" in begun.stdout.readline()
+                continue
+            out, problems = begun.communicate()
+            assert begun.returncode == 0, out + problems
+            said[" ".join(command.split()[:3])] = out.decode()
+    return said

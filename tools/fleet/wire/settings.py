@@ -4,6 +4,7 @@ Robots speak in their own frame, usually metres with y up; everything else here 
 """
 
 import math
+from abc import ABC, abstractmethod
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
@@ -75,7 +76,7 @@ class StandIn(Value):
     lost: tuple[Spell, ...] = ()
 
 
-class WireSettings(Value):
+class WireSettings(Value, ABC):
     """Robots that are elsewhere; lengths are in the robots' frame.
 
     Attributes:
@@ -121,9 +122,9 @@ class WireSettings(Value):
         return length / self.frame.metres_per_pixel
 
     @property
+    @abstractmethod
     def where(self) -> str:
         """What they are reached through, in words: "the broker localhost:1883"."""
-        raise NotImplementedError
 
     @property
     def alone(self) -> str:

@@ -1,16 +1,13 @@
 """A real browser on a real server: what must not happen while a page is open is looked for."""
 
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Request, expect, sync_playwright
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 chromium = import_module("chromium")
 LONG = 20_000
 """Longest, ms, that a turn may take on a machine that is busy."""

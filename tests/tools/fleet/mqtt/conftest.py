@@ -1,23 +1,18 @@
 """Robots that are simulated on the wire of a real broker, and files of both."""
 
 import json
-import sys
-import threading
 from collections.abc import Callable, Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
+from deploying import Simulated, ended, wait_for
 from formup.tools.fleet.described import described_as
 from formup.tools.fleet.mqtt.fleet import MqttFleet
 from formup.tools.fleet.mqtt.link import Link
 from formup.tools.fleet.mqtt.settings import MqttSettings
 from formup.tools.fleet.mqtt.stand_in import MqttStandIns
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-wait_for = import_module("deploying").wait_for
 USUAL: dict[str, Any] = {
     "fleet": "mqtt",
     "robots": ["a", "b", "c"],
@@ -52,8 +47,8 @@ class Faulty(MqttStandIns):
         return self.faults[robot](message, self.seq)
 
 
-class Lab:
-    """A fleet's file, its stand-ins in a thread, and whatever speaks beside them."""
+class Lab(Simulated[Faulty]):
+    """A fleet on MQTT, and whatever speaks beside it."""
 
     def __init__(self, path: Path, broker: Any, more: dict[str, Any]) -> None:
         own = path.parent.name
@@ -62,25 +57,13 @@ class Lab:
             "goal": f"{own}/{{robot}}/goal",
             "hold": f"{own}/hold",
         }
-        given = {**USUAL, "broker": broker.url, "topics": topics, **more}
-        path.write_text(yaml.safe_dump(given))
-        self.path, self.told = path, list[str]()
+        super().__init__(path, {**USUAL, "broker": broker.url, "topics": topics, **more})
         self.settings: MqttSettings = described_as(MqttSettings, path)
-        self._done = threading.Event()
-        self._robots: Faulty | None = None
-        self._thread: threading.Thread | None = None
         self._links: list[Link] = []
 
-    @property
-    def robots(self) -> Faulty:
-        assert self._robots is not None
-        return self._robots
-
     def simulate(self) -> "Lab":
-        self._robots = Faulty(self.settings, self.told.append)
-        wait_for(lambda: self.robots.link.connected)
-        self._thread = threading.Thread(target=self.robots.run, args=(self._done.is_set,))
-        self._thread.start()
+        robots = Faulty(self.settings, self.told.append)
+        self.run(robots, lambda: robots.link.connected)
         return self
 
     def fleet(self) -> MqttFleet:
@@ -95,32 +78,21 @@ class Lab:
     def topic(self, kind: str, robot: str = "") -> str:
         return str(getattr(self.settings.topics, kind)).replace("{robot}", robot)
 
-    def was_told(self, what: str) -> bool:
-        return any(what in text for text in self.told)
-
     def end(self) -> None:
-        self._done.set()
-        if self._thread is not None:
-            self._thread.join()
+        super().end()
         for link in self._links:
             link.close()
-        if self._robots is not None:
-            self._robots.close()
 
 
 @pytest.fixture
 def lab(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Callable[..., Lab]]:
     """Makes labs; what is given is said in their file."""
-    made: list[Lab] = []
 
     def make(broker: Any = None, **more: Any) -> Lab:
-        found = broker or request.getfixturevalue("shared")
-        made.append(Lab(tmp_path / "lab.yaml", found, more))
-        return made[-1]
+        return Lab(tmp_path / "lab.yaml", broker or request.getfixturevalue("shared"), more)
 
-    yield make
-    for one in made:
-        one.end()
+    with ended(make) as made:
+        yield made
 
 
 def spoken(**message: Any) -> bytes:

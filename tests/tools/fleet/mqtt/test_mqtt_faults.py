@@ -2,16 +2,14 @@
 
 import asyncio
 import re
-import sys
 import time
 from collections.abc import Callable
 from contextlib import aclosing
-from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from deploying import SURE, Act, Case, deployed, stand, stops
 from formup.tools.fleet import getting_on
 from formup.tools.fleet.protocol import (
     Fleet,
@@ -22,11 +20,6 @@ from formup.tools.fleet.protocol import (
 )
 from formup.tools.fleet.wire import fleet as fleet_module
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-shared = import_module("deploying")
-deployed, stand, stops = shared.deployed, shared.stand, shared.stops
-Case, SURE = shared.Case, shared.SURE
-Act = Callable[[Any, Fleet], object]
 Labs = Callable[..., Any]
 
 

@@ -2,23 +2,19 @@
 
 import json
 import socket
-import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
+from deploying import Simulated, ended
 from formup.tools.fleet.described import described_as
 from formup.tools.fleet.ros.bridge import StandInBridge
 from formup.tools.fleet.ros.fleet import RosFleet
 from formup.tools.fleet.ros.settings import RosSettings
 from formup.tools.fleet.ros.stand_in import RosStandIns
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-wait_for = import_module("deploying").wait_for
 USUAL: dict[str, Any] = {
     "fleet": "ros",
     "robots": ["a", "b", "c"],
@@ -68,30 +64,19 @@ class Faulty(RosStandIns):
         return self.faults[robot](message, self.seq)
 
 
-class Lab:
-    """A fleet's file, its stand-ins in a thread, and whatever speaks beside them."""
+class Lab(Simulated[Faulty]):
+    """A fleet behind a stand-in bridge, and whatever speaks beside it."""
 
     def __init__(self, path: Path, more: dict[str, Any]) -> None:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port: int = free.getsockname()[1]
-        path.write_text(yaml.safe_dump({**USUAL, "bridge": f"ws://127.0.0.1:{port}", **more}))
-        self.path, self.told = path, list[str]()
+        super().__init__(path, {**USUAL, "bridge": f"ws://127.0.0.1:{port}", **more})
         self.settings: RosSettings = described_as(RosSettings, path)
-        self._done = threading.Event()
-        self._robots: Faulty | None = None
-        self._thread: threading.Thread | None = None
         self._speaking: threading.Thread | None = None
 
-    @property
-    def robots(self) -> Faulty:
-        assert self._robots is not None
-        return self._robots
-
     def simulate(self) -> "Lab":
-        self._robots = Faulty(self.settings, self.told.append)
-        self._thread = threading.Thread(target=self.robots.run, args=(self._done.is_set,))
-        self._thread.start()
+        self.run(Faulty(self.settings, self.told.append), lambda: True)
         return self
 
     def fleet(self) -> RosFleet:
@@ -105,7 +90,7 @@ class Lab:
             with connect(self.settings.url, proxy=None) as socket:
                 for _ in range(60):
                     socket.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
-                    self._done.wait(0.05)
+                    self.done.wait(0.05)
 
         self._speaking = threading.Thread(target=again)
         self._speaking.start()
@@ -113,28 +98,20 @@ class Lab:
     def goal(self, robot: str) -> str:
         return {robot: topic for topic, robot in self.settings.goals.items()}[robot]
 
-    def was_told(self, what: str) -> bool:
-        return any(what in text for text in self.told)
-
     def end(self) -> None:
-        self._done.set()
-        for thread in (self._thread, self._speaking):
-            if thread is not None:
-                thread.join()
-        if self._robots is not None:
-            self._robots.close()
+        self.done.set()
+        if self._speaking is not None:
+            self._speaking.join()
+        super().end()
 
 
 @pytest.fixture
 def lab(tmp_path: Path) -> Iterator[Callable[..., Lab]]:
     """Makes labs; what is given is said in their file."""
     pytest.importorskip("websockets", reason="the extra ros is not installed")
-    made: list[Lab] = []
 
     def make(**more: Any) -> Lab:
-        made.append(Lab(tmp_path / "lab.yaml", more))
-        return made[-1]
+        return Lab(tmp_path / "lab.yaml", more)
 
-    yield make
-    for one in made:
-        one.end()
+    with ended(make) as made:
+        yield made

@@ -7,12 +7,11 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import aclosing
-from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from deploying import SURE, Act, Case, deployed, stand, stops, wait_for
 from formup.tools.fleet import getting_on
 from formup.tools.fleet.protocol import (
     Fleet,
@@ -22,12 +21,7 @@ from formup.tools.fleet.protocol import (
 )
 from formup.tools.fleet.wire import fleet as fleet_module
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-shared = import_module("deploying")
-deployed, stand, stops, wait_for = shared.deployed, shared.stand, shared.stops, shared.wait_for
-Case, SURE = shared.Case, shared.SURE
 Labs = Callable[..., Any]
-Act = Callable[[Any, Fleet], object]
 Said = dict[str, Any]
 MODES = ["pose", "cmd_vel", "nav2"]
 DRIVE = """

@@ -1,21 +1,18 @@
 """Vehicles that are simulated on the wire of a real broker, and files of both."""
 
 import json
-import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
+from deploying import Simulated, ended, wait_for
 from formup.tools.fleet.described import described_as
 from formup.tools.fleet.mqtt.link import Link
 from formup.tools.fleet.vda5050.fleet import Vda5050Fleet
 from formup.tools.fleet.vda5050.settings import Vda5050Settings
 from formup.tools.fleet.vda5050.stand_in import Vda5050StandIns
 
-PATIENCE = 10.0
 USUAL: dict[str, Any] = {
     "fleet": "vda5050",
     "version": "2.1",
@@ -29,13 +26,6 @@ USUAL: dict[str, Any] = {
     "simulated": {"starts": [[50, 50], [50, 100], [50, 150]]},
 }
 Fault = Callable[[str, dict[str, Any]], dict[str, Any] | None]
-
-
-def wait_for(what: Callable[[], object]) -> None:
-    ends = time.monotonic() + PATIENCE
-    while not what():
-        assert time.monotonic() < ends, "it has not come about"
-        time.sleep(0.01)
 
 
 class Faulty(Vda5050StandIns):
@@ -53,29 +43,19 @@ class Faulty(Vda5050StandIns):
             self._links[robot].say(self._speaks.topic(robot, kind), said)
 
 
-class Hall:
-    """A fleet's file, its stand-ins in a thread, and whatever speaks beside them."""
+class Hall(Simulated[Faulty]):
+    """A fleet of vehicles, and whatever speaks beside it."""
 
     def __init__(self, path: Path, broker: Any, more: dict[str, Any]) -> None:
         given = {**USUAL, "interface": path.parent.name, "broker": broker.url, **more}
-        path.write_text(yaml.safe_dump(given))
-        self.path, self.told = path, list[str]()
+        super().__init__(path, given)
         self.settings: Vda5050Settings = described_as(Vda5050Settings, path)
-        self._done = threading.Event()
-        self._robots: Faulty | None = None
-        self._thread: threading.Thread | None = None
         self._links: list[Link] = []
 
-    @property
-    def robots(self) -> Faulty:
-        assert self._robots is not None
-        return self._robots
-
     def simulate(self) -> "Hall":
-        self._robots = Faulty(self.settings, self.told.append)
-        wait_for(lambda: all(link.connected for link in self.robots._links.values()))  # pyright: ignore[reportPrivateUsage]
-        self._thread = threading.Thread(target=self.robots.run, args=(self._done.is_set,))
-        self._thread.start()
+        robots = Faulty(self.settings, self.told.append)
+        links = robots._links.values()  # pyright: ignore[reportPrivateUsage]
+        self.run(robots, lambda: all(link.connected for link in links))
         return self
 
     def fleet(self) -> Vda5050Fleet:
@@ -94,29 +74,18 @@ class Hall:
         self.link(everything, heard=lambda topic, text: said.append((topic, json.loads(text))))
         return said
 
-    def was_told(self, what: str) -> bool:
-        return any(what in text for text in self.told)
-
     def end(self) -> None:
-        self._done.set()
-        if self._thread is not None:
-            self._thread.join()
+        super().end()
         for link in self._links:
             link.close()
-        if self._robots is not None:
-            self._robots.close()
 
 
 @pytest.fixture
 def hall(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Callable[..., Hall]]:
     """Makes halls; what is given is said in their file."""
-    made: list[Hall] = []
 
     def make(broker: Any = None, **more: Any) -> Hall:
-        found = broker or request.getfixturevalue("shared")
-        made.append(Hall(tmp_path / "hall.yaml", found, more))
-        return made[-1]
+        return Hall(tmp_path / "hall.yaml", broker or request.getfixturevalue("shared"), more)
 
-    yield make
-    for one in made:
-        one.end()
+    with ended(make) as made:
+        yield made

@@ -9,53 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from deploying import Act, deployed, stand
 from formup.tools.fleet import getting_on
-from formup.tools.fleet.arrival import Arrival
-from formup.tools.fleet.assigning import assign_robots
-from formup.tools.fleet.deploy import deploy
-from formup.tools.fleet.protocol import Fleet, FleetUnreachableError, Pose
+from formup.tools.fleet.protocol import Fleet, FleetUnreachableError
 from formup.tools.fleet.vda5050.messages import Writer
 from formup.tools.fleet.wire import fleet as fleet_module
-from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.plan import make_plan
-from formup.tools.formation.site import Site
-from formup.tools.geometry.outline import make_outline
 
-SITE = Site({"t1": make_outline([(200, 200), (300, 200), (300, 300), (200, 300)])}, 640, 480)
-PLAN = make_plan(
-    Contract(groups=(Group(relation="around", targets=("t1",), robots=3),), robot_radius=5),
-    SITE,
-    "s",
-)
-Act = Callable[[Any, Fleet], object]
 Halls = Callable[..., Any]
 Json = dict[str, Any]
-
-
-def deployed(hall: Any, fleet: Fleet, act: Act = lambda hall, fleet: None) -> Arrival:
-    """What comes of a deployment when something happens once robots are on their way."""
-    begun: list[Pose] = []
-    done = False
-
-    def watch(poses: tuple[Pose, ...]) -> None:
-        nonlocal done
-        begun[:] = begun or poses
-        pairs = zip(begun, poses, strict=True)
-        if not done and any(abs(a.x - b.x) + abs(a.y - b.y) > 20 for a, b in pairs):
-            done = True
-            act(hall, fleet)
-
-    async def go() -> Arrival:
-        robots = assign_robots(await fleet.observe(), PLAN.formation.points).robots
-        return (await deploy(PLAN, SITE, fleet, robots, watch=watch)).arrival
-
-    return asyncio.run(go())
-
-
-def stand(hall: Any) -> bool:
-    before = hall.robots.points.copy()
-    time.sleep(0.3)
-    return bool(abs(hall.robots.points - before).max() < 0.5)
 
 
 def said(of: Callable[[str, Json], Json | None]) -> Act:
