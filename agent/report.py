@@ -248,6 +248,8 @@ def _status(
     if isinstance(outcome, Paused):
         asked = outcome.call.name == "ask_user"
         return ("question" if asked else "needs_approval"), text
+    if arrival is not None and arrival.ended == "stopped":
+        return "stopped", text
     if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
         # Robots have moved, whatever happened after that.
         done = arrival.done and _given_up(outcome.messages) is None

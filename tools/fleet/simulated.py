@@ -135,7 +135,9 @@ class SimulatedFleet:
                 await self.pace.step(PERIOD)
                 self._check_open()
                 if self._stops != stops:
-                    raise FleetStoppedError("The simulated fleet was stopped on the way.")
+                    raise FleetStoppedError(
+                        "The simulated fleet was stopped on the way: its robots are held."
+                    )
         finally:
             self._simulator.hold()
             self._driving = False

@@ -242,7 +242,7 @@ def test_a_stop_ends_a_deployment_where_the_robots_are_and_lasts_until_released(
     )
     arrival = deployment.arrival
     assert (arrival.arrived, arrival.ended, arrival.corrections) == (False, "stopped", 0)
-    assert arrival.reason == "The simulated fleet was stopped on the way."
+    assert arrival.reason == "The simulated fleet was stopped on the way: its robots are held."
     assert len(frames) <= 10 + 1 + 1  # one more period, and the last observation
     assert frames[-1] == deployment.poses
     assert max(arrival.residual_px) > 10 * arrival.tolerance_px

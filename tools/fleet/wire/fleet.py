@@ -272,7 +272,9 @@ class WireFleet(ABC):
         """Refuse to go on where anything is not as it has to be."""
         self._check_open()
         if self._stops != stops:
-            raise FleetStoppedError(f"The {self.name} fleet was stopped on the way.")
+            raise FleetStoppedError(
+                f"The {self.name} fleet was stopped on the way: its robots are held."
+            )
         self._check_link(joined)
         if time.monotonic() - self._others < OTHERS:
             raise FleetBusyError("Another program drives these robots; end it, and drive again.")
