@@ -1,8 +1,6 @@
 # Everything sets itself up: `make demo` on a fresh machine needs Python 3.11 or later, git, make.
 PYTHON ?= python3
 BIN := .venv/bin
-PHOTOS := evals/photos/images
-OUT := formup-runs/demo
 PEERS := pydantic_ai openai_agents langgraph smolagents
 ROUNDS ?= 80
 SERVERS := transformers litellm ray conformance
@@ -16,15 +14,7 @@ WITH_TORCH := -c constraints.txt -e '.[torch,rl]' '$(TORCH)' hypothesis pytest
 .PHONY: wordings demo test test-servers test-torch check bench bench-evals bench-loop clean
 
 demo: .venv/.ready
-	@$(BIN)/formup run $(PHOTOS)/cars_two.jpg "Surround the red car at the corners" -n 4 \
-	  --point 390,260 --out $(OUT)/car
-	@echo
-	@$(BIN)/formup run $(PHOTOS)/ucm_sparseresidential28.jpg "Fill the pool with 6 robots" \
-	  --box 322,261,429,388 --out $(OUT)/pool
-	@echo
-	@$(BIN)/formup run $(PHOTOS)/us_coins.jpg "Cage the largest coin" -n 10 --out $(OUT)/coin
-	@echo
-	@$(BIN)/formup run docs/images/lot.jpg "Surround the incorrectly parked car" -n 6 --out $(OUT)/lot
+	@$(BIN)/formup demo
 
 test: .venv/.ready-dev
 	$(BIN)/pytest -q -n auto --ignore tests/servers

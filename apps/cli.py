@@ -18,6 +18,7 @@ from . import (
     arguments,
     calibrate,
     chat,
+    demo,
     deploy,
     doctor,
     evaluate,
@@ -41,7 +42,6 @@ from .window import watching
 app = typer.Typer(
     name="formup",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -173,6 +173,12 @@ app.add_typer(serve.tokens, name="tokens")
 app.command(name="deploy")(deploy.deploy)
 app.command(name="calibrate")(calibrate.calibrate)
 app.command(name="trace")(trace.show_trace)
+
+
+@app.command(name="demo")
+def demonstrate(out: o.DemoOut = Path("formup-runs", "demo")) -> None:
+    """Run four instructions on pictures that come with formup."""
+    raise typer.Exit(demo.show_demo(lambda words: app(words, standalone_mode=False) or 0, out))
 
 
 @app.command(name="doctor")

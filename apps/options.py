@@ -53,6 +53,7 @@ PlanOnly = Annotated[bool, typer.Option("--plan-only", help="Certify a plan but 
 Out = Annotated[
     Path | None, typer.Option("--out", help="Folder for the files; default: formup-runs/TIME.")
 ]
+DemoOut = Annotated[Path, typer.Option("--out", help="Folder for the files, one for each.")]
 ModelName = Annotated[
     str,
     typer.Option(
