@@ -80,7 +80,7 @@ def without_asides(words: str, standing: Standing) -> tuple[str, tuple[str, ...]
     parts = [p for part in PART.findall(REASON.sub(", ", words)) for p in _run_on(part)]
     told = [k for k, part in enumerate(parts) if _tells(part, standing)]
     kept = "".join(part for k, part in enumerate(parts) if k not in told)
-    if not told and OF_ONE.match(parts[0]) and IT.search(kept[len(parts[0]) :]):
+    if parts and not told and OF_ONE.match(parts[0]) and IT.search(kept[len(parts[0]) :]):
         plain = IDLE.sub("", parts[0])
         one = [c for c in chunks_of(plain, standing) if {*c.kinds} & DEMANDING]
         if len(one) == 1 and "robots" in one[0].kinds:  # "robot 2 looks odd, move it up"

@@ -1,5 +1,6 @@
 """From a frame to edits that follow from the last ones: more of it, less, the other way, not so."""
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,6 +25,26 @@ RELATIVE = (
     *("mirror", "swap"),
 )
 """Kinds that are done again on top of themselves."""
+FURTHER = re.compile(r"\b(?:further|farther)(?: please)?\W*$", re.IGNORECASE)
+"""Without a word for where to, it is on in the direction of the last move."""
+
+
+def _latest(said: Said, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
+    """The last edits of one of these kinds: of robots that moved one by one, all that did."""
+    edits = [dict(e) for e in said.last]
+    while edits and edits[-1]["kind"] not in kinds:
+        edits.pop()
+    alike = [k for k, e in enumerate(edits) if e["kind"] != edits[-1]["kind"]]
+    return edits[alike[-1] + 1 if alike else 0 :] if edits and "robot" in edits[-1] else edits[-1:]
+
+
+def further_on(slots: Slots, said: Said) -> Effects:
+    """ "A bit further", after a robot was moved or all were turned: on in that direction."""
+    kinds = {e["kind"] for e in _latest(said)}
+    slots.has("radial", "again")
+    if not kinds or kinds - {"place", "rotate"}:
+        return None
+    return more(slots, said) if FURTHER.search(said.words) else None
 
 
 def again(slots: Slots, said: Said) -> Effects:
@@ -36,13 +57,22 @@ def again(slots: Slots, said: Said) -> Effects:
 
 def more(slots: Slots, said: Said) -> Effects:
     """More of the last change; without an amount as much again."""
-    last = next(
-        (e for e in reversed(said.last) if e["kind"] in (*RELATIVE, "opening", "distance")), None
-    )
-    if last is None:
+    last = _latest(said, (*RELATIVE, "opening", "distance"))
+    if not last:
         return ask("More of what?", "a bit further out", "a bit closer", "one more robot")
-    amount = _again(last, slots, said)
-    return None if amount is None else [amount]
+    amounts = [_again(edit, slots, said) for edit in last]
+    found = [amount for amount in amounts if amount is not None]
+    return found if len(found) == len(last) else None
+
+
+def more_of(slots: Slots, said: Said) -> Effects:
+    """More of the last change, for some of the robots it was about."""
+    named = {r for robots in slots["robots"] for r in robots}
+    slots.has("make", "move")
+    placed = [e for e in _latest(said) if e.get("robot") in named]
+    amounts = [_again(edit, slots, said) for edit in placed]
+    found = [amount for amount in amounts if amount is not None]
+    return found if len(found) == len(named) else None
 
 
 def _again(last: Effect, slots: Slots, said: Said) -> Effect | None:
@@ -105,12 +135,11 @@ def less_by(slots: Slots, said: Said) -> Effects:
 def less(slots: Slots, said: Said) -> Effects:
     """Half of the last change taken back, however it is said."""
     slots.has("much", "ratio", "back")
-    kinds = (*RELATIVE, "opening")
-    last = next((e for e in reversed(said.last) if e["kind"] in kinds), None)
-    halved = None if last is None else _scaled(last, -0.5)
-    if halved is None:
+    last = _latest(said, (*RELATIVE, "opening"))
+    halved = [half for edit in last if (half := _scaled(edit, -0.5)) is not None]
+    if not halved or len(halved) < len(last):
         return ask("Less of what?", "a bit closer", "take one robot away")
-    return [halved]
+    return halved
 
 
 def _scaled(edit: Effect, share: float) -> Effect | None:
@@ -149,15 +178,15 @@ def _scaled(edit: Effect, share: float) -> Effect | None:
 def otherway(slots: Slots, said: Said) -> Effects:
     """The last change the other way; with an amount, so much of it back."""
     turning = (*RELATIVE, "opening", "sides", "heading")
-    last = next((e for e in reversed(said.last) if e["kind"] in turning), None)
-    if last is None:
+    last = _latest(said, turning)
+    if not last:
         return ask('"The other way" of what?', "turn it left", "turn it right")
     if "much" in slots:
         return less(slots, said)
-    other = _turned(last)
-    if other is None:
+    other = [turned for edit in last if (turned := _turned(edit)) is not None]
+    if len(other) < len(last):
         return None
-    return corrected([last], [other]) if last["kind"] in RELATIVE else [other]
+    return corrected(last, other) if last[-1]["kind"] in RELATIVE else other
 
 
 def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
@@ -166,8 +195,10 @@ def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
     found = [e for e in back if e is not None]
     if len(found) < len(back):
         return [{"kind": "undo", "steps": 1}, *edits]
-    if len(found) == len(edits) == 1:
-        return _merged(found[0], edits[0])
+    if len(found) == len(edits) and (len(edits) == 1 or all("robot" in e for e in edits)):
+        return [
+            e for first, then in zip(found[::-1], edits, strict=True) for e in _merged(first, then)
+        ]
     return [*found, *edits]
 
 
@@ -221,7 +252,7 @@ def toofar(slots: Slots, said: Said) -> Effects:
     if "dir" in slots:
         back = {"left": "right", "right": "left", "up": "down", "down": "up"}[slots["dir"][0]]
         return shift(Slots({"dir": [back], "much": ["bit"]}), said)
-    last = next((e for e in reversed(said.last) if e["kind"] in RELATIVE), None)
+    last = next(iter(_latest(said)), None)
     _, denied, side = str(slots["toofar"][0]).rpartition("not ")
     way = {"far": "out", "near": "in"}[side]
     if last is not None and (

@@ -203,9 +203,9 @@ class _Reader:
 
     def _every(self, at: int) -> tuple[dict[str, Any], int] | None:
         """Every second robot, every third one, the odd ones."""
-        step = 2 if self.plain[at] != "every" else table_of("ordinals").get(self.plain[at + 1], 0)
-        step = 2 if self.plain[at : at + 2] == ["every", "other"] else step
-        end = at + 1 + (self.plain[at] == "every")
+        every, rank = self.plain[at] == "every", "".join(self.plain[at + 1 : at + 2])
+        step = 2 if not every or rank == "other" else table_of("ordinals").get(rank, 0)
+        end = at + 1 + every
         end += self.plain[end : end + 1] == ["numbered"]
         if step < 2 or self.plain[end : end + 1] not in [[w] for w in (*EACH, *word_set("robots"))]:
             return None

@@ -7,6 +7,7 @@ asked about, quoting what was not understood. Nothing said is left out.
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from .accounting import read_instruction
@@ -19,6 +20,7 @@ from .followup import Followup, Kind
 from .followup_edits import Effect, listed
 from .followup_last import RELATIVE, corrected
 from .followup_places import meant_by_place, numbered
+from .followup_recent import all_or_those, with_numbers
 from .followup_things import impossible
 from .followup_words import Chunk, rules, word_set
 from .spelling import spelled
@@ -71,8 +73,12 @@ DEFAULTS = (("spacing", "even"), ("fit", "normal"))
 
 def read_followup(words: str, standing: Standing | None) -> Followup:
     """What is meant by words that are said when a plan stands, or talk that fits at any time."""
-    if standing is None or not standing.places:
+    if standing is None:
         return _heard(words, standing)
+    words = with_numbers(words, standing)
+    if not standing.places:
+        read = partial(_heard, standing=standing)
+        return all_or_those(words, read(words), standing, read)
     told = numbered(standing)
     robots = meant_by_place(words, told, lambda text: _is_settled(_heard(text, told)))
     if robots.tied:
@@ -82,7 +88,7 @@ def read_followup(words: str, standing: Standing | None) -> Followup:
     if moved and words != robots.words:
         text = f'Which robot is meant in "{words}" may change on the way. Say it in two turns.'
         return Followup("ask", text=text, about="tied")
-    return meant
+    return all_or_those(words, meant, standing, partial(_heard, standing=told))
 
 
 def _is_settled(followup: Followup) -> bool:

@@ -112,8 +112,10 @@ def _after_verb(words: Sequence[str], start: int, end: int) -> int:
     """Where a thing begins behind a verb nobody knows: "desired around" the court."""
     opens = (k for k in range(start, end) if words[k] in _lists()["determiners"])
     first = next(opens, start)
+    if first == start:
+        return start
     verb = words[start].endswith(("ed", "ing")) or words[start - 1] in _lists()["before_verbs"]
-    leads = first > start and words[first - 1] in _lists()["leading"]
+    leads = words[first - 1] in _lists()["leading"]
     return first if verb and leads else start
 
 

@@ -1,6 +1,7 @@
 """Follow-ups as operators type them to the edits, answers and questions that they mean."""
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any, get_args
@@ -8,9 +9,12 @@ from typing import Any, get_args
 import pytest
 import yaml
 from formup.agent.offline.followup import Followup
+from formup.agent.offline.followup_words import rules
 from formup.agent.offline.followups import read_followup
 from formup.agent.offline.standing import Standing
 from formup.tools.formation.editing.edit_kinds import Edit
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 EDIT: TypeAdapter[Any] = TypeAdapter(Edit)
@@ -120,3 +124,13 @@ def test_what_is_not_understood_is_quoted() -> None:
     assert '"further out" is clear' in followup.text
     assert '"paint"' in followup.text
     assert followup.options == ("further out",)
+
+
+SALAD = st.lists(st.sampled_from(sorted({*re.findall(r"[a-z']+|[0-9]+", repr(rules()).lower())})))
+
+
+@settings(deadline=None, max_examples=150)
+@given(SALAD.map(" ".join), st.sampled_from(sorted(TABLE["scenes"])))
+def test_any_words_of_the_rules_are_read_without_a_crash(words: str, scene: str) -> None:
+    for followup in (read_followup(words, standing(scene)), read_followup(words, None)):
+        assert followup.text or followup.kind not in ("ask", "refuse")
