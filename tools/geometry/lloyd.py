@@ -1,9 +1,8 @@
 """Lloyd's iteration to a centroidal Voronoi tessellation, on a square grid of cells.
 
-A step searches again only for the cells whose nearest robot may have changed: each cell has an
-upper bound on the distance to its own robot and a lower bound on that to any other (Hamerly 2010).
-Within half the distance from its robot to the next one, no other robot is nearer.
-Frame: image pixels, x right, y down.
+A step searches again only for cells whose nearest robot may have changed, by an upper bound on the
+distance to the own robot and a lower bound on that to any other (Hamerly 2010); none is nearer
+within half the way from the robot to its neighbour. Frame: image pixels, x right, y down.
 """
 
 import math

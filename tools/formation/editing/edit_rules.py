@@ -1,7 +1,7 @@
-"""What each kind of edit does to one group of a formation: new places and new demands.
+"""Edits of one group of a formation: new places and new fields for each kind of edit.
 
-Maps of the plane and shifts along a curve take every robot with them; only where places are new
-does the least sum of squared ways decide. Frame: image pixels, x right, y down.
+Maps of the plane and shifts along a curve take every robot along; only if places are new does the
+least sum of squared distances decide who goes where. Frame: image pixels, x right, y down.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,7 +25,7 @@ def _offset(part: Part, edit: Offset) -> Part:
     group = part.group
     if group.stands_beside:
         return beside(part, _by(edit, part.offset - part.radius, inward=False))
-    if group.solves_clearance:  # how far apart they stand gives way
+    if group.solves_clearance:  # the pitch gives way
         clearance = exact_clearance(group, part.offset - part.radius)
         group = group.model_copy(update={"clearance": clearance, **without_pitch(group)})
         part = replace(part, group=group)
@@ -48,7 +48,7 @@ def _offset(part: Part, edit: Offset) -> Part:
     least, greatest = (round(max(bound + by, 0.0), DECIMALS) for bound in group.clearance)
     if group.clearance[1] >= MAX_LENGTH:
         stated, greatest = group.clearance[0], MAX_LENGTH
-        if by < 0 and clearance + by >= stated:  # "at least so far" holds on
+        if by < 0 and clearance + by >= stated:  # "at least" still holds
             least = stated
         elif by < 0 and edit.px is None:
             raise ToolError(
@@ -66,10 +66,12 @@ def _offset(part: Part, edit: Offset) -> Part:
 
 
 def beside(part: Part, by: float) -> Part:
-    """Robots at places of their own further from a target, px: a form as it is, others each.
+    """Move robots placed independently `by` px further from their target.
+
+    A shape moves as a whole; robots at points move one by one.
 
     Raises:
-        ToolError: they would come upon it.
+        ToolError: they would come into contact with the target.
     """
     solid = part.site.outlines[part.group.targets[0]].filled
     if part.offset - part.radius + by <= 0:
@@ -83,13 +85,13 @@ def beside(part: Part, by: float) -> Part:
 
 
 def _resized(part: Part, factor: float, clearance: tuple[float, float]) -> Part:
-    """A circle of another radius about the same centre."""
+    """Scale a circle of robots about its centre."""
     points, radius = part.centre + (part.points - part.centre) * factor, part.group.radius or 0.0
     return part.to(points, radius=round(radius * factor, DECIMALS), clearance=clearance)
 
 
 def _by(edit: Offset, clearance: float, inward: bool) -> float:
-    """How much further from the outline, px; what is inside it goes out by going nearer."""
+    """Return how much further from the outline robots go, px; inside, out means nearer to it."""
     grows = (edit.kind == "out") != inward
     if edit.px is not None:
         return edit.px if grows else -edit.px
@@ -100,7 +102,7 @@ def _by(edit: Offset, clearance: float, inward: bool) -> float:
 def _beyond(
     part: Part, here: Track | None, by: float, clearance: tuple[float, float]
 ) -> FloatArray:
-    """Where robots stand with a new clearance, (n, 2)."""
+    """Return where robots stand with a new clearance, (n, 2)."""
     group, points = part.group.model_copy(update={"clearance": clearance}), part.points
     if here is not None:
         there = track_at(group, part.site, part.radius, here.offset + by)

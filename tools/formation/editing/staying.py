@@ -1,7 +1,7 @@
-"""Robots that are not to move while the others do.
+"""Keeps robots in place while the others move.
 
-Where a ring can be turned so that a robot that stays is on its place again, it is; else the robot
-stands at a point of its own from then on, and the others are edited without it.
+If a ring can be turned so that a held robot is at its place again, it is turned. Otherwise the
+robot stands at a point of its own from then on, and the others are edited without it.
 """
 
 from collections.abc import Collection
@@ -14,16 +14,16 @@ from .draft import Draft
 from .part import Part, at_points, skipped
 
 STILL = 0.5
-"""Px by which a robot that stays may miss its place on a curve, before it is put there."""
+"""A held robot that misses its place on a curve by at most this, px, is put back there."""
 
 
 def holding(draft: Draft, robots: Collection[int]) -> Draft:
-    """The draft in which robots are to stay; nobody is chosen to leave or go who does."""
+    """Return the draft with robots held, by number; none of them is chosen to leave or move."""
     return replace(draft, held=frozenset(draft.indices(robots).tolist()))
 
 
 def moved_in(draft: Draft, before: Draft) -> list[int]:
-    """The numbers of the robots that stay in a draft and have no place where they were."""
+    """Return the numbers of a draft's held robots that are not where they were before."""
     there = dict(zip(draft.was.tolist(), draft.points, strict=True))
     old = before.points
     gone = [i for i in draft.held if i not in there or (there[i] != old[i]).any()]
@@ -31,7 +31,7 @@ def moved_in(draft: Draft, before: Draft) -> list[int]:
 
 
 def settled(draft: Draft, before: Draft) -> Draft:
-    """The draft with its rings turned so that who stays is where they were, as far as that goes."""
+    """Return the draft with rings turned so that held robots are where they were, if possible."""
     if not draft.held:
         return draft
     return draft.with_parts(_turned_back(part, draft.held, before.points) for part in draft.parts)
@@ -54,9 +54,9 @@ def _turned_back(part: Part, held: frozenset[int], old: FloatArray) -> Part:
 
 
 def held(draft: Draft, robots: Collection[int]) -> Draft:
-    """The draft in which robots that stay stand at points of their own, out of their groups.
+    """Return the draft with held robots at points of their own, out of their groups.
 
-    Groups all of whose robots stay are left alone.
+    Groups whose robots are all held are left alone.
     """
     draft = holding(draft, robots)
     names = ", ".join(map(str, sorted(robots)))
@@ -66,10 +66,11 @@ def held(draft: Draft, robots: Collection[int]) -> Draft:
 
 
 def alone(draft: Draft, robots: Collection[int]) -> Draft:
-    """The draft in which robots stand at points of their own, and their places are empty.
+    """Return the draft with robots at points of their own and their old places empty.
 
     Args:
-        robots: their places in the formation before.
+        draft: the draft.
+        robots: the robots' indices in the formation before.
     """
     left: list[Part] = []
     singles: list[Part] = []
@@ -86,7 +87,7 @@ def alone(draft: Draft, robots: Collection[int]) -> Draft:
 
 
 def _unringed(part: Part) -> Part:
-    """A group of which a robot is taken out: its ring has a hole, and is no cage any more."""
+    """Return a group from which robots are taken out: with its ring broken, it is not a cage."""
     group = part.group
     hole = dict.fromkeys(("closure", "walls", "max_gap", "opening", "opening_towards"))
     relation = "around" if group.relation == "cage" else group.relation

@@ -79,9 +79,8 @@ def first_grid(body: Body, obstacles: Obstacles) -> Grid:
     x, y = np.meshgrid(np.arange(nx) + 0.5, np.arange(ny) + 0.5)
     centres = origin + np.stack([x.ravel(), y.ravel()], axis=1) * side
     domain = np.asarray(shapely.contains_xy(region, centres), dtype=np.bool_).reshape(x.shape)
-    even = (
-        np.pi * np.sqrt(2) * body.reach / side
-    )  # so that a turn by one cell moves the body about as far as a step
+    # With this many turns, a cell of theta moves the body about as far as a cell of x or y.
+    even = np.pi * np.sqrt(2) * body.reach / side
     turns = int(np.clip(np.ceil(even), MIN_TURNS, MAX_TURNS))
     return Grid(origin, side, turns, domain)
 
