@@ -36,10 +36,13 @@ def _of_part(part: Part) -> list[float | None]:
     if not isinstance(heading, str):
         return [heading % 360] * len(part.points)
     turned = 180.0 if heading == "away" else 0.0
-    return [round(math.degrees(math.atan2(y, x)) + turned, DECIMALS) % 360 for x, y in _ways(part)]
+    return [
+        round(math.degrees(math.atan2(y, x)) + turned, DECIMALS) % 360
+        for x, y in _look_vectors(part)
+    ]
 
 
-def _ways(part: Part) -> FloatArray:
+def _look_vectors(part: Part) -> FloatArray:
     """Return the vectors (n, 2) from each robot to the nearest point of the object it looks at.
 
     A robot on the object looks at its centre. If there is no object, robots look at their mean.

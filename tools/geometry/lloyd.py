@@ -90,7 +90,7 @@ class _Owners:
         self._cells = cells
         self.index: NDArray[np.intp] = np.zeros(len(cells), dtype=np.intp)
         self._other: FloatArray = np.full(len(cells), np.inf)  # no other point is nearer
-        self._ask(np.arange(len(cells)), points)
+        self._reassign(np.arange(len(cells)), points)
 
     def follow(self, points: FloatArray, furthest: float) -> None:
         """Update after the points have moved to new places, none further than `furthest` px."""
@@ -101,9 +101,9 @@ class _Owners:
         if len(points) > 1:  # within half the way from its point to the next, none is nearer
             halves = nearest(points, points, 2)[0][:, 1] / 2
             known = np.maximum(known, halves[self.index])
-        self._ask(np.flatnonzero(distance >= known * (1 - ROUNDING)), points)
+        self._reassign(np.flatnonzero(distance >= known * (1 - ROUNDING)), points)
 
-    def _ask(self, which: NDArray[np.intp], points: FloatArray) -> None:
+    def _reassign(self, which: NDArray[np.intp], points: FloatArray) -> None:
         if not len(which) or len(points) < 2:
             return
         distance, index = nearest(points, self._cells[which], 2)

@@ -8,7 +8,7 @@ from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import nearest
 from ..contract import nominal, pitch_slack
 from ..placement.ring_parts import opening_station, ring_line, sides_of
-from ..placement.spacing import NARROWEST, WIDEST, enough, stations_on
+from ..placement.spacing import NARROWEST, WIDEST, count_for_max_gap, stations_on
 from .verdict import TOLERANCE, Audit, Part
 
 IntArray = NDArray[np.intp]
@@ -65,7 +65,9 @@ def no_wider(part: Part, curve: Curve, audit: Audit) -> None:
         audit.greatest("widest_opening_px", wide.max())
     for k in np.flatnonzero(wide > limit + TOLERANCE):
         i, j = part.first + one[k], part.first + other[k]
-        audit.find("opening", wide[k], limit, robot=i, others=(j,), needed=enough(part, curve))
+        audit.find(
+            "opening", wide[k], limit, robot=i, others=(j,), needed=count_for_max_gap(part, curve)
+        )
 
 
 def opening_left(part: Part, curve: Curve, audit: Audit) -> None:

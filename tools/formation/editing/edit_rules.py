@@ -17,14 +17,16 @@ from ..placement.pitch import pitch_places
 from .edit_forms import DECIMALS
 from .edit_kinds import Offset, SideOnly
 from .moving import rigid
-from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
+from .part import ON_CURVE, RING, Part, assigned_slots, check_room, without_pitch
 from .respacing import Track, feet_on, moved_out, pushed, track, track_at
 
 
 def _offset(part: Part, edit: Offset) -> Part:
     group = part.group
     if group.stands_beside:
-        return beside(part, _by(edit, part.offset - part.radius, inward=False))
+        return moved_from_target(
+            part, _distance_change(edit, part.offset - part.radius, inward=False)
+        )
     if group.solves_clearance:  # the pitch gives way
         clearance = exact_clearance(group, part.offset - part.radius)
         group = group.model_copy(update={"clearance": clearance, **without_pitch(group)})
@@ -39,7 +41,7 @@ def _offset(part: Part, edit: Offset) -> Part:
     here = track(group, part.points, part.site, part.radius) if group.relation in ON_CURVE else None
     nearest_px = here.offset if here else float(distances(base, part.points).min())
     clearance = nearest_px - part.radius
-    by = _by(edit, clearance, inward)
+    by = _distance_change(edit, clearance, inward)
     if clearance + by <= 0:
         raise ToolError(
             f"{part.site.length(-by)} nearer to the outline of {group.targets[0]} is too much: "
@@ -58,14 +60,16 @@ def _offset(part: Part, edit: Offset) -> Part:
             )
     if group.radius is not None:
         return _resized(part, (group.radius + by) / group.radius, (least, greatest))
-    moved = part.to(_beyond(part, here, by, (least, greatest)), clearance=(least, greatest))
+    moved = part.to(
+        _places_at_clearance(part, here, by, (least, greatest)), clearance=(least, greatest)
+    )
     if here is None or group.pitch is not None or moved.certified or not part.certified:
         return moved
     even = moved.evenly_at(moved.group, here.offset + by)
     return even if even.certified else moved
 
 
-def beside(part: Part, by: float) -> Part:
+def moved_from_target(part: Part, by: float) -> Part:
     """Move robots placed independently `by` px further from their target.
 
     A shape moves as a whole; robots at points move one by one.
@@ -90,7 +94,7 @@ def _resized(part: Part, factor: float, clearance: tuple[float, float]) -> Part:
     return part.to(points, radius=round(radius * factor, DECIMALS), clearance=clearance)
 
 
-def _by(edit: Offset, clearance: float, inward: bool) -> float:
+def _distance_change(edit: Offset, clearance: float, inward: bool) -> float:
     """Return how much further from the outline robots go, px; inside, out means nearer to it."""
     grows = (edit.kind == "out") != inward
     if edit.px is not None:
@@ -99,7 +103,7 @@ def _by(edit: Offset, clearance: float, inward: bool) -> float:
     return clearance * (factor - 1 if grows else 1 / factor - 1)
 
 
-def _beyond(
+def _places_at_clearance(
     part: Part, here: Track | None, by: float, clearance: tuple[float, float]
 ) -> FloatArray:
     """Return where robots stand with a new clearance, (n, 2)."""
@@ -110,14 +114,14 @@ def _beyond(
         if group.pitch is not None:
             slots = pitch_places(group, there.curve, part.site)
             if len(slots) == len(points):
-                return slots[taken(points, slots)]
+                return slots[assigned_slots(points, slots)]
         return moved_out(points, here, there)
     if group.relation == "corners":
         outline = part.site.outlines[group.targets[0]]
         corners = corner_points(outline, group.robots)
         return pushed(outline.filled, points, corners[nearest(corners, points, 1)[1]], by)
     slots = part.placed(len(points), clearance=clearance)
-    return slots[taken(points, slots)]
+    return slots[assigned_slots(points, slots)]
 
 
 def _to_side(part: Part, edit: SideOnly) -> Part:

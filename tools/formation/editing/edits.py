@@ -20,7 +20,7 @@ from .edit_kinds import Count, Edit, Spacing
 from .edit_rules import RULES
 from .off_things import off_things
 from .ring_rules import RING_RULES
-from .staying import held, holding, moved_in, settled
+from .staying import displaced_robots, with_held, with_held_at_points, with_rings_turned_back
 from .team_rules import TEAM_RULES
 
 
@@ -62,23 +62,23 @@ def edited(
     """
     with search_budget():
         start = draft_of(plan, site)
-        draft = settled(_edited_by(holding(start, stay), edits), start)
-        if moved_in(draft, start):
-            draft = _edited_by(held(start, stay), edits)
-        if astray := moved_in(draft, start):
+        draft = with_rings_turned_back(_apply_edits(with_held(start, stay), edits), start)
+        if displaced_robots(draft, start):
+            draft = _apply_edits(with_held_at_points(start, stay), edits)
+        if astray := displaced_robots(draft, start):
             names = " and ".join(map(str, astray))
             raise ToolError(f"Robot {names} cannot stay where it is and take part in that.")
         contract = draft.agreed()
         after = make_plan(contract, site, version(contract), draft.points)
         after = off_things(after, draft, plan.formation.points, {edit.kind for edit in edits})
-    after = after.model_copy(update={"verdict": _called_by_id(after.verdict, draft)})
+    after = after.model_copy(update={"verdict": _with_robot_numbers(after.verdict, draft)})
     names = plan.formation.robot_of_place
     robots = tuple(None if i < 0 else names[i] for i in map(int, draft.was))
     return Edited(plan=after, parent=plan.id, robots=robots)
 
 
-def _edited_by(draft: Draft, edits: Sequence[Edit]) -> Draft:
-    for edit in _apart_that_fit(edits):
+def _apply_edits(draft: Draft, edits: Sequence[Edit]) -> Draft:
+    for edit in _merge_spacing_into_count(edits):
         if edit.kind in TEAM_RULES:
             draft = TEAM_RULES[edit.kind](draft, edit)
             continue
@@ -87,7 +87,7 @@ def _edited_by(draft: Draft, edits: Sequence[Edit]) -> Draft:
     return draft
 
 
-def _apart_that_fit(edits: Sequence[Edit]) -> Sequence[Edit]:
+def _merge_spacing_into_count(edits: Sequence[Edit]) -> Sequence[Edit]:
     """Merge a spacing into a count of as many robots as fit, as their least distance."""
     fit = next((e for e in edits if isinstance(e, Count) and e.robots == "fit"), None)
     apart = next((e for e in edits if isinstance(e, Spacing) and e.px is not None), None)
@@ -97,7 +97,7 @@ def _apart_that_fit(edits: Sequence[Edit]) -> Sequence[Edit]:
     return [both if edit is fit else edit for edit in edits if edit is not apart]
 
 
-def _called_by_id(verdict: Verdict, draft: Draft) -> Verdict:
+def _with_robot_numbers(verdict: Verdict, draft: Draft) -> Verdict:
     """Return the verdict with robots numbered as the person numbers them, and the draft's notes."""
     used = set(draft.numbers)
     free = (n for n in count(1) if n not in used)

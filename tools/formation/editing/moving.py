@@ -23,7 +23,7 @@ from ..placement.ring_parts import opening_way
 from .draft import Draft
 from .edit_forms import DECIMALS, Affine, form_after
 from .edit_kinds import Mirror, Rotate, Scale, Shift
-from .part import ON_CURVE, Part, at_points, free_targets, taken
+from .part import ON_CURVE, Part, assigned_slots, at_points, free_targets
 
 HELD_TO = {
     "wrong_side": "on their side of {thing}",
@@ -60,7 +60,7 @@ OPPOSITE: Mapping[str, Mapping[str, SideName]] = {
 ROUND = frozenset({"around", "cage", "corners", "inside", "centre"})
 
 
-def carried_out(draft: Draft, edit: Rotate | Mirror | Shift | Scale) -> Draft:
+def moved_groups(draft: Draft, edit: Rotate | Mirror | Shift | Scale) -> Draft:
     """Return the draft with groups moved, under their demands or as free places with a note."""
     for k in draft.chosen(edit):
         old = draft.parts[k]
@@ -86,16 +86,16 @@ def _moved(part: Part, edit: Rotate | Mirror | Shift | Scale) -> tuple[Part, tup
     if findings and isinstance(edit, Mirror):
         there = _on_curve(there, part)
     elif part.group.relation not in ROUND and any(f.kind == "on_target" for f in findings):
-        there = _beside(there, part) if isinstance(edit, Rotate | Scale) else there
+        there = _moved_off_target(there, part) if isinstance(edit, Rotate | Scale) else there
     findings = there.findings if findings else ()
-    kept = _kept(part, edit) if findings else set[str]()
+    kept = _binding_findings(part, edit) if findings else set[str]()
     if not findings or any(f.kind in kept or f.kind not in HELD_TO for f in findings):
         slid = _slid(part, edit) if findings and isinstance(edit, Shift) else None
         return slid or there, ()
     return _freed(there), findings
 
 
-def _kept(part: Part, edit: Rotate | Mirror | Shift | Scale) -> set[str]:
+def _binding_findings(part: Part, edit: Rotate | Mirror | Shift | Scale) -> set[str]:
     """Return the kinds of findings that a group is not freed of: those on stated lengths.
 
     Those on gaps matter only to scaling, as other motions preserve gaps.
@@ -150,7 +150,7 @@ def _on_curve(image: Part, old: Part) -> Part:
     return image
 
 
-def _beside(part: Part, old: Part) -> Part:
+def _moved_off_target(part: Part, old: Part) -> Part:
     """Move a form, rotated or scaled onto its target, off it to its distance before."""
     way = part.points.mean(axis=0) - part.centre
     if not free_targets(part.group) or not way.any():
@@ -180,7 +180,7 @@ def _rotated(part: Part, degrees: float) -> Part:
     if here is not None and here.curve.closed and here.holds(part.points):
         arc = here.clockwise * here.curve.length * degrees / 360
         points = here.at(here.stations(part.points) + arc)
-        return part.to(here.settled(points, distances(here.base, part.points)))
+        return part.to(here.at_distances(points, distances(here.base, part.points)))
     quarters = degrees / 90
     if part.group.opens or (part.group.sides and abs(quarters - round(quarters)) < 1e-9):
         return part.on_ring(part.valid_group(**_ring_turned(part, degrees)))
@@ -236,7 +236,7 @@ def _shifted(part: Part, edit: Shift) -> Part:
     usual = has_default_clearance(group, part.site.outlines, part.site.room, part.radius)
     if group.clearance is None or group.relation not in ("around", "cage") or not usual:
         return there
-    off, (least, greatest) = _edges_off(there), group.clearance
+    off, (least, greatest) = _edge_clearances(there), group.clearance
     if off.min() <= 0:
         return there
     least, greatest = min(least, float(off.min())), max(greatest, float(off.max()))
@@ -281,7 +281,7 @@ def scaled(part: Part, factor: float) -> Part:
     group = there.group
     if group.clearance is None or not group.targets:
         return there
-    old, new = (_edges_off(p) for p in (part, there))
+    old, new = (_edge_clearances(p) for p in (part, there))
     if min(old.min(), new.min()) <= 0:
         return there  # on the outline: the verdict says so
     if group.radius is not None:
@@ -293,7 +293,7 @@ def scaled(part: Part, factor: float) -> Part:
     return there.to(there.points, clearance=(least, greatest))
 
 
-def _edges_off(part: Part) -> FloatArray:
+def _edge_clearances(part: Part) -> FloatArray:
     """Return how far robots' edges are from the outline, (n,), px; negative on the wrong side."""
     outline = part.site.outlines[part.group.targets[0]]
     within = np.asarray(shapely.intersects_xy(outline.polygon, part.points))
@@ -311,7 +311,7 @@ def rigid(part: Part, linear: FloatArray, origin: FloatArray, to: FloatArray) ->
         moved = replace(part, group=group, points=points)
         if anew:
             slots = moved.placed(len(points))
-            moved = replace(moved, points=slots[taken(points, slots)])
+            moved = replace(moved, points=slots[assigned_slots(points, slots)])
         return moved
     if part.group.line is None:
         return part.to(points)

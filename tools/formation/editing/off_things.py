@@ -19,7 +19,7 @@ from ..placement.caging import escape_proof
 from ..placement.place import Site
 from ..plan import Plan, make_plan
 from .draft import Draft
-from .part import ON_CURVE, IntArray, Part, taken
+from .part import ON_CURVE, IntArray, Part, assigned_slots
 from .respacing import Track
 
 EXACT = frozenset({"rotate", "mirror", "shift", "scale", "swap", "skip", "place", "heading"})
@@ -67,7 +67,9 @@ def _rearranged(plan: Plan, draft: Draft, site: Site) -> Plan:
     if off is plan:
         return plan
     contract, points, slots = plan.formation.contract, plan.formation.points, off.formation.points
-    order = np.concatenate([mine[taken(points[mine], slots[mine])] for mine in _members(draft)])
+    order = np.concatenate(
+        [mine[assigned_slots(points[mine], slots[mine])] for mine in _members(draft)]
+    )
     stays = np.isin(draft.was, list(draft.held))
     if (slots[order][stays] != points[stays]).any():
         return plan
@@ -114,9 +116,9 @@ class _Slides:
             if line is None or not len(bad):
                 continue
             for i in map(int, bad):
-                self._take(self._alone(line, mine, i))
+                self._take(self._slide_one(line, mine, i))
             if self._on(self._best.formation.points[bad]).any() and self._free[mine].all():
-                self._take(self._together(line, mine, points[mine]))
+                self._take(self._slide_all(line, mine, points[mine]))
         return self._best
 
     def _take(self, ways: Iterator[FloatArray]) -> None:
@@ -134,7 +136,7 @@ class _Slides:
                 self._best = plan
                 return
 
-    def _alone(self, line: Track, mine: IntArray, i: int) -> Iterator[FloatArray]:
+    def _slide_one(self, line: Track, mine: IntArray, i: int) -> Iterator[FloatArray]:
         """Yield arrangements with one robot at other places of its curve, nearest first."""
         points = self._best.formation.points
         reach = REACH * line.curve.length / len(mine)
@@ -146,7 +148,7 @@ class _Slides:
             if not len(apart) or apart.min() >= self._floor:
                 yield way
 
-    def _together(self, line: Track, mine: IntArray, points: FloatArray) -> Iterator[FloatArray]:
+    def _slide_all(self, line: Track, mine: IntArray, points: FloatArray) -> Iterator[FloatArray]:
         """Yield all robots of a curve slid equally, by fewest on objects, then least motion."""
         ways = [_slid(line, points, s) for s in _shifts(REACH * line.curve.length / len(mine))]
         for own in sorted(ways, key=lambda way: int(self._on(way).sum())):
@@ -173,4 +175,4 @@ def _slid(line: Track, points: FloatArray, by: float) -> FloatArray:
     """Slide robots (n, 2) along a curve by a length, px, keeping their distance from the target."""
     ends = (-np.inf, np.inf) if line.curve.closed else (0.0, line.curve.length)
     there = line.at(np.clip(line.stations(points) + by, *ends))
-    return there if line.base.is_empty else line.settled(there, distances(line.base, points))
+    return there if line.base.is_empty else line.at_distances(there, distances(line.base, points))

@@ -142,7 +142,7 @@ class Part:
         """Move its robots to the places of another group, assigned by least motion."""
         there = replace(self, group=group)
         slots = there.placed(len(self.points))
-        return replace(there, points=slots[taken(self.points, slots)])
+        return replace(there, points=slots[assigned_slots(self.points, slots)])
 
     def evenly_at(self, group: Group, offset: float) -> "Part":
         """Spread its robots evenly on the curve of another group at an offset of centres, px."""
@@ -150,7 +150,7 @@ class Part:
         check_room(self, there)
         slots, takes = respaced(there, self.points, len(self.points))
         if not there.curve.closed:
-            takes = taken(self.points, slots)
+            takes = assigned_slots(self.points, slots)
         return replace(self, group=group, points=slots[takes])
 
     def on_ring(self, group: Group) -> "Part":
@@ -248,10 +248,10 @@ def slots_for(part: Part, count: int) -> tuple[FloatArray, IntArray]:
         check_room(part, here)
         return respaced(here, part.points, count)
     slots = part.placed(count)
-    return slots, taken(part.points, slots)
+    return slots, assigned_slots(part.points, slots)
 
 
-def taken(points: FloatArray, slots: FloatArray) -> IntArray:
+def assigned_slots(points: FloatArray, slots: FloatArray) -> IntArray:
     """Assign each robot one of as many slots or more by least sum of squares; indices, (n,)."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist

@@ -18,7 +18,16 @@ from ..placement.group_conflicts import Stand
 from .draft import Draft
 from .edit_kinds import Arrange, Merge, Target
 from .moving import rigid
-from .part import ON_CURVE, IntArray, Part, check_known, closed_up, skipped, slots_for, taken
+from .part import (
+    ON_CURVE,
+    IntArray,
+    Part,
+    assigned_slots,
+    check_known,
+    closed_up,
+    skipped,
+    slots_for,
+)
 
 Leave = Callable[[Part, FloatArray], Part]
 KEPT = ("targets", "heading", "min_spacing", "max_gap", "pitch")
@@ -58,7 +67,7 @@ def more_of(part: Part, n: int, coming: Part | None = None) -> Part:
     slots, takes = slots_for(part, len(part.points) + n)
     new = np.setdiff1d(np.arange(len(slots)), takes)
     if coming is not None:
-        new = new[taken(coming.points, slots[new])]
+        new = new[assigned_slots(coming.points, slots[new])]
     was = np.full(n, -1, dtype=np.intp) if coming is None else coming.was
     return replace(part.to(slots[np.concatenate([takes, new])]), was=np.append(part.was, was))
 
@@ -123,10 +132,10 @@ def _taken_to(part: Part, to: str) -> Part:
         there = replace(part, group=group.model_copy(update={"targets": (to,)}))
         moved = rigid(part, np.eye(2), part.centre, there.centre)
         return moved.to(moved.points, targets=(to,))
-    return _as_near(part, part.demanding(_retargeted(part, to)))
+    return _at_same_distance(part, part.demanding(_retargeted(part, to)))
 
 
-def _as_near(part: Part, group: Group) -> Part:
+def _at_same_distance(part: Part, group: Group) -> Part:
     """Place a group at its new target, at the same distance as before if there is room."""
     usual = group.clearance
     if usual is not None and group.relation in ON_CURVE and group.pitch is None:
@@ -153,7 +162,7 @@ def targeted(draft: Draft, edit: Target) -> Draft:
         if not chosen:
             raise ToolError(f"The robots are at {edit.to} already.")
         return _all_to(draft, chosen, edit.to)
-    going = _going(draft, edit)
+    going = _robots_to_move(draft, edit)
     first = next(p for p in draft.parts if np.isin(p.was, going).any())
     where = {int(i): point for i, point in zip(draft.was, draft.points, strict=True)}
     coming = replace(first, points=np.array([where[int(i)] for i in going]), was=going)
@@ -165,7 +174,7 @@ def targeted(draft: Draft, edit: Target) -> Draft:
         for k, part in enumerate(others):
             if (part.group.relation, part.group.targets) == (group.relation, group.targets):
                 return left.with_each((k,), lambda part: more_of(part, len(going), coming))
-    return draft.with_parts((*others, _as_near(_beside_others(coming, others), group)))
+    return draft.with_parts((*others, _at_same_distance(_beside_others(coming, others), group)))
 
 
 def added_about(draft: Draft, number: int, n: int, to: str) -> Draft:
@@ -183,14 +192,16 @@ def added_about(draft: Draft, number: int, n: int, to: str) -> Draft:
     for k, part in enumerate(draft.parts):
         if (part.group.relation, part.group.targets) == (group.relation, group.targets):
             return draft.with_each((k,), lambda part: more_of(part, n))
-    return draft.with_parts((*draft.parts, _as_near(_beside_others(coming, draft.parts), group)))
+    return draft.with_parts(
+        (*draft.parts, _at_same_distance(_beside_others(coming, draft.parts), group))
+    )
 
 
 def _beside_others(part: Part, others: Sequence[Part]) -> Part:
     return replace(part, beside=tuple(Stand(p.group, p.points) for p in others))
 
 
-def _going(draft: Draft, edit: Target) -> IntArray:
+def _robots_to_move(draft: Draft, edit: Target) -> IntArray:
     """Return who goes to another target: the robots named, or as many of those nearest to it."""
     if isinstance(edit.robots, tuple):
         return draft.indices(edit.robots)

@@ -67,7 +67,7 @@ class Track:
         """1.0 if arc length grows clockwise as seen in the picture, else -1.0."""
         return 1.0 if LinearRing(self.curve.lines[0]).is_ccw else -1.0  # y points down
 
-    def settled(self, points: FloatArray, apart: FloatArray) -> FloatArray:
+    def at_distances(self, points: FloatArray, apart: FloatArray) -> FloatArray:
         """Move points of the polyline exactly to distances that it only approximates, (n, 2).
 
         Args:
@@ -111,12 +111,14 @@ def moved_out(points: FloatArray, old: Track, new: Track) -> FloatArray:
         return slots[_ordered(new, points, slots)]
     stations, share = old.stations(points), new.curve.length / old.curve.length
     if not loops:
-        return new.settled(new.at(stations * share), apart + by)
+        return new.at_distances(new.at(stations * share), apart + by)
     anchor = int(np.argmax(apart <= old.offset + OFF_TRACK))
     foot = feet_on(old.base, points[anchor : anchor + 1])
     start = new.stations(pushed(old.base, points[anchor : anchor + 1], foot, by))[0]
     turn = new.clockwise * old.clockwise
-    return new.settled(new.at(start + turn * share * (stations - stations[anchor])), apart + by)
+    return new.at_distances(
+        new.at(start + turn * share * (stations - stations[anchor])), apart + by
+    )
 
 
 def pushed(base: BaseGeometry, points: FloatArray, origins: FloatArray, by: float) -> FloatArray:
@@ -167,7 +169,7 @@ def respaced(here: Track, points: FloatArray, count: int) -> tuple[FloatArray, I
     takes = np.empty(len(points), dtype=np.intp)
     takes[order] = taken % count
     slots = here.at(phase + step * np.arange(count, dtype=float))
-    return here.settled(slots, np.full(count, here.offset)), takes
+    return here.at_distances(slots, np.full(count, here.offset)), takes
 
 
 def _fitted(

@@ -21,7 +21,7 @@ from ..contract import (
 from ..placement.pitch import pitch_offset
 from .edit_forms import DECIMALS
 from .edit_kinds import Closure, Distance, Heading, Opening, Sides, Spacing
-from .edit_rules import beside
+from .edit_rules import moved_from_target
 from .moving import QUARTERS, scaled
 from .part import ON_CURVE, RING, Part, check_room, without_pitch
 from .respacing import moved_out, track, track_at
@@ -43,7 +43,7 @@ def _distant(part: Part, edit: Distance) -> Part:
     """Move all robots straight to a distance if their curve allows that; else place them anew."""
     group = part.group
     if group.stands_beside:
-        return beside(part, edit.px + part.radius - part.offset)
+        return moved_from_target(part, edit.px + part.radius - part.offset)
     clearance = exact_clearance(group, edit.px)
     if group.relation == "centre":  # at a distance from an object means around it
         demands = {"relation": "around", "targets": group.targets, "heading": group.heading}

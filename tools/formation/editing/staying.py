@@ -17,12 +17,12 @@ STILL = 0.5
 """A held robot that misses its place on a curve by at most this, px, is put back there."""
 
 
-def holding(draft: Draft, robots: Collection[int]) -> Draft:
+def with_held(draft: Draft, robots: Collection[int]) -> Draft:
     """Return the draft with robots held, by number; none of them is chosen to leave or move."""
     return replace(draft, held=frozenset(draft.indices(robots).tolist()))
 
 
-def moved_in(draft: Draft, before: Draft) -> list[int]:
+def displaced_robots(draft: Draft, before: Draft) -> list[int]:
     """Return the numbers of a draft's held robots that are not where they were before."""
     there = dict(zip(draft.was.tolist(), draft.points, strict=True))
     old = before.points
@@ -30,7 +30,7 @@ def moved_in(draft: Draft, before: Draft) -> list[int]:
     return sorted(map(draft.number, gone))
 
 
-def settled(draft: Draft, before: Draft) -> Draft:
+def with_rings_turned_back(draft: Draft, before: Draft) -> Draft:
     """Return the draft with rings turned so that held robots are where they were, if possible."""
     if not draft.held:
         return draft
@@ -45,7 +45,7 @@ def _turned_back(part: Part, held: frozenset[int], old: FloatArray) -> Part:
         if here.curve.closed and here.holds(points) and here.holds(wanted):
             by = here.stations(wanted) - here.stations(points[mine])
             turned = here.at(here.stations(points) + by)
-            points = here.settled(turned, distances(here.base, points))
+            points = here.at_distances(turned, distances(here.base, points))
     near = np.linalg.norm(points[mine] - wanted, axis=1) <= STILL
     if not near.all():
         return part
@@ -53,19 +53,19 @@ def _turned_back(part: Part, held: frozenset[int], old: FloatArray) -> Part:
     return part.to(points)
 
 
-def held(draft: Draft, robots: Collection[int]) -> Draft:
+def with_held_at_points(draft: Draft, robots: Collection[int]) -> Draft:
     """Return the draft with held robots at points of their own, out of their groups.
 
     Groups whose robots are all held are left alone.
     """
-    draft = holding(draft, robots)
+    draft = with_held(draft, robots)
     names = ", ".join(map(str, sorted(robots)))
     who = f"Robot {names} stays" if len(robots) == 1 else f"Robots {names} stay"
     note = f"{who} as it is, by itself." if len(robots) == 1 else f"{who} as they are."
-    return replace(alone(draft, draft.held), notes=(*draft.notes, note))
+    return replace(at_own_points(draft, draft.held), notes=(*draft.notes, note))
 
 
-def alone(draft: Draft, robots: Collection[int]) -> Draft:
+def at_own_points(draft: Draft, robots: Collection[int]) -> Draft:
     """Return the draft with robots at points of their own and their old places empty.
 
     Args:
@@ -81,12 +81,12 @@ def alone(draft: Draft, robots: Collection[int]) -> Draft:
             continue
         singles.append(at_points(part, mine))
         if not mine.all():
-            rest = skipped(_unringed(part), part.points[~mine])
+            rest = skipped(_without_closure(part), part.points[~mine])
             left.append(replace(rest, was=part.was[~mine]))
     return draft.with_parts([*left, *singles])
 
 
-def _unringed(part: Part) -> Part:
+def _without_closure(part: Part) -> Part:
     """Return a group from which robots are taken out: with its ring broken, it is not a cage."""
     group = part.group
     hole = dict.fromkeys(("closure", "walls", "max_gap", "opening", "opening_towards"))

@@ -37,11 +37,11 @@ from .edit_kinds import (
     Skip,
     Swap,
 )
-from .moving import carried_out
+from .moving import moved_groups
 from .part import ON_CURVE, Part, check_known, closed_up, skipped, without_pitch
 from .regrouping import added_about, arranged, left_of, merged, more_of, targeted, without
 from .ring_rules import closed, ringed
-from .staying import alone
+from .staying import at_own_points
 
 EXACT = 0.01
 """How far inside its limits, px, a corrected distance is kept."""
@@ -143,15 +143,15 @@ def _needed(part: Part) -> int:
 
 
 def _with_as_many_as_fit(draft: Draft, k: int, px: float | None) -> Draft:
-    loose = draft.with_each((k,), lambda part: _loosened(part, px))
-    for count in range(_fitting(loose.parts[k]), 0, -1):
+    loose = draft.with_each((k,), lambda part: _with_least_spacing(part, px))
+    for count in range(_capacity_estimate(loose.parts[k]), 0, -1):
         fits = _with_count(loose, k, count)
         if "too_close" not in {f.kind for f in fits.parts[k].findings}:
             return fits
     return _with_count(loose, k, 1)
 
 
-def _loosened(part: Part, px: float | None) -> Part:
+def _with_least_spacing(part: Part, px: float | None) -> Part:
     """Return the group with its pitch replaced by a least spacing, `px` or its own.
 
     Without `px`, a group is changed only if its clearance follows from its pitch.
@@ -166,7 +166,7 @@ def _loosened(part: Part, px: float | None) -> Part:
     return replace(part, group=part.valid_group(**demands))
 
 
-def _fitting(part: Part) -> int:
+def _capacity_estimate(part: Part) -> int:
     """Return an upper estimate of how many robots fit into a group's place at its spacing.
 
     Raises:
@@ -201,14 +201,14 @@ def _placed(draft: Draft, edit: Place) -> Draft:
     (index,) = draft.indices((edit.robot,))
     before = len(draft.parts)
     if edit.stays is None:
-        draft = alone(draft, (int(index),))
+        draft = at_own_points(draft, (int(index),))
     k = next(k for k, part in enumerate(draft.parts) if index in part.was)
     part = draft.parts[k]
     i = int(np.flatnonzero(part.was == index)[0])
     points = part.points.copy()
     if edit.target is not None:
         check_known(edit.target, draft.site)
-        points[i] = _beside(part, points[i], edit.target)
+        points[i] = _nearest_beside(part, points[i], edit.target)
     else:
         points[i] = edit.to if edit.to is not None else points[i] + np.asarray(edit.by)
     if edit.stays == "near":
@@ -238,7 +238,7 @@ def _allowed_near(part: Part, point: FloatArray) -> FloatArray:
     return foot + (near - foot) * np.clip(off, least + slack, most - slack) / off if off else near
 
 
-def _beside(part: Part, point: FloatArray, name: str) -> FloatArray:
+def _nearest_beside(part: Part, point: FloatArray, name: str) -> FloatArray:
     """Return the place beside an object that is nearest to a robot, (2,)."""
     outline, group = part.site.outlines[name], part.group
     clearance = default_clearance(outline, part.site.room, part.radius)
@@ -270,5 +270,5 @@ TEAM_RULES: Mapping[str, Callable[..., Draft]] = {
     "arrange": arranged,
     "place": _placed,
     "keep-out": _kept_off,
-    **dict.fromkeys(("rotate", "mirror", "shift", "scale"), carried_out),
+    **dict.fromkeys(("rotate", "mirror", "shift", "scale"), moved_groups),
 }

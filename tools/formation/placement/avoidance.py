@@ -74,7 +74,7 @@ class _Search:
         sure += [region.buffer(TOUCHING) for region in hard]
         self._regions = [shapely.union_all(regions) for regions in (hard, sure, faint)]
 
-    def _bad(self, points: FloatArray) -> NDArray[np.bool_]:
+    def _violations(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return in which ways each of the places (n, 2) is bad: a mask (n, 4), as in `Cost`."""
         hard, sure, faint = (
             np.full(len(points), np.inf) if region.is_empty else distances(region, points)
@@ -84,7 +84,7 @@ class _Search:
         return np.stack([hard <= self._radius, sure < on, sure < near, faint < on], axis=1)
 
     def _cost(self, points: FloatArray) -> Cost:
-        return tuple(self._bad(points).sum(axis=0).tolist())
+        return tuple(self._violations(points).sum(axis=0).tolist())
 
     def rearrange(self, group: Group, mine: slice) -> None:
         """Adopt the cheapest certified arrangement found for a group's robots, if it is better."""
@@ -94,20 +94,20 @@ class _Search:
         costs = sorted((self._cost(way), k) for k, way in enumerate(ways))
         for _, k in [c for c in costs if c[0] < before][: self._left // 2]:
             points[mine] = ways[k]
-            if self._accepts(points):
+            if self._adopt_if_better(points):
                 return
 
     def nudge(self) -> None:
         """Move robots that still stand on a hard keep-out or a sure object off it, one by one."""
-        bad = self._bad(self.best.formation.points)[:, :NEAR].any(axis=1)
+        bad = self._violations(self.best.formation.points)[:, :NEAR].any(axis=1)
         for i in map(int, np.flatnonzero(bad)):
             points = self.best.formation.points
             for place in self._places_near(points, i)[: max(self._left, 0)]:
                 points[i] = place
-                if self._accepts(points):
+                if self._adopt_if_better(points):
                     break
 
-    def _accepts(self, points: FloatArray) -> bool:
+    def _adopt_if_better(self, points: FloatArray) -> bool:
         """Adopt the places as the best plan if they make a better one; return whether they do."""
         before, self._left = self.best, self._left - 1
         if self._cost(points) >= self._cost(before.formation.points):
@@ -139,7 +139,7 @@ class _Search:
                 at = own + shift
                 if new.closed or (at.min() >= 0 and at.max() <= new.length):
                     yield interpolate(line, at % new.length if new.closed else at)
-            bad = self._bad(interpolate(line, steps))[:, : NEAR + 1].any(axis=1)
+            bad = self._violations(interpolate(line, steps))[:, : NEAR + 1].any(axis=1)
             begins = np.flatnonzero(np.roll(bad, 1) & ~bad).tolist() if new.closed else [0]
             for begin in begins:
                 free = np.cumsum(~np.roll(bad, -begin))
@@ -167,7 +167,7 @@ class _Search:
         turns = np.arange(TURNS) * (2 * math.pi / TURNS)
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         places = points[i] + (reach[:, None, None] * ways).reshape(-1, 2)
-        free = ~self._bad(places).any(axis=1)
+        free = ~self._violations(places).any(axis=1)
         free &= shapely.intersects_xy(self._site.frame(self._radius).box, places)
         others = np.delete(points, i, axis=0)
         if len(others):

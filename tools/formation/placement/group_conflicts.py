@@ -50,7 +50,7 @@ class CrowdedError(PlacementError):
         self.first, self.second = first, second
 
 
-def need(first: Group, second: Group) -> float:
+def least_distance(first: Group, second: Group) -> float:
     """Return the least distance between robots of two groups, px."""
     return max(first.min_spacing or 0.0, second.min_spacing or 0.0)
 
@@ -65,22 +65,26 @@ def conflict(stand: Stand, earlier: Sequence[Stand]) -> tuple[int, float, float]
         if not len(other.points) or not len(stand.points):
             continue
         apart = float(nearest(other.points, stand.points, 1)[0].min())
-        least = need(stand.group, other.group)
+        least = least_distance(stand.group, other.group)
         if apart < least * NEARLY:
             return index, apart, least
     return None
 
 
-def clear(points: FloatArray, group: Group, earlier: Sequence[Stand]) -> NDArray[np.bool_]:
+def clear_of_earlier(
+    points: FloatArray, group: Group, earlier: Sequence[Stand]
+) -> NDArray[np.bool_]:
     """Return a mask (n,) of a group's places (n, 2) far enough from robots of earlier groups."""
     kept = np.ones(len(points), dtype=bool)
     for other in earlier:
         if len(other.points) and len(points):
-            kept &= nearest(other.points, points, 1)[0] >= need(group, other.group) * NEARLY
+            kept &= (
+                nearest(other.points, points, 1)[0] >= least_distance(group, other.group) * NEARLY
+            )
     return kept
 
 
-def slid(curve: Curve, n: int) -> Iterator[FloatArray]:
+def shifted_places(curve: Curve, n: int) -> Iterator[FloatArray]:
     """Yield n places evenly along a curve, starting at one phase of a gap after another."""
     if curve.length <= 0:
         return
@@ -101,7 +105,7 @@ def slid(curve: Curve, n: int) -> Iterator[FloatArray]:
         )
 
 
-def without(
+def region_left_by(
     outline: Outline, group: Group, earlier: Sequence[Stand], margin: float
 ) -> Outline | None:
     """Return what the robots of earlier groups leave of a region; None if nothing is left.
@@ -115,7 +119,7 @@ def without(
     discs = [
         shapely.buffer(
             shapely.multipoints(other.points),
-            max(need(group, other.group) - margin, LEAST_DISC),
+            max(least_distance(group, other.group) - margin, LEAST_DISC),
             quad_segs=DISC_SEGMENTS,
         )
         for other in earlier

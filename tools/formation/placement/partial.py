@@ -58,15 +58,15 @@ def best_partial(
         return make_plan(smaller, site, scene_version)
 
     with search_budget():
-        fewer = None if refusal is None else _fewer(full, attempt)
-        found = fewer or _nearer(contract, full, attempt, site)
+        fewer = None if refusal is None else _with_fewer_robots(full, attempt)
+        found = fewer or _at_smaller_clearance(contract, full, attempt, site)
         if found is None or found.partial is None or not cut_short():
             return found
         short = found.partial.model_copy(update={"sentence": found.partial.sentence + CUT_SHORT})
         return found.model_copy(update={"partial": short})
 
 
-def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
+def _with_fewer_robots(full: Contract, attempt: Attempt) -> Plan | None:
     """Return a partial plan with as many robots as fit, reducing group after group, or None."""
     smaller, names = full, list(range(len(full.groups)))
     for _ in range(ROUNDS):
@@ -168,7 +168,9 @@ def _shortfall(full: Contract, smaller: Contract, names: list[int]) -> Shortfall
     return Shortfall(asked=asked, placed=placed, sentence=sentence)
 
 
-def _nearer(stated: Contract, full: Contract, attempt: Attempt, site: Site) -> Plan | None:
+def _at_smaller_clearance(
+    stated: Contract, full: Contract, attempt: Attempt, site: Site
+) -> Plan | None:
     """Return a partial plan with the greatest clearance that can be held in some group, or None.
 
     The first group for which this succeeds is reduced. A ring all the way round is preferred to a

@@ -26,7 +26,14 @@ from ..contract import CENTRE_SHARE, DIRECTIONS, OUTSIDE, Contract, Group, nomin
 from ..site import CapacityError, Site, most_that_fit
 from .caging import caged_places, escape_proof
 from .figure import figure_of, place_figure
-from .group_conflicts import CrowdedError, Stand, clear, conflict, slid, without
+from .group_conflicts import (
+    CrowdedError,
+    Stand,
+    clear_of_earlier,
+    conflict,
+    region_left_by,
+    shifted_places,
+)
 from .pitch import pitch_offset, pitch_places
 from .ring_parts import ring_of
 
@@ -87,7 +94,7 @@ def stand_of(
     clash = conflict(stand, earlier)
     solid = _foreign(contract, group, site)
     if clash is not None or _stands_on(solid, stand.points, contract.robot_radius):
-        return _elsewhere(contract, stand, earlier, site, clash, sound)
+        return _alternative_stand(contract, stand, earlier, site, clash, sound)
     return stand
 
 
@@ -192,7 +199,7 @@ def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
     return REFLEX * group.offsets(radius)[1] + short
 
 
-def _elsewhere(
+def _alternative_stand(
     contract: Contract,
     stand: Stand,
     earlier: list[Stand],
@@ -210,7 +217,7 @@ def _elsewhere(
     """
     group, radius = stand.group, contract.robot_radius
     solid = _foreign(contract, group, site)
-    for points in _otherwise(group, earlier, site, radius):
+    for points in _alternative_places(group, earlier, site, radius):
         other = Stand(group, points)
         free = len(points) == group.robots and conflict(other, earlier) is None
         if free and not _stands_on(solid, points, radius) and sound(group, points):
@@ -221,7 +228,7 @@ def _elsewhere(
     raise CrowdedError(index, len(earlier), site.length(apart), site.length(least))
 
 
-def _otherwise(
+def _alternative_places(
     group: Group, earlier: list[Stand], site: Site, radius: float
 ) -> Iterator[FloatArray]:
     """Yield alternative places for a group that are equally good in themselves, if any."""
@@ -232,12 +239,12 @@ def _otherwise(
         yield _place_at_target(group, site, radius, earlier)[0]
     elif group.relation == "inside":
         least, greatest = group.offsets(radius)
-        left = without(site.visible(group.targets[0]), group, earlier, least)
+        left = region_left_by(site.visible(group.targets[0]), group, earlier, least)
         if left is not None:
             yield inside(left, n, least, greatest, spacing)
     else:
         for offset in _offsets(group, radius):
-            for points in slid(reference_curve(group, site, radius, offset), n):
+            for points in shifted_places(reference_curve(group, site, radius, offset), n):
                 if min_spacing(points) >= spacing * (1 - 1e-6):
                     yield points
 
@@ -312,7 +319,7 @@ def _place_at_target(
     crowd = sum(len(other.points) for other in earlier)
     points = near(around_point(outline.centre, n + min(crowd, n + MOST_AVOIDED), pitch))
     points = near(_drawn_in(points, site.frame(radius).box))
-    points = points[clear(points, group, earlier)][:n]
+    points = points[clear_of_earlier(points, group, earlier)][:n]
     return points, f"within {site.length(most, '.0f')} of the centre"
 
 
@@ -341,7 +348,7 @@ def _corner_places(
     near = np.linalg.norm(points - corners, axis=1) <= corner_reach(group, outline, radius)
     least = 0.0 if group.on_corners else group.offsets(radius)[0] - ROUNDING
     free = points[near & (distances(outline.filled, points) >= least)]
-    free = free[clear(free, group, earlier)]
+    free = free[clear_of_earlier(free, group, earlier)]
     if len(free) > group.robots:
         free = free[spread_subset(free, group.robots)]
     taken: list[FloatArray] = []

@@ -114,13 +114,14 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
     if not encloses and not escape_proof(part.group):
         about = part.group.targets[0]
         audit.find("not_enclosed", len(points), 3, about=about, unit="robots")
-    kind, needed = "opening" if curve.closed else "opening_at_border", enough(part, curve)
+    kind = "opening" if curve.closed else "opening_at_border"
+    needed = count_for_max_gap(part, curve)
     for k in np.flatnonzero(opening > allowed + TOLERANCE):
         robot, other = part.first + order[k], part.first + order[(k + 1) % len(order)]
         audit.find(kind, opening[k], allowed, robot=robot, others=(other,), needed=needed)
 
 
-def enough(part: Part, curve: Curve) -> int | None:
+def count_for_max_gap(part: Part, curve: Curve) -> int | None:
     """Return how many robots make openings as narrow as `max_gap`, if more robots are needed.
 
     None if more would not help, would be too close together, or the curve is not closed.

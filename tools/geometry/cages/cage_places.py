@@ -218,13 +218,13 @@ class _Slides:
                 for slide in SLIDES:
                     moved = chosen.copy()
                     moved[i] = (chosen[i] + slide) % len(self._rings[k])
-                    if self._apart(k, moved, i) and not self._leaks(k, moved, width - step):
+                    if self._keeps_spacing(k, moved, i) and not self._leaks(k, moved, width - step):
                         chosen, width = moved, self._width(k, moved, width - step)
             if width == before:
                 break
         return width, chosen
 
-    def _apart(self, k: int, chosen: list[int], i: int) -> bool:
+    def _keeps_spacing(self, k: int, chosen: list[int], i: int) -> bool:
         points = self._rings[k][chosen]
         away = np.linalg.norm(np.delete(points, i, axis=0) - points[i], axis=1)
         return bool(away.min() >= max(self._demand.spacing, 1e-9))
