@@ -1,1 +1,1 @@
-"""Contract and positions to a verdict, a certified plan and the motion that reaches it."""
+"""From a contract and positions to a verdict and a certified plan, and edits of such plans."""

@@ -1,9 +1,8 @@
-"""What an instruction demands of a formation, in a form code can check.
+"""What an instruction demands of a formation, in a form that code can check.
 
-A model (or a person) writes a Contract before anything is placed; the checker certifies
-positions against it. Lengths are pixels of the picture, or metres until `contract_in_pixels`;
-clearances are measured from the outline to the robot's edge, so a robot of radius r keeps its
-centre r further away.
+A model or a person writes a Contract before anything is placed; the checker certifies positions
+against it. Lengths are image pixels, or metres until `contract_in_pixels`; clearances run from the
+outline to the robot's edge, so a robot of radius r keeps its centre r further away.
 """
 
 import math
@@ -18,19 +17,20 @@ from .value import Value
 
 MAX_ROBOTS = 10_000
 MIN_SPACING = 2.0
-"""Centres of point robots nearer than this, px, are the same place."""
+"""Point robots whose centres are nearer than this, px, are in the same place."""
 CLEARANCE_SHARE, MIN_CLEARANCE = 0.16, 6.0
-"""Default clearance: this share of the target's size (square root of its area), at least 6 px."""
+"""Default clearance: this share of the target's size (square root of its area), and least value,
+px."""
 CORNER_SHARE, MIN_STANDOFF = 0.06, 3.0
 LEAST_SOLVED = 1.0
-"""Least clearance of a ring whose own follows from a radius or from how far apart robots stand."""
+"""Least clearance, px, of a ring whose clearance follows from its radius or its pitch."""
 INSIDE_SHARE = 0.05
 CENTRE_SHARE = 0.2
 PITCH_SHARE, PITCH_PX = 0.01, 0.5
-"""Neighbours an exact distance apart may differ from it by this share, at least half a pixel."""
+"""Tolerance of the distance of neighbours at an exact pitch: this share, at least PITCH_PX px."""
 
 EXACT_SHARE, EXACT_PX = 0.05, 1.0
-"""How exactly a clearance that is named to the pixel is held: within this share, at least 1 px."""
+"""Tolerance of a clearance stated exactly: this share of it, at least EXACT_PX px."""
 
 Relation = Literal[
     "around", "cage", "corners", "along", "inside", "between", "centre", "shape", "at"
@@ -43,7 +43,7 @@ RingPart = Literal[
 Fit = Literal["tight", "normal", "wide"]
 FIT_FACTOR = {"tight": 0.5, "normal": 1.0, "wide": 2.0}
 MAX_LENGTH = 100_000.0
-"""A greatest clearance of this is none: "at least"."""
+"""A greatest clearance of this, px, means that there is none, as in "at least"."""
 LOOKING = ("towards", "away")
 DIRECTIONS = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, -1.0), "bottom": (0.0, 1.0)}
 Length = Annotated[float, Field(ge=0, le=MAX_LENGTH, allow_inf_nan=False)]
@@ -98,7 +98,7 @@ class Group(Value):
 
     @property
     def keeps_clearance(self) -> bool:
-        """Whether a clearance says anything: of a shape, where a target gives it its place."""
+        """Whether a clearance applies; to a shape, if it is around, inside or beside a target."""
         if self.shape is not None:
             return self.shape.where not in (None, "on")
         return self.relation not in ("between", "centre", "shape", "at")
@@ -111,31 +111,31 @@ class Group(Value):
 
     @property
     def stands_beside(self) -> bool:
-        """Whether its robots have places of their own and only stay off a target."""
+        """Whether its robots are placed independently of its one target and only keep off it."""
         free = self.relation in ("shape", "at") and not self.keeps_clearance
         return free and not self.enters and len(self.targets) == 1
 
     @property
     def opens(self) -> bool:
-        """Whether an opening is to be left in its ring."""
+        """Whether its ring is to have an opening."""
         return self.opening is not None or self.opening_towards is not None
 
     @property
     def solves_clearance(self) -> bool:
-        """Whether the distance from the target follows from that of the robots on the ring."""
+        """Whether the distance from the target follows from the pitch of the robots on the ring."""
         whole = self.radius is None and self.sides is None and not self.opens
         return self.relation == "around" and self.pitch is not None and self.robots > 1 and whole
 
     @property
     def on_corners(self) -> bool:
-        """Whether its robots' centres are to be exactly at the corners."""
+        """Whether its robots' centres have to be exactly at the corners."""
         return self.relation == "corners" and self.clearance == (0, 0)
 
     def offsets(self, radius: float = 0.0) -> tuple[float, float]:
-        """Least and greatest distance of robots' centres from the outline, px.
+        """Return the least and greatest distance of robots' centres from the outline, px.
 
         Args:
-            radius: of a robot, px; for 0 that of their edges, the clearance.
+            radius: radius of a robot, px; 0 gives the distance of their edges, the clearance.
         """
         assert self.clearance is not None  # the contract's defaults are written out
         least, greatest = self.clearance
@@ -204,7 +204,7 @@ ONLY_IN = {
     "facing": ("along",),
     "shape": ("shape",),
 }
-"""The relations that a field of a group says something in, where those are not all."""
+"""The relations that a field of a group applies to, for fields that do not apply to all."""
 
 
 class Contract(Value):
@@ -232,12 +232,12 @@ class Contract(Value):
 
     @property
     def robots(self) -> int:
-        """Robots over all groups."""
+        """The number of robots over all groups."""
         return sum(group.robots for group in self.groups)
 
     @property
     def target_ids(self) -> tuple[str, ...]:
-        """Every target named, once, in order."""
+        """The ids of everything named, each once: targets and keep-outs, then what is faced."""
         named = [t for group in self.groups for t in group.targets] + list(self.keep_out)
         faced = [group.facing for group in self.groups if group.facing is not None]
         ways = [way for group in self.groups for way in (group.opening_towards, group.heading)]
@@ -246,25 +246,28 @@ class Contract(Value):
 
     @property
     def solid_targets(self) -> tuple[str, ...]:
-        """Targets no robot may stand on or drive over: those that no group is to enter."""
+        """Targets that no robot may stand on or drive over: those that no group enters."""
         entered = {t for g in self.groups if g.enters for t in g.targets}
         return tuple(t for t in self.target_ids if t in self.keep_out or t not in entered)
 
     @property
     def spacing_floor(self) -> float:
-        """Least distance of any two robots' centres, px: bodies must not overlap."""
+        """Least distance between any two robots' centres, px, at which bodies do not overlap."""
         return max(2 * self.robot_radius, MIN_SPACING)
 
 
 def broken_rules(error: ValidationError) -> str:
-    """What is wrong with the fields of a contract or group, in the words of its rules."""
+    """Return what is wrong with the fields of a contract or group, as its validators phrase it."""
     return "; ".join(e["msg"].removeprefix("Value error, ") for e in error.errors())
 
 
 def with_defaults(
     contract: Contract, outlines: Mapping[str, Outline], room: tuple[float, float]
 ) -> Contract:
-    """The contract with every length it leaves open written out, in a picture of a size in px."""
+    """Return the contract with all lengths it leaves open filled in.
+
+    `room` is the picture's width and height, px.
+    """
     groups = tuple(
         group.model_copy(update=_defaults(group, outlines, room, contract))
         for group in contract.groups
@@ -273,9 +276,9 @@ def with_defaults(
 
 
 def nominal(clearance: tuple[float, float]) -> float:
-    """The clearance aimed at within an allowed range, px: the geometric mean.
+    """Return the clearance to aim at within an allowed range, px: the geometric mean.
 
-    "At least" allows everything further out as well; no more than twice the least is aimed at.
+    "At least" allows any distance further out; the aim is then no more than twice the least.
     """
     least, greatest = clearance
     return math.sqrt(least * min(greatest, 4 * least)) if least > 0 else greatest / 2
@@ -284,21 +287,21 @@ def nominal(clearance: tuple[float, float]) -> float:
 def has_default_clearance(
     group: Group, outlines: Mapping[str, Outline], room: tuple[float, float], radius: float
 ) -> bool:
-    """Whether the clearance written out in a group is the one it has where none is named."""
+    """Return whether a group's clearance is the one it gets by default."""
     if group.clearance is None or not group.targets:
         return True
     return group.clearance == _default_range(group, outlines[group.targets[0]], room, radius)
 
 
 def default_clearance(outline: Outline, room: tuple[float, float], radius: float) -> float:
-    """0.16 of the target's size, at least 6 px, no more than the picture has room for."""
+    """Return 0.16 of the target's size, at least 6 px but no more than the picture has room for."""
     x0, y0, x1, y1 = outline.bounds
     widest = max(x0, y0, room[0] - 1 - x1, room[1] - 1 - y1) - 2 * radius
     return min(max(CLEARANCE_SHARE * outline.size, MIN_CLEARANCE), max(0.6 * widest, 1.0))
 
 
 def exact_clearance(group: Group, px: float) -> tuple[float, float]:
-    """The range that says a group's robots keep just so far from the outline; inside, at least."""
+    """Return the clearance range, px, for a distance stated exactly; for inside, "at least"."""
     if group.relation == "inside":
         return px, MAX_LENGTH
     slack = max(EXACT_PX, EXACT_SHARE * px)
@@ -331,7 +334,7 @@ def _least_pitch(group: Group) -> float:
 
 
 def pitch_slack(pitch: float) -> float:
-    """By how much neighbours at an exact distance may be nearer or further, px."""
+    """Return the tolerance, px, on the distance between neighbours at an exact pitch."""
     return max(PITCH_SHARE * pitch, PITCH_PX)
 
 

@@ -1,4 +1,4 @@
-"""Which other things are in a picture, and which of them robots stand on or drive over.
+"""Finds the other objects in a picture, and which of them robots stand on or drive over.
 
 Frame: image pixels, x right, y down.
 """
@@ -20,19 +20,24 @@ from .site import Other, Site, closed
 from .value import Value
 
 TOUCHING = 2.0
-"""A robot whose edge is nearer to a thing than this, px, may stand on it: outlines are so exact."""
+"""A robot whose edge is nearer to an object than this, px, may stand on it, as outlines are only
+this accurate."""
 ROOM_SHARE = 0.02
-"""The distance from things that is aimed at on the way, as a share of the picture's diagonal."""
+"""Distance that robots aim to keep from objects on their way, as a share of the picture's
+diagonal."""
 AT_BORDER = 1.0
-"""A robot whose edge is so near to the picture's border, px, is cut off by it."""
+"""A robot whose edge is nearer to the picture's border than this, px, counts as cut off by it."""
 SAME, SMALL = 0.2, 0.5
-"""Regions that share more than SAME of the smaller one are the same thing or one a part of the
-other; on a target that robots enter may stand what covers no more than SMALL of it."""
+"""Regions that share more than SAME of the smaller one are the same object, or one is part of the
+other. On a target that robots enter, a sure object below SMALL of its area stays separate."""
 MOST_NOTES, MOST_NAMED = 8, 12
 
 
 class Encounter(Value):
-    """Robots, by their ids, and a thing that they are not kept off, or the picture's border."""
+    """Robots, by id, and an object or the picture's border that they could not be kept off.
+
+    `how` is on or over (the object), or border.
+    """
 
     how: Literal["on", "over", "border"]
     robots: tuple[str, ...]
@@ -42,7 +47,7 @@ class Encounter(Value):
 
     @property
     def sentence(self) -> str:
-        """For people and models."""
+        """The encounter as a sentence for people and models."""
         s = "s" if len(self.robots) == 1 else ""
         more = ", ..." if len(self.robots) > MOST_NAMED else ""
         who = f"Robot{'' if s else 's'} {', '.join(self.robots[:MOST_NAMED])}{more}"
@@ -55,7 +60,7 @@ class Encounter(Value):
 
 
 def notes_of(encounters: Sequence[Encounter]) -> list[str]:
-    """Sentences that name robots and things, as many as anybody reads."""
+    """Return sentences on the first MOST_NOTES encounters, and one that counts the rest."""
     more = len(encounters) - MOST_NOTES
     rest = [f"The picture marks {more} more such things."] if more > 0 else []
     return [e.sentence for e in encounters[:MOST_NOTES]] + rest
@@ -64,12 +69,14 @@ def notes_of(encounters: Sequence[Encounter]) -> list[str]:
 def others_than(
     contract: Contract, outlines: Mapping[str, Outline], things: Iterable[Other]
 ) -> tuple[Other, ...]:
-    """The things that are no targets, parts of targets, or what targets lie on.
+    """Return the objects that are neither targets, nor parts of them, nor what targets lie on.
 
-    Their holes are filled, but those in which a target lies.
+    Their holes are filled, except those in which a target lies.
 
     Args:
-        things: of two that are the same the first is meant.
+        contract: tells which targets robots enter.
+        outlines: outlines of the targets, by id.
+        things: the objects found; of two that are the same, the first is used.
     """
     entered = {name for group in contract.groups if group.enters for name in group.targets}
     kept: list[Other] = []
@@ -86,23 +93,25 @@ def others_than(
 
 
 def _shared(one: Polygon, other: Polygon) -> float:
-    """The share of the smaller of two regions that lies in both."""
+    """Return the share of the smaller of two regions that lies in both."""
     return float(one.intersection(other).area) / min(one.area, other.area)
 
 
 def room_of(site: Site) -> float:
-    """The distance from other things that is aimed at on the way, px."""
+    """Return the distance that robots aim to keep from other objects on their way, px."""
     return max(ROOM_SHARE * math.hypot(*site.room), 2 * TOUCHING)
 
 
 def encounters_of(
     plan: Plan, site: Site, paths: Mapping[str, FloatArray], radius: float
 ) -> tuple[Encounter, ...]:
-    """What robots stand on or drive over that their contract does not name, and who is cut off.
+    """Return what robots stand on or drive over outside their contract, and who is cut off.
 
     Args:
-        paths: by robot, (k, 2) each, px.
-        radius: of a robot on its way, px.
+        plan: the formation.
+        site: with the other objects.
+        paths: the path of each robot by id, (k, 2), px.
+        radius: radius of a robot on its way, px.
     """
     formation, points = plan.formation, plan.formation.points
     body, names = formation.contract.robot_radius, formation.robot_of_place

@@ -1,4 +1,4 @@
-"""Which way robots look, as a contract has it: degrees clockwise as seen, 0 to the right."""
+"""Robots' headings according to a contract: degrees clockwise as seen, 0 to the right."""
 
 import math
 
@@ -11,13 +11,13 @@ from .contract import Contract
 from .site import Site
 
 DECIMALS = 3
-"""Headings are rounded to this many places of a degree."""
+"""Headings are rounded to this many decimals of a degree."""
 
 
 def headings_of(contract: Contract, points: FloatArray, site: Site) -> tuple[float | None, ...]:
-    """Degrees for each place, (n, 2), in the order of the groups, None where none was named.
+    """Return the heading at each of the points (n, 2), degrees, in the order of the groups.
 
-    Nothing at all where no group has a heading.
+    None where the group has no heading; an empty tuple if no group has one.
     """
     if all(group.heading is None for group in contract.groups):
         return ()
@@ -25,7 +25,7 @@ def headings_of(contract: Contract, points: FloatArray, site: Site) -> tuple[flo
 
 
 def off_heading(heading: float, wanted: float) -> float:
-    """How far one heading is from another, degrees, 0 to 180."""
+    """Return the difference between two headings, degrees, 0 to 180."""
     return abs((heading - wanted + 180) % 360 - 180)
 
 
@@ -36,13 +36,16 @@ def _of_part(part: Part) -> list[float | None]:
     if not isinstance(heading, str):
         return [heading % 360] * len(part.points)
     turned = 180.0 if heading == "away" else 0.0
-    return [round(math.degrees(math.atan2(y, x)) + turned, DECIMALS) % 360 for x, y in _ways(part)]
+    return [
+        round(math.degrees(math.atan2(y, x)) + turned, DECIMALS) % 360
+        for x, y in _look_vectors(part)
+    ]
 
 
-def _ways(part: Part) -> FloatArray:
-    """From each robot to what it looks at, (n, 2): of a thing the nearest point.
+def _look_vectors(part: Part) -> FloatArray:
+    """Return the vectors (n, 2) from each robot to the nearest point of the object it looks at.
 
-    A robot on the thing looks at its centre; where there is no thing, at the robots' middle.
+    A robot on the object looks at its centre. If there is no object, robots look at their mean.
     """
     group = part.group
     name = (

@@ -1,7 +1,7 @@
 """Numbers as people write and say them: "78", "a hundred and twenty", "two and a half dozen".
 
-Read here because no kept library reads dozens, halves, fractions and "a hundred" with their
-place in the text (text2num, the best of those tried, reads plain cardinals only).
+No maintained library reads dozens, halves, fractions and "a hundred" and gives their position in
+the text (text2num, the best of those tried, reads plain cardinals only).
 """
 
 import re
@@ -43,7 +43,7 @@ TENS = {
 } | {"fourty": 40}
 SCALES = {"hundred": 100, "thousand": 1_000, "million": 1_000_000}
 GROUPS = {"dozen": 12, "score": 20, "pair": 2, "couple": 2, "gross": 144, "trio": 3, "quartet": 4}
-"""Nouns that count: "three pairs of robots" are six."""
+"""Nouns that multiply a number: "three pairs of robots" are six."""
 PARTS = {"half": 2, "third": 3, "quarter": 4, "fifth": 5, "sixth": 6, "eighth": 8, "tenth": 10}
 SIGNS = {"\u00bd": 0.5, "\u00bc": 0.25, "\u00be": 0.75, "\u2153": 1 / 3, "\u2154": 2 / 3}
 DIGITS = (
@@ -54,7 +54,7 @@ DIGITS = (
 WEIGHED = (
     r"[0-9]{1,3}(?: [0-9]{3})+(?=[ -]?(?:k?g|k?grams?|kilos?|pounds?|lbs?|oz|ounces?|v|volts?)\b)"
 )
-"""No number in thousands: "8 200 gram robots" are eight."""
+"""A weight or voltage after a count, which is not one number: "8 200 gram robots" are eight."""
 ATOM = re.compile(
     rf"(?P<weighed>(?<![\w.,]){WEIGHED})|"
     rf"(?P<digits>(?<![\w.,])(?:{DIGITS})(?!\d|(?:st|nd|rd|th|d)\b))|(?P<sign>[\u00bd\u00bc\u00be\u2153\u2154])|"
@@ -65,11 +65,11 @@ ATOM = re.compile(
 
 @dataclass(frozen=True)
 class Number:
-    """A number that stands in a text, or a range of numbers.
+    """A number or range of numbers found in a text.
 
     Attributes:
-        least, most: the number; of a range its ends.
-        start, end: where it stands, first and past-the-last character.
+        least, most: the number twice, or the ends of a range.
+        start, end: indices of its first and past-the-last character.
     """
 
     least: float
@@ -79,7 +79,7 @@ class Number:
 
     @property
     def whole(self) -> int | None:
-        """A count: a whole number above 0 that is no range; else None."""
+        """The number if it is whole, above 0 and not a range, as a count is; else None."""
         value = round(self.least)
         exact = abs(value - self.least) < 1e-9 and self.most == self.least
         return value if exact and value > 0 else None
@@ -94,10 +94,10 @@ class _Atom:
 
 
 def numbers_in(text: str) -> tuple[Number, ...]:
-    """The numbers of a text in their order, read as far as they go.
+    """Return the numbers in a text in order, each read as far as it extends.
 
-    Ordinals, "no one" and "the one" are none. Sums, products and shares of a number come to one
-    number, "20-30" and "between 20 and 30" to a range, "25 \u00b1 2" too.
+    Ordinals, "no one" and "the one" are not numbers. Sums, products and fractions of a number give
+    one number; "20-30", "between 20 and 30" and "25 \u00b1 2" give a range.
     """
     atoms = [_Atom(m[0].lower(), str(m.lastgroup), m.start(), m.end()) for m in ATOM.finditer(text)]
     found: list[Number] = []
@@ -113,7 +113,7 @@ def numbers_in(text: str) -> tuple[Number, ...]:
 
 
 def _expression(atoms: Sequence[_Atom], at: int) -> tuple[Number, int] | None:
-    """A number with its sign, and what is added to it or spans a range with it."""
+    """Parse a number with its sign and what is joined to it by arithmetic or as a range."""
     read = _joined(atoms, at, bridging=True)
     if read is not None and _text(atoms, at) == "between" and read[0].least == read[0].most:
         return (
@@ -123,7 +123,7 @@ def _expression(atoms: Sequence[_Atom], at: int) -> tuple[Number, int] | None:
 
 
 def _joined(atoms: Sequence[_Atom], at: int, *, bridging: bool) -> tuple[Number, int] | None:
-    """The same; `bridging` is whether "and" may stand within the first number."""
+    """Parse as `_expression` does; `bridging` allows "and" within the first number."""
     start = at
     negative = _text(atoms, at) in ("minus", "-", "\u2212") and _begins(atoms, at)
     between = _text(atoms, at) == "between"
@@ -156,7 +156,7 @@ def _joined(atoms: Sequence[_Atom], at: int, *, bridging: bool) -> tuple[Number,
 
 
 def _begins(atoms: Sequence[_Atom], at: int) -> bool:
-    """Whether a minus sign is one: directly before the number, and joined to nothing before."""
+    """Return whether a sign is a minus: "minus", or next to the number and to nothing before it."""
     if atoms[at].text == "minus":
         return True
     close = at + 1 < len(atoms) and atoms[at].end == atoms[at + 1].start
@@ -166,7 +166,7 @@ def _begins(atoms: Sequence[_Atom], at: int) -> bool:
 def _quantity(
     atoms: Sequence[_Atom], at: int, *, bridging: bool = True
 ) -> tuple[float, int] | None:
-    """A number with its halves, and times the dozens, scores or pairs that it counts."""
+    """Parse a number with its fraction, times the dozens, scores or pairs that it counts."""
     if _text(atoms, at) in ("a", "an") and _text(atoms, at + 1) == "baker's":
         return (13.0, at + 3) if _text(atoms, at + 2) == "dozen" else None
     share = _share(atoms, at)
@@ -188,7 +188,7 @@ def _quantity(
 
 
 def _share(atoms: Sequence[_Atom], at: int) -> tuple[float, int] | None:
-    """Half a dozen, half of 40, two thirds of a (metre), three quarters of an hour."""
+    """Parse a fraction: half a dozen, half of 40, two thirds of a (metre), three quarters of an."""
     count, k = 1.0, at
     if _text(atoms, k) in ("a", "an", "one") and _text(atoms, k + 1) in PARTS:
         k += 1
@@ -221,7 +221,7 @@ def _and_a_half(atoms: Sequence[_Atom], value: float, at: int) -> tuple[float, i
 
 
 def _number(atoms: Sequence[_Atom], at: int, *, bridging: bool = True) -> tuple[float, int] | None:
-    """Digits, a fraction in digits, or a cardinal in words with what follows its point."""
+    """Parse digits, a fraction in digits, or a cardinal in words with its decimals."""
     if at >= len(atoms):
         return None
     atom = atoms[at]
@@ -231,7 +231,7 @@ def _number(atoms: Sequence[_Atom], at: int, *, bridging: bool = True) -> tuple[
         value, end = _after_point(atoms, 0.0, at)
         return (value, end) if end > at else None
     if atom.kind == "digits":
-        decimal = re.fullmatch(r"[0-9]+,[0-9]{1,2}", atom.text)  # as much of Europe writes it
+        decimal = re.fullmatch(r"[0-9]+,[0-9]{1,2}", atom.text)  # as in much of Europe
         plain = atom.text.replace(",", ".") if decimal else atom.text
         value = float(re.sub(r"[^0-9.e]", "", plain))
         if _text(atoms, at + 1) == "/" and at + 2 < len(atoms) and atoms[at + 2].kind == "digits":
@@ -243,7 +243,7 @@ def _number(atoms: Sequence[_Atom], at: int, *, bridging: bool = True) -> tuple[
 
 
 def _cardinal(atoms: Sequence[_Atom], at: int, bridging: bool) -> tuple[float, int] | None:
-    """Four hundred and twenty-one; one point five."""
+    """Parse a cardinal in words: four hundred and twenty-one; one point five."""
     total, current, k = 0, 0, at
     if _text(atoms, k) in ("a", "an") and _text(atoms, k + 1) in SCALES:
         current, k = 1, k + 1
@@ -260,7 +260,7 @@ def _cardinal(atoms: Sequence[_Atom], at: int, bridging: bool) -> tuple[float, i
 
 
 def _grown(current: int, word: str) -> int | None:
-    """A number below a thousand with one more word to it; None where the word does not fit."""
+    """Extend a number below a thousand by one more word; None if the word does not fit."""
     if word == "hundred":
         return current * 100 if 0 < current < 100 else None
     if word in TENS:
@@ -273,7 +273,7 @@ def _grown(current: int, word: str) -> int | None:
 
 
 def _bridges(atoms: Sequence[_Atom], at: int, whole: bool, begun: bool) -> bool:
-    """Whether "and" or a hyphen joins what follows to the number before it."""
+    """Return whether "and" or a hyphen joins what follows to the number before it."""
     if not begun or not _next_counts(atoms, at):
         return False
     word = _text(atoms, at)
@@ -281,7 +281,7 @@ def _bridges(atoms: Sequence[_Atom], at: int, whole: bool, begun: bool) -> bool:
 
 
 def _after_point(atoms: Sequence[_Atom], value: float, at: int) -> tuple[float, int]:
-    """The number with its decimals, where "point" and digits in words follow."""
+    """Return the number with its decimals, if "point" and digits in words follow."""
     if _text(atoms, at) != "point" or _text(atoms, at + 1) not in SMALL:
         return value, at
     at, scale = at + 1, 0.1

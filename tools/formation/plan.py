@@ -1,7 +1,7 @@
 """A certified formation as a value that can be stored, approved by its id, and deployed.
 
-The id is a hash of what would be driven to and why: positions, contract, robot radius and the
-scene version. Whoever approves an id approves exactly that; a changed scene voids the plan.
+The id is a hash of where robots would drive and why: positions, contract, robot radius and scene
+version. Approving an id approves exactly that; a changed scene voids the plan.
 """
 
 import hashlib
@@ -25,22 +25,22 @@ from .units import length_text
 from .value import Value
 
 DECIMALS = 3
-"""Positions are rounded to this many places of a pixel before they are certified."""
+"""Positions are rounded to this many decimals of a pixel before they are certified."""
 
 Point = tuple[float, float]
 
 
 class Formation(Value):
-    """N positions in robot order with the contract they are meant to satisfy.
+    """N positions in robot order, with the contract they are meant to satisfy.
 
     Attributes:
         positions: (x, y) px; positions[i] is where robots[i] is to stand.
-        robots: ids of the robots in the fleet's order; none until it is decided who goes where,
-            and positions are then in the order of the contract's groups.
-        members: for each group of the contract the indices of its robots, in the order of its
-            places; none as long as there are no robots.
-        headings_deg: for each position which way the robot looks, degrees clockwise from the
-            right, None where none was named; empty where the contract names none at all.
+        robots: ids of the robots in the fleet's order; empty until it is decided who goes where,
+            in which case positions are in the order of the contract's groups.
+        members: for each group of the contract, the indices of its robots in the order of its
+            places; empty while there are no robots.
+        headings_deg: for each position the robot's heading, degrees clockwise from the right, or
+            None if it has none; empty if the contract names no headings at all.
     """
 
     positions: tuple[Point, ...]
@@ -52,7 +52,7 @@ class Formation(Value):
 
     @property
     def id(self) -> str:
-        """The content hash that names the plan, `p-` and 10 hex digits."""
+        """The content hash that names the plan: `p-` and 10 hex digits."""
         return "p-" + _digest(self.model_dump(mode="json"))
 
     @property
@@ -70,7 +70,7 @@ class Formation(Value):
 
     @property
     def robot_of_place(self) -> tuple[str, ...]:
-        """Ids of the robots in the order of `points`; numbers from 1 where none were chosen."""
+        """Ids of the robots in the order of `points`; numbers from 1 if none were chosen."""
         if not self.robots:
             return tuple(str(i + 1) for i in range(len(self.positions)))
         return tuple(self.robots[i] for group in self.members for i in group)
@@ -94,7 +94,7 @@ class Shortfall(Value):
     sentence: str
 
     def short(self, metres_per_pixel: float | None) -> str:
-        """In a few words, such as `12 of 30`."""
+        """Return a short text, such as `12 of 30`."""
         if self.clearance is None or self.clearance_asked is None:
             return f"{self.placed} of {self.asked}"
         pair = (self.clearance[0], self.clearance_asked[0])
@@ -105,7 +105,7 @@ class Shortfall(Value):
 class Plan(Value):
     """A formation with its verdict; only a certified one may be deployed.
 
-    One that is partial is certified for less than was asked, and names what is missing.
+    A partial plan is certified for less than was asked for, and names what is missing.
     """
 
     formation: Formation
@@ -114,14 +114,14 @@ class Plan(Value):
 
     @property
     def id(self) -> str:
-        """The formation's content hash; of a partial plan also that of its shortfall."""
+        """The content hash of the formation, and for a partial plan also of its shortfall."""
         if self.partial is None:
             return self.formation.id
         content = [self.formation.model_dump(mode="json"), self.partial.model_dump(mode="json")]
         return "p-" + _digest(content)
 
     def for_robots(self, taking: Sequence[str], fleet: Sequence[str]) -> "Plan":
-        """The plan with robots named and its positions in the fleet's order.
+        """Return the plan with its robots assigned and its positions in the fleet's order.
 
         Args:
             taking: the id of the robot that takes each place, in the order of the groups.
@@ -147,14 +147,16 @@ class Plan(Value):
 def make_plan(
     contract: Contract, site: Site, scene_version: str, positions: ArrayLike | None = None
 ) -> Plan:
-    """Write out the contract's defaults, place the robots unless placed, and certify.
+    """Fill in the contract's defaults, place the robots unless positions are given, and certify.
 
     Args:
-        scene_version: of the scene the outlines were measured in.
-        positions: (N, 2) image pixels, in order over all groups; None to place them here.
+        contract: the contract, in px.
+        site: the outlines and the picture.
+        scene_version: version of the scene in which the outlines were measured.
+        positions: (N, 2) image pixels, in order over all groups; None to compute them.
 
     Raises:
-        ToolError: the positions are no pairs, or none were given and the contract cannot be met.
+        ToolError: the positions are not pairs, or none were given and the contract cannot be met.
     """
     full = with_defaults(contract, site.outlines, site.room)
 
@@ -185,6 +187,6 @@ def _digest(content: Any) -> str:
 def scene_version(
     picture_sha256: str, outlines: Mapping[str, object], metres_per_pixel: float | None = None
 ) -> str:
-    """Hash of what a certificate depends on: the picture, outlines by id, its scale if any."""
+    """Return a hash of what a certificate depends on: picture, outlines by id, scale if any."""
     scale = () if metres_per_pixel is None else (metres_per_pixel,)
     return "s-" + _digest([picture_sha256, dict(outlines), *scale])

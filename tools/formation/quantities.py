@@ -1,4 +1,4 @@
-"""Numbers and lengths in an instruction with their units: "25 dm", "half a metre", "10'"."""
+"""Parses numbers and lengths with units in an instruction: "25 dm", "half a metre", "10'"."""
 
 import re
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ UNITS: tuple[tuple[str, Kind, float], ...] = (
     (r"degrees?|deg|\u00b0", "degrees", 1.0),
     (r"per ?cent|%", "share", 0.01),
 )
-"""Spellings, what is measured, and how much of its unit one comes to."""
+"""Spellings of a unit, the kind of quantity, and the factor to that kind's unit."""
 UNIT = re.compile(
     rf"[\s-]*(?:{'|'.join(f'(?P<u{k}>{row[0]})' for k, row in enumerate(UNITS))})"
     r"(?![\w\u00b2\u00b3]|\s*(?:/|per\b))",
@@ -33,20 +33,20 @@ ONE = re.compile(
 SPLIT = re.compile(
     r"\b([0-9]+)\s?m\s?([0-9]{2})\b(?!\s*(?:px|pixels?|c?m|%|robots?)\b)", re.IGNORECASE
 )
-"""2m50."""
+"""A length written as "2m50"."""
 SHARES_OF = (" a", " an")
-"""Ends of numbers that are none without a unit: "half a circle"."""
+"""Endings of numbers that do not count without a unit: "half a circle"."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number with its unit, as it stands in a text.
+    """A number with its unit, found in a text.
 
     Attributes:
-        kind: "number" where it has no unit, "compound" in "four-wheeled".
-        least, most: in px, m, degrees, or as a share; alike where it is no range.
-        wording: as it is written.
-        start, end: first and past-the-last character.
+        kind: "number" if it has no unit, "compound" in words such as "four-wheeled".
+        least, most: the range, in px, m, degrees or as a share; equal if it is not a range.
+        wording: the text as written.
+        start, end: indices of its first and past-the-last character.
     """
 
     kind: Kind
@@ -58,18 +58,18 @@ class Quantity:
 
     @property
     def is_length(self) -> bool:
-        """Whether it is one, in px or metres."""
+        """Whether it is a length, in px or metres."""
         return self.kind in ("px", "m")
 
     @property
     def whole(self) -> int | None:
-        """A count: a whole number above 0 that is no range and has no unit; else None."""
+        """The number if it is whole, above 0, not a range and without a unit; else None."""
         if self.kind not in ("number", "compound"):
             return None
         return Number(self.least, self.most, self.start, self.end).whole
 
     def px(self, metres_per_pixel: float | None) -> tuple[float, float] | None:
-        """Least and most in pixels; None for metres in a picture without a scale."""
+        """Return least and most in pixels; None for metres in a picture without a scale."""
         if self.kind == "px":
             return self.least, self.most
         scale = metres_per_pixel
@@ -77,7 +77,7 @@ class Quantity:
 
 
 def quantities_in(text: str) -> tuple[Quantity, ...]:
-    """The quantities of a text in its order."""
+    """Return the quantities in a text, in order."""
     found = [_split(m) for m in SPLIT.finditer(text)]
     taken = [(q.start, q.end) for q in found]
     ones = [Number(1.0, 1.0, m.start(), m.end()) for m in ONE.finditer(text)]
@@ -89,7 +89,7 @@ def quantities_in(text: str) -> tuple[Quantity, ...]:
 
 
 def _ranges(text: str, found: Sequence[Quantity]) -> tuple[Quantity, ...]:
-    """The quantities; two that name the unit of each end of a range are one: "1 m to 2 m"."""
+    """Join quantities that are the two ends of a range, each with its unit: "1 m to 2 m"."""
     ranges: list[Quantity] = []
     for quantity in found:
         last = ranges[-1] if ranges else quantity

@@ -1,4 +1,4 @@
-"""What robots draw and where: the part of a contract that is about shapes."""
+"""The part of a contract about shapes: what robots draw, and where."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self
@@ -15,7 +15,7 @@ Coordinate = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False
 
 
 def numbers(count: int) -> WithJsonSchema:
-    """Schema of a fixed-length list; providers do not all know prefixItems."""
+    """Return the schema of a fixed-length list of numbers; some providers lack prefixItems."""
     return WithJsonSchema(
         {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
     )
@@ -26,7 +26,7 @@ Four = Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], numbers(
 Where = Literal["around", "inside", "on", "left", "right", "above", "below"]
 ENCLOSING: frozenset[Kind] = frozenset({"arc", "v", "u", "circle", "polygon", "star"})
 TOWARDS: dict[str, Opens] = {"left": "right", "right": "left", "above": "down", "below": "up"}
-"""Which way is towards the target from beside it."""
+"""The direction towards the target from each place beside it."""
 
 
 class ShapeSpec(Value):
@@ -47,7 +47,7 @@ class ShapeSpec(Value):
 
     @property
     def name(self) -> str:
-        """What people call it."""
+        """The name of the shape in texts for people."""
         return self.kind.upper() if self.kind in ("v", "u") else self.kind.replace("_", " ")
 
     @property

@@ -1,4 +1,4 @@
-"""Where positions are judged: the targets' outlines and the picture; what does not fit there."""
+"""The site that positions are judged in, outlines and picture, and errors for what does not fit."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -14,19 +14,19 @@ from .contract import Contract, Group
 from .units import length_text
 
 SURE = 0.55
-"""What was found with at least this confidence is a thing."""
+"""An object found with at least this confidence counts as certain."""
 WITHIN, ROOMY = 0.8, 0.7
-"""What is meant lies in a hole if more than WITHIN of it does, and has room there if it covers less
-than ROOMY of the hole; else the thing with the hole is what it lies on."""
+"""An outline lies in a hole if more than WITHIN of its area does, and has room there if its area is
+less than ROOMY of the hole's; otherwise it lies on the object that has the hole."""
 BLUR = 0.2
-"""How far off the outline of a thing of no confidence may be, as a share of its size."""
+"""Error of the outline of an object found with confidence 0, as a share of its size."""
 
 
 @dataclass(frozen=True)
 class Other:
-    """A thing in the picture that a contract does not name: robots keep off it where they can.
+    """An object in the picture that a contract does not name; robots keep off it if they can.
 
-    Its region is in px, holes and all, its confidence from 0 to 1.
+    Its region is in px and includes holes; its confidence is from 0 to 1.
     """
 
     id: str
@@ -36,17 +36,17 @@ class Other:
 
     @property
     def sure(self) -> bool:
-        """Whether it was found with confidence; else it may be no thing at all."""
+        """Whether it was found with confidence; otherwise there may be no object at all."""
         return self.confidence >= SURE
 
     @property
     def blur(self) -> float:
-        """How far off its outline may be, px."""
+        """The possible error of its outline, px."""
         return BLUR * (1 - self.confidence) * math.sqrt(self.region.area)
 
 
 def closed(region: Polygon, meant: Iterable[Outline]) -> Polygon:
-    """A region with its holes filled, but those in which something that is meant lies with room."""
+    """Fill a region's holes, except those in which an outline of `meant` lies with room."""
     solid = [outline.filled for outline in meant] if region.interiors else []
     holes = [Polygon(ring) for ring in region.interiors]
     open_ = [h for h in holes if any(_holds(h, r) for r in solid)]
@@ -62,8 +62,8 @@ def _holds(hole: Polygon, region: Polygon) -> bool:
 class Site:
     """What positions are judged in: the targets' outlines and the picture's size, px.
 
-    With metres per pixel, texts about positions give lengths in metres too. A certificate does not
-    depend on the others.
+    With metres per pixel, texts about positions give lengths in metres too. Certificates do not
+    depend on `others`.
     """
 
     outlines: Mapping[str, Outline]
@@ -80,14 +80,14 @@ class Site:
     def length(
         self, px: float | tuple[float, float], spec: str = ".1f", joint: str = " to "
     ) -> str:
-        """A length in px as texts show it, see `length_text`."""
+        """Format lengths in px as texts show them, see `length_text`."""
         return length_text(px, self.metres_per_pixel, spec, joint)
 
     def visible(self, name: str) -> Outline:
-        """The part of a target inside the picture.
+        """Return the part of a target inside the picture.
 
         Raises:
-            ToolError: there is none.
+            ToolError: it lies outside the picture.
         """
         outline = self.outlines[name]
         picture = shapely.box(-0.5, -0.5, self.width - 0.5, self.height - 0.5)  # whole pixels
@@ -99,35 +99,39 @@ class Site:
         return outline_of(seen)
 
     def solid(self, name: str, contract: Contract) -> Polygon:
-        """What of a target robots keep off: its holes too, where no other target lies in them."""
+        """Return the part of a target that robots keep off.
+
+        This includes its holes, except those in which another target lies with room.
+        """
         others = [self.outlines[other] for other in contract.target_ids if other != name]
         return closed(self.outlines[name].polygon, others)
 
     def frame(self, radius: float) -> Frame:
-        """Where robots of a radius stand wholly inside the picture."""
+        """Return the frame in which robots of a radius, px, stand wholly inside the picture."""
         return Frame(self.width, self.height, radius)
 
 
 MORE = 32
-"""Numbers tried above the estimate of how many robots fit."""
+"""How far above the estimate of how many robots fit the search begins."""
 
 
 def most_that_fit(fits: Callable[[int], bool], estimate: int, too_many: int) -> int:
-    """The greatest number of robots found that fit, a little above an estimate or below it.
+    """Return the greatest number of robots found to fit, from slightly above an estimate downwards.
 
-    Fewer robots do not always fit where more do: corners and tips that they take first may be
-    nearer to each other than the places that more of them share.
+    Returns 0 if none fit; `too_many` is known not to fit. Fewer robots do not always fit where more
+    do: the corners and tips that they take first may be nearer to each other than the places that
+    more robots share.
     """
     tried = range(min(too_many - 1, estimate + MORE), 0, -1)
     return next((n for n in tried if fits(n)), 0)
 
 
 class PlacementError(ToolError):
-    """The robots of a contract cannot all be placed; fewer, or nearer, may be."""
+    """Not all robots of a contract can be placed; fewer, or a nearer clearance, may be possible."""
 
 
 class CapacityError(PlacementError):
-    """A group has more robots than its place holds."""
+    """A group has more robots than fit; `fits` is how many do."""
 
     def __init__(self, group: Group, fits: int, why: str) -> None:
         noun = "robot fits" if fits == 1 else "robots fit"

@@ -1,6 +1,6 @@
-"""Metres and pixels of a picture taken straight from above: where the one becomes the other.
+"""Conversion between metres and pixels of a picture taken straight from above.
 
-All that is computed is pixels. A scale that differs from place to place would come in here.
+All computation is in pixels. A scale that varies over the picture would be handled here.
 """
 
 import math
@@ -16,16 +16,17 @@ FINEST, COARSEST = 1e-6, 1e3
 """Least and greatest metres per pixel: from a microscope's picture to a satellite's."""
 NO_SCALE = "this picture has no scale (metres per pixel)"
 DECIMALS_PX, STATED_PX = 2, 6
-"""Decimals of pixels: those that metres beside them tell apart, those kept of a contract's."""
+"""Decimals of a pixel: DECIMALS_PX that lengths in metres resolve, STATED_PX that a contract's
+lengths are rounded to."""
 LENGTHS = ("min_spacing", "max_gap", "pitch", "radius", "opening")
-"""Fields of a group that are one length."""
+"""Fields of a group that are a single length."""
 
 
 def check_scale(metres_per_pixel: float | None) -> None:
-    """Refuse what is no scale of a picture.
+    """Check a picture's scale, which may be None.
 
     Raises:
-        InputError: not a number from 0.000001 to 1000.
+        InputError: it is not a number from 0.000001 to 1000.
     """
     if metres_per_pixel is not None and not FINEST <= metres_per_pixel <= COARSEST:  # nan fails
         raise InputError(
@@ -35,15 +36,15 @@ def check_scale(metres_per_pixel: float | None) -> None:
 
 
 def in_pixels(length: float, unit: Unit | None, metres_per_pixel: float | None) -> float:
-    """A length in pixels; metres become at most 100,000 of them, with 6 decimals.
+    """Convert a length to pixels; metres give at most 100,000 px, rounded to 6 decimals.
 
     Args:
-        length: in the unit.
-        unit: None is px where there is no scale; where there is one, it has to be said.
-        metres_per_pixel: None where the picture has no scale.
+        length: the length, in `unit`.
+        unit: None means px if there is no scale; if there is one, a unit is required.
+        metres_per_pixel: None if the picture has no scale.
 
     Raises:
-        ToolError: metres without a scale, or no unit with one.
+        ToolError: metres are given without a scale, or no unit with one.
     """
     if unit == "m" and metres_per_pixel is None:
         raise ToolError(
@@ -57,14 +58,15 @@ def in_pixels(length: float, unit: Unit | None, metres_per_pixel: float | None) 
 
 
 def contract_in_pixels(contract: Contract, metres_per_pixel: float | None) -> Contract:
-    """The contract with all lengths in pixels, whatever unit they were stated in.
+    """Return the contract with all lengths in pixels, whatever unit they were stated in.
 
     Args:
-        contract: as stated; a length of 0 needs no unit.
-        metres_per_pixel: of the picture; None where it has no scale.
+        contract: the contract as stated; a length of 0 needs no unit.
+        metres_per_pixel: the picture's scale; None if it has none.
 
     Raises:
-        ToolError: metres without a scale, lengths of no unit with one, or too small or large.
+        ToolError: metres are given without a scale, lengths without a unit although there is one,
+            or lengths are too small or large at this scale.
     """
 
     def px(length: float) -> float:
@@ -93,7 +95,7 @@ def contract_in_pixels(contract: Contract, metres_per_pixel: float | None) -> Co
 
 
 def in_metres(pixels: float, metres_per_pixel: float) -> float:
-    """A length or coordinate in metres, rounded to a hundredth of a pixel or a little finer."""
+    """Convert a length or coordinate to metres, rounded to 0.01 px or slightly finer."""
     return round(pixels * metres_per_pixel, _decimals(DECIMALS_PX, metres_per_pixel))
 
 
@@ -103,13 +105,13 @@ def length_text(
     spec: str = ".1f",
     joint: str = " to ",
 ) -> str:
-    """A length, or two of them joined, as every text shows it.
+    """Format a length, or two of them joined, as all texts show it.
 
     Args:
-        px: in pixels.
-        metres_per_pixel: where it is known, metres come first: "1.25 m (25.0 px)".
-        spec: how the pixels are formatted; metres have decimals that tell apart as much.
-        joint: what stands between two lengths.
+        px: one or two lengths, px.
+        metres_per_pixel: if known, metres come first: "1.25 m (25.0 px)".
+        spec: format of the pixels; metres get enough decimals for the same resolution.
+        joint: text between two lengths.
     """
     numbers = [format(length, spec) for length in (px if isinstance(px, tuple) else (px,))]
     text = f"{joint.join(numbers)} px"
@@ -124,7 +126,10 @@ def length_text(
 
 
 def with_metres(data: Mapping[str, Any], metres_per_pixel: float | None) -> dict[str, Any]:
-    """The data and, beside each number named in px, the same in metres: `far_px`, `far_m`."""
+    """Return the data with each number in px, such as `far_px`, also in metres, as `far_m`.
+
+    `area_px` is accompanied by `area_m2`.
+    """
     if metres_per_pixel is None:
         return dict(data)
     beside: dict[str, Any] = {}
@@ -139,5 +144,5 @@ def with_metres(data: Mapping[str, Any], metres_per_pixel: float | None) -> dict
 
 
 def _decimals(px_decimals: int, metres_per_pixel: float) -> int:
-    """Decimals of metres that tell apart what so many decimals of pixels do."""
+    """Return how many decimals of metres resolve at least what `px_decimals` of pixels do."""
     return max(0, math.ceil(px_decimals - math.log10(metres_per_pixel)))

@@ -1,8 +1,8 @@
-"""Which robot takes which place of a formation.
+"""Assigns robots to the places of a formation.
 
-Least sum of squared distances, the condition of CAPT (Turpin et al. 2014) for straight synchronised
-ways that do not meet. Exact up to `EXACT` robots; beyond, nearly so, with a proven bound of what
-was left to save.
+Minimises the sum of squared distances, the condition of CAPT (Turpin et al. 2014) for straight
+synchronised paths that do not meet. Exact for up to `EXACT` robots; beyond that nearly optimal,
+with a proven bound on what a better assignment could save.
 """
 
 from dataclasses import dataclass
@@ -25,25 +25,25 @@ from .outline import FARTHEST, FloatArray
 IntArray = NDArray[np.intp]
 
 EXACT = 2_000
-"""Robots up to which the optimum is found: under a second and 100 MB."""
+"""Most robots for which the optimum is found: under a second and 100 MB."""
 ENOUGH = 0.01
-"""Share of the cost that may be left to save when an approximation is no longer improved."""
+"""An approximation is improved until at most this share of the cost could still be saved."""
 ROUNDS = 6
-"""Rounds of improvement at most: about 0.3 s each for 10,000 robots."""
+"""Most rounds of improvement: about 0.3 s each for 10,000 robots."""
 WARM_ROUNDS = 2
-"""Rounds after which the exact method takes over; prices to start from make it several times
+"""Rounds of improvement before the exact method; the prices they find make it several times
 faster."""
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """Who goes where, how that was found, and what it costs.
+    """An assignment of robots to goals, with its method and cost.
 
     Attributes:
-        robots: (n,) for each goal the robot (from 0) that takes it.
+        robots: (n,) the index of the robot that takes each goal.
         method: exact, or approximate with more than EXACT robots.
         cost: sum of squared distances, px^2.
-        gap: share of the cost that another assignment could save at most; 0 when exact.
+        gap: upper bound on the share of the cost that another assignment could save; 0 when exact.
     """
 
     robots: IntArray
@@ -53,14 +53,14 @@ class Assignment:
 
 
 def assign(starts: FloatArray, goals: FloatArray) -> Assignment:
-    """The robots for all goals.
+    """Assign one robot to each goal.
 
     Args:
-        starts: (n, 2) where robots are, image pixels.
-        goals: (n, 2) places.
+        starts: (n, 2) positions of the robots, image pixels.
+        goals: (n, 2) places, image pixels.
 
     Raises:
-        ToolError: arrays of other shapes or with no places in a picture.
+        ToolError: the shapes differ or are not (n, 2), or a coordinate is farther than FARTHEST.
     """
     starts, goals = _checked_places(starts, goals)
     if not len(goals):
@@ -79,7 +79,10 @@ def assign(starts: FloatArray, goals: FloatArray) -> Assignment:
 
 
 def _exact(goals: FloatArray, starts: FloatArray, matching: Matching) -> IntArray:
-    """The least sum of squares, warm: costs less prices have the same optimum, found sooner."""
+    """Minimise the sum of squares from a warm start.
+
+    Costs reduced by the prices have the same optimum, which is found sooner.
+    """
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
@@ -95,10 +98,10 @@ def _exact(goals: FloatArray, starts: FloatArray, matching: Matching) -> IntArra
 def _improved(
     goals: FloatArray, starts: FloatArray, matching: Matching, displacement: float
 ) -> tuple[Matching, float]:
-    """Rounds of improvement until little can be left to save of cost and displacement, px^2.
+    """Improve the matching until little of cost plus displacement, px^2, could still be saved.
 
     Returns:
-        the matching, and a lower bound of the cost of any.
+        The matching, and a lower bound on the cost of any matching, px^2.
     """
     bound = max(0.0, lower_bound(goals, starts, matching.prices))
     for _ in range(ROUNDS):

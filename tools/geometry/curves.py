@@ -1,7 +1,7 @@
-"""Curves robots stand on: rings around an outline, its sides and chosen edges.
+"""Curves for robots to stand on: rings around an outline, its sides and chosen edges.
 
-All are parts of offset curves (Minkowski sums with a disc), so every point of them has the
-clearance asked for. Frame: image pixels, x right, y down.
+All are parts of offset curves (Minkowski sums with a disc), so every point on them has the
+requested clearance. Frame: image pixels, x right, y down.
 """
 
 import math
@@ -24,9 +24,9 @@ from .outline import (
 
 
 def round_join_dip(quad_segments: int) -> float:
-    """By how much further to offset with round joins, which are polylines inside the true arc.
+    """Return the factor on an offset that makes up for round joins, whose chords cut the true arc.
 
-    GEOS rounds the number of chords of an arc, so that one chord may span half as much again.
+    GEOS rounds the number of chords of an arc, so a chord may span half as much again.
     """
     return 1 / math.cos(1.5 * math.pi / (4 * quad_segments))
 
@@ -34,23 +34,23 @@ def round_join_dip(quad_segments: int) -> float:
 QUAD_SEGMENTS = 24
 ROUND_JOIN_DIP = round_join_dip(QUAD_SEGMENTS)
 FACING = math.radians(50)
-"""How far a curve's outward normal may turn from a side's direction and still be that side."""
+"""A curve still counts as a side where its outward normal is within this angle of the direction."""
 CIRCLE_STEPS = 720
 SIDE_STEP = 400
-"""Samples along a curve when a part of it is cut out by a condition."""
+"""Number of samples across the extent of a side."""
 LEAP = 0.02
-"""A chord whose middle is off the curve by this share of the offset leaps over a part of it."""
+"""A chord skips part of a curve if its middle is off it by more than this share of the offset."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One or more polylines; `closed` when it is a single loop.
+    """One or more polylines; `closed` if it is a single loop.
 
     Attributes:
-        lines: each (n, 2), image pixels; a loop repeats its first point.
+        lines: polylines, (n, 2) each, image pixels; a loop repeats its first point.
         closed: whether robots go all the way round.
-        whole_length: length the curve would have had with nothing cut off by the picture, px.
-        parted: whether it is open on purpose, so that no cut of it counts as a gap.
+        whole_length: length the curve would have if the picture cut nothing off, px.
+        parted: whether it is open on purpose, so that no cut in it counts as a gap.
     """
 
     lines: tuple[FloatArray, ...]
@@ -60,14 +60,14 @@ class Curve:
 
     @property
     def length(self) -> float:
-        """Length that is left, px."""
+        """The length that is left, px."""
         return sum(float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum()) for x in self.lines)
 
     def cut(self, n: int) -> float | None:
-        """Straight length between the ends of a loop that the picture cut once, px.
+        """Return the straight distance between the ends of a loop that the picture cut once, px.
 
-        None when the curve is no such loop, or the cut is wider than the gap n robots would
-        leave: then they go to the ends instead.
+        None if the curve is not such a loop, or if the cut is wider than the gap between n robots,
+        which then stand at the ends instead.
         """
         if self.closed or self.parted or len(self.lines) != 1:
             return None
@@ -75,17 +75,17 @@ class Curve:
         return across if across < (self.length + across) / n else None
 
     def geometry(self) -> MultiLineString:
-        """The curve as a shapely geometry."""
+        """Return the curve as a shapely geometry."""
         return MultiLineString([LineString(line) for line in self.lines])
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The part of the plane robots may stand in: the picture less a margin.
+    """The part of the plane that robots may stand in: the picture less a margin.
 
     Attributes:
-        width, height: of the picture, px.
-        margin: kept free along the picture's border, px.
+        width, height: size of the picture, px.
+        margin: strip kept free along the picture's border, px.
     """
 
     width: float
@@ -94,7 +94,7 @@ class Frame:
 
     @property
     def box(self) -> Polygon:
-        """The allowed rectangle; empty when the margin eats the picture."""
+        """The allowed rectangle; empty if the margin leaves nothing of the picture."""
         far_x, far_y = self.width - 1 - self.margin, self.height - 1 - self.margin
         if far_x < self.margin or far_y < self.margin:
             return Polygon()
@@ -108,16 +108,16 @@ def ring(
     frame: Frame | None = None,
     keep: float = 0.0,
 ) -> Curve:
-    """The loop around an outline at a distance, led along the picture's border where that cuts it.
+    """Return the loop around an outline at a distance; it follows the picture's border if cut.
 
-    Concavities are bridged, as a ring of robots would, but never further out than allowed.
+    Concavities are bridged, as a ring of robots would do, but never further out than allowed.
 
     Args:
-        outline: what to go around; its holes do not matter.
+        outline: what to go around; its holes are ignored.
         offset: distance from the outline, px, > 0.
-        farthest: greatest distance where a concavity is bridged, px, >= offset.
+        farthest: greatest distance from the outline where a concavity is bridged, px, >= offset.
         frame: where robots may stand; None for the whole plane.
-        keep: parts of the border run that come nearer to the outline than this are cut out, px.
+        keep: stretches along the border that come nearer to the outline than this, px, are cut out.
     """
     reach = max(farthest, offset * ROUND_JOIN_DIP)
     swept = outline.filled.buffer(reach, quad_segs=QUAD_SEGMENTS)
@@ -129,7 +129,7 @@ def ring(
         return Curve((shapely.get_coordinates(whole),), True, float(whole.length))
     inside = _filled_parts(closed.intersection(frame.box)).boundary
     near = outline.filled.buffer(keep * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
-    border = frame.box.exterior  # the ring's own part is as far off as it is to be
+    border = frame.box.exterior  # the ring's own part already keeps its distance
     run = inside.intersection(border).difference(near)
     lines = _polylines(shapely.union(inside.difference(border), run))
     is_loop = len(lines) == 1 and bool(np.allclose(lines[0][0], lines[0][-1]))
@@ -137,7 +137,7 @@ def ring(
 
 
 def circle(centre: FloatArray, radius: float, frame: Frame | None = None) -> Curve:
-    """A circle about a centre, (2,), px; parts outside the frame are cut off."""
+    """Return a circle about a centre (2,), px; parts outside the frame are cut off."""
     turn: FloatArray = np.linspace(0, 2 * math.pi, CIRCLE_STEPS + 1)
     loop = centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     loop[-1] = loop[0]
@@ -145,7 +145,7 @@ def circle(centre: FloatArray, radius: float, frame: Frame | None = None) -> Cur
 
 
 def part_of(curve: Curve, region: BaseGeometry, whole_length: float | None = None) -> Curve:
-    """The part of a curve in a region; its whole length is its own where none is given."""
+    """Return the part of a curve in a region; `whole_length` defaults to the part's own length."""
     lines = _polylines(curve.geometry().intersection(region))
     closed = len(lines) == 1 and bool(np.allclose(lines[0][0], lines[0][-1]))
     part = Curve(lines, closed, 0.0, parted=True)
@@ -155,13 +155,13 @@ def part_of(curve: Curve, region: BaseGeometry, whole_length: float | None = Non
 def side(
     outline: Outline, direction: tuple[float, float], offset: float, frame: Frame | None = None
 ) -> Curve:
-    """The part of the envelope's offset curve that faces a direction, in one piece.
+    """Return the part of the envelope's offset curve that faces a direction, in one piece.
 
     Args:
-        outline: the thing.
+        outline: the object.
         direction: outward vector of the side, image frame: (0, 1) is the bottom, (-1, 0) the left.
         offset: distance from the outline's envelope, px, > 0.
-        frame: parts outside are cut off.
+        frame: parts outside it are cut off; None for the whole plane.
     """
     unit = np.asarray(direction, dtype=float) / math.hypot(*direction)
     across = np.array([-unit[1], unit[0]])
@@ -174,7 +174,7 @@ def side(
         np.stack([stations + (depth.max() + 1) * unit, stations + depth.min() * unit], axis=1)
     )
     hits, ray = shapely.get_coordinates(shapely.intersection(rays, loop), return_index=True)
-    order = np.lexsort((-(hits @ unit), ray))  # per ray the hit nearest to its outer end first
+    order = np.lexsort((-(hits @ unit), ray))  # for each ray the outermost hit first
     line = hits[order[np.unique(ray[order], return_index=True)[1]]]
     tangent = np.gradient(line, axis=0)
     facing = np.abs(np.arctan2(tangent @ unit, np.abs(tangent @ across))) <= FACING
@@ -184,10 +184,10 @@ def side(
 
 
 def _along_loop(line: FloatArray, loop: BaseGeometry, offset: float) -> FloatArray:
-    """A polyline of points on a loop, with the loop's own vertices where a chord skips part of it.
+    """Return a polyline of points on a loop, with the loop's vertices where a chord skips part.
 
-    Rays meet only the outer end of what hangs over; a chord from there to what lies behind is at
-    no certain distance from the outline.
+    Rays hit only the outer edge of an overhang; a chord from there to what lies behind it may come
+    at any distance from the outline.
     """
     chords = np.linalg.norm(np.diff(line, axis=0), axis=1)
     leaps = np.flatnonzero(chords > 2 * np.median(chords))
@@ -206,7 +206,7 @@ def _along_loop(line: FloatArray, loop: BaseGeometry, offset: float) -> FloatArr
 
 
 def _stretch(loop: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """The vertices of a loop (m, 2) on the shorter way between two points on it."""
+    """Return the vertices of a loop (m, 2) on the shorter way between two points on it, (k, 2)."""
     lengths = np.linalg.norm(np.diff(loop, axis=0), axis=1)
     whole, at = float(lengths.sum()), (np.cumsum(lengths) - lengths)
     a, b = locate(loop, np.stack([start, end]))
@@ -221,16 +221,16 @@ def _stretch(loop: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray
 def edge_curve(
     outline: Outline, edges: tuple[int, ...], offset: float, frame: Frame | None = None
 ) -> Curve:
-    """The part of the offset curve whose nearest edges of E are the chosen ones.
+    """Return the part of the offset curve that is nearer to the chosen edges than to any other.
 
     Args:
-        outline: the thing, with its graph G = (V, E).
+        outline: the object, with its graph G = (V, E).
         edges: indices into E.
         offset: distance from the outline, px, > 0.
-        frame: parts outside are cut off.
+        frame: parts outside it are cut off; None for the whole plane.
 
     Raises:
-        IndexError: an edge number that is not in E.
+        IndexError: an edge number is not in E.
     """
     vertices, pairs = outline.graph()
     sides = [LineString(vertices[list(pair)]) for pair in pairs]
@@ -252,17 +252,20 @@ def segment(
     frame: Frame | None = None,
     solid: BaseGeometry | None = None,
 ) -> Curve:
-    """The straight line between two points, (2,) each, image pixels, less what is solid."""
+    """Return the straight line between two points (2,), image pixels, less what is solid.
+
+    Parts outside the frame are cut off too.
+    """
     line = LineString([start, end])
     free = _polylines(line if solid is None else line.difference(solid))
     return _clip(list(free), frame)
 
 
 def interpolate(line: FloatArray, stations: FloatArray) -> FloatArray:
-    """The places (n, 2) at arc lengths (n,) of a polyline (m, 2), px; beyond an end it is meant.
+    """Return the points (n, 2) at arc lengths (n,) along a polyline (m, 2), px.
 
-    To the last bit those that GEOS finds, which walks along the line for each; here one search
-    serves all.
+    Arc lengths beyond an end give that end. The results equal GEOS's to the last bit, but GEOS
+    walks along the line for each point, whereas one search here serves all.
     """
     steps = np.diff(line, axis=0)
     lengths = np.sqrt(steps[:, 0] * steps[:, 0] + steps[:, 1] * steps[:, 1])
@@ -275,7 +278,7 @@ def interpolate(line: FloatArray, stations: FloatArray) -> FloatArray:
 
 
 def locate(line: FloatArray, points: FloatArray) -> FloatArray:
-    """Arc length of the place on a polyline (m, 2) that is nearest to each of (n, 2) points, px."""
+    """Return the arc length, (n,), px, of the place on a polyline (m, 2) nearest to each point."""
     places = np.asarray(shapely.points(points), dtype=object)
     whole = LineString(line)
     if len(points) * len(line) < WALKED:
@@ -289,7 +292,7 @@ def locate(line: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def _flagged_runs(line: FloatArray, flags: NDArray[np.bool_]) -> list[FloatArray]:
-    """Stretches of at least two successive flagged points."""
+    """Return the runs of at least two successive flagged points, (k, 2) each."""
     changes = np.flatnonzero(np.diff(flags.astype(np.int8))) + 1
     pieces = np.split(line, changes)
     kept = np.split(flags, changes)
@@ -304,7 +307,7 @@ def _clip(lines: list[FloatArray], frame: Frame | None) -> Curve:
 
 
 def _polylines(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
-    """Polylines of any geometry, pieces that touch joined, dust under half a pixel dropped."""
+    """Return the polylines of any geometry; touching ones are joined, those <= 0.5 px dropped."""
     parts = [g for g in shapely.get_parts(geometry) if isinstance(g, LineString) and g.length]
     merged = shapely.line_merge(MultiLineString(parts)) if parts else MultiLineString()
     lines = (shapely.get_coordinates(g) for g in shapely.get_parts(merged))
@@ -312,6 +315,6 @@ def _polylines(geometry: BaseGeometry) -> tuple[FloatArray, ...]:
 
 
 def _filled_parts(geometry: BaseGeometry) -> BaseGeometry:
-    """The geometry's polygons without their holes."""
+    """Return the geometry's polygons without their holes."""
     parts = [Polygon(g.exterior) for g in shapely.get_parts(geometry) if isinstance(g, Polygon)]
     return MultiPolygon(parts) if parts else Polygon()

@@ -1,7 +1,8 @@
-"""N robots inside a region: evenly over it, or as far apart as it allows.
+"""Places N robots inside a region: evenly over it, or as far apart as it allows.
 
-Even is a centroidal Voronoi tessellation, relaxed from hexagonal lattices; where robots would
-come nearer than allowed they stand on the widest lattice itself. Frame: image pixels, y down.
+An even spread is a centroidal Voronoi tessellation, relaxed from hexagonal lattices; if robots
+would come too near to each other, they stand on the widest lattice itself. Frame: image pixels,
+y down.
 """
 
 import math
@@ -26,40 +27,45 @@ from .outline import FloatArray, Outline, largest_part, rectangle_of
 from .sampling import min_spacing, nearest, open_points, spread_subset
 
 FEW, MANY = 50, 2_000
-"""Up to FEW robots several starts are relaxed to the end; past MANY one lattice is laid one way."""
+"""Up to FEW robots, four starts are relaxed for LLOYD_STEPS; past MANY, one lattice in one
+orientation is used."""
 LLOYD_STEPS = 40
 BRISK_STEPS, STRETCH = 12, 1.7
 BRISK_CELLS, CELLS_EACH = 75_000, 60
-"""Past FEW: fewer steps that go further; so many cells, or at least so many for each robot."""
+"""Past FEW robots: BRISK_CELLS cells, or CELLS_EACH for each robot if that is more, relaxed in
+fewer steps, each STRETCH times as far."""
 SOME = 100
-"""Up to so many robots, four starts are tried; up to MANY, two."""
+"""Up to this many robots four starts are tried; up to MANY, two."""
 SURELY = 1.2
-"""Discs about robots take up no more of the ground they reach than hexagons do; this is slack."""
+"""Slack on the bound that discs about robots cover at most the share of the ground they reach that
+hexagonal packing does."""
 RELAXED = 0.7
-"""The closest pair after relaxing a lattice of thousands, as a share of its pitch; measured."""
+"""Distance of the closest pair after relaxing a lattice of thousands of points, as a share of its
+pitch; measured."""
 THIN = 0.25
-"""Area over boundary length, px, below which a region is treated as a line."""
+"""Ratio of area to boundary length, px, below which a region is treated as a line."""
 FINE_SEGMENTS = 96
 FINE_DIP = round_join_dip(FINE_SEGMENTS)
-"""Margins wider than they need be take ground away: so fine, less than 1 part in 10,000 of them."""
+"""Offsetting further than the margin wastes ground; with segments this fine, under 1 part in 10,000
+of the margin."""
 TURNS = (0.0, math.pi / 12, math.pi / 6)
 
 
 def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float) -> FloatArray:
-    """N points spread evenly over a region, holes and concavities respected.
+    """Return n points spread evenly over a region, respecting holes and concavities.
 
-    Lloyd's iteration to a centroidal Voronoi tessellation, best of a few lattice starts;
-    where two robots would come nearer than `spacing`, a hexagonal lattice instead.
+    Uses Lloyd's iteration to a centroidal Voronoi tessellation, the best of a few lattice starts;
+    if two robots would come nearer than `spacing`, a hexagonal lattice instead.
 
     Args:
         outline: the region.
-        n: how many.
-        margin: distance kept from the region's boundary, px.
-        depth: greatest distance from it, px; beyond the region's half-width it means nothing.
+        n: number of points.
+        margin: least distance from the region's boundary, px.
+        depth: greatest distance from it, px; no effect beyond the region's half-width.
         spacing: smallest distance allowed between two robots, px.
 
     Returns:
-        (k, 2), k < n when no more fit.
+        (k, 2), k < n if no more fit.
     """
     region = ground(outline, margin, depth)
     if region.is_empty:
@@ -67,7 +73,7 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
     if region.area < THIN * region.length:
         return _on_axis(region, n, spacing)
     reached = max(region.buffer(spacing / 2).area, region.area)  # GEOS grows nothing by 1e-200
-    if n * spacing**2 * math.sqrt(3) / 2 < SURELY * reached:  # else they cannot all fit
+    if n * spacing**2 * math.sqrt(3) / 2 < SURELY * reached:  # otherwise they cannot all fit
         even = _evenly_spread(region, ground(outline, 0, depth), n)
         if min_spacing(even) >= spacing:
             return even.copy()
@@ -80,16 +86,16 @@ def inside(outline: Outline, n: int, margin: float, depth: float, spacing: float
 def yardstick(
     outline: Outline, n: int, margin: float, depth: float, spacing: float
 ) -> tuple[float, FloatArray]:
-    """A reference for judging N points inside a region: their closest pair, and an even spread.
+    """Return a reference for judging n points in a region: a closest distance and an even spread.
 
-    Up to MANY the points of `inside` themselves. Past it the lattice they would be relaxed from,
-    which leaves less bare than it does, and the share of its pitch that relaxing leaves.
+    Up to MANY robots these are the points of `inside`. Beyond that they are the lattice those would
+    be relaxed from, which leaves less ground bare, with the share RELAXED of its pitch as distance.
 
     Args:
         outline, n, margin, depth, spacing: as for `inside`.
 
     Returns:
-        The distance of the closest pair, px, and (k, 2); k = 0 where nothing fits.
+        The distance of the closest pair, px, and the points (k, 2); k = 0 if nothing fits.
     """
     region = ground(outline, margin, depth)
     if n > MANY and region.area >= THIN * region.length:
@@ -101,16 +107,19 @@ def yardstick(
 
 
 def coverage_radius(outline: Outline, points: FloatArray, cells: FloatArray | None = None) -> float:
-    """Greatest distance from a point of the region to its nearest robot (n, 2), px (sampled).
+    """Return the greatest distance from a sampled point of the region to its nearest robot, px.
 
-    `cells` are the samples, see `cells_of`, where they are at hand.
+    Args:
+        outline: the region.
+        points: (n, 2) robots.
+        cells: the samples, if the caller already has them; see `cells_of`.
     """
     sampled = cells_of(outline.polygon, len(points)) if cells is None else cells
     return float(nearest(points, sampled, 1)[0].max())
 
 
 def ground(outline: Outline, margin: float, depth: float) -> BaseGeometry:
-    """Where robots may stand: as deep inside as they must and no deeper than they may.
+    """Return the part of a region whose distance from its boundary lies within limits.
 
     Args:
         outline: the region.
@@ -118,19 +127,19 @@ def ground(outline: Outline, margin: float, depth: float) -> BaseGeometry:
         depth: greatest distance from it, px.
     """
     kept = outline.polygon.buffer(-margin * FINE_DIP, quad_segs=FINE_SEGMENTS)
-    if kept.is_empty:  # a sliver has no round joins to make up for
+    if kept.is_empty:  # a sliver has no round joins to compensate
         kept = outline.polygon.buffer(-margin, quad_segs=FINE_SEGMENTS)
     x0, y0, x1, y1 = outline.bounds
-    if 2 * depth >= min(x1 - x0, y1 - y0):  # nothing is deeper, which GEOS takes long to find
+    if 2 * depth >= min(x1 - x0, y1 - y0):  # nothing lies deeper, which GEOS takes long to find out
         return kept
     return kept.difference(outline.polygon.buffer(-depth))
 
 
-@lru_cache(maxsize=4)  # whoever places robots has them checked next
+@lru_cache(maxsize=4)  # robots are checked right after they are placed
 def _evenly_spread(region: BaseGeometry, covered: BaseGeometry, n: int) -> FloatArray:
-    """N points of a region spread evenly over a wider one, however near to each other.
+    """Return n points of a region spread evenly over a wider one, however near to each other.
 
-    What lies within the margin is to be covered like the rest, though no robot stands there.
+    The margin in `covered` is to be covered like the rest, though no robot stands there.
     """
     long = _long_angle(region)
     if n <= FEW:
@@ -146,7 +155,7 @@ def _evenly_spread(region: BaseGeometry, covered: BaseGeometry, n: int) -> Float
 
 
 def _thinned(region: BaseGeometry, n: int, turn: float) -> FloatArray:
-    """Exactly n starting points: the finest lattice with n or more, thinned out evenly."""
+    """Return exactly n starting points: the first lattice found with n or more, thinned evenly."""
     shapely.prepare(region)
     pitch = ideal_pitch(region.area, n)
     for _ in range(60):
@@ -158,14 +167,14 @@ def _thinned(region: BaseGeometry, n: int, turn: float) -> FloatArray:
 
 
 def _long_angle(region: BaseGeometry) -> float:
-    """Direction of the longer side of the minimum-area rectangle, radians."""
+    """Return the direction of the longer side of the minimum-area rectangle, radians."""
     sides = np.diff(rectangle_of(region), axis=0)
     x, y = sides[int(np.argmax(np.linalg.norm(sides, axis=1)))]
     return math.atan2(y, x)
 
 
 def _on_axis(region: BaseGeometry, n: int, spacing: float) -> FloatArray:
-    """Up to n points along a region that is little more than a line, straight or closed."""
+    """Return up to n points along a region that is little more than a line or a loop, (k, 2)."""
     band = largest_part(region)
     if band is not None and band.interiors:
         loop = LineString(band.exterior.coords)

@@ -15,27 +15,27 @@ from .outline import FloatArray, distances
 from .sampling import spread_subset
 
 HALVINGS = 12
-"""Steps of the search for the widest pitch: it is found to 1 part in 10,000 or so."""
+"""Steps of the search for the widest pitch, which find it to about 1 part in 10,000."""
 NARROWEST = 0.55
-"""The search for a pitch begins at this share of the one that open ground would have."""
+"""The search for a pitch starts at this share of the ideal pitch on open ground."""
 ALL_PHASES = tuple((i / 4, j / 4) for i in range(4) for j in range(4))
-"""Phases of a lattice to try, as shares of its two steps."""
+"""Phases of a lattice to try, as shares of its two basis vectors."""
 
 
 class Lattice(NamedTuple):
-    """How a lattice lies: its turn (radians) and its phase as shares of its two steps."""
+    """The placement of a lattice: its turn, radians, and phase, as shares of its basis vectors."""
 
     turn: float
     phase: tuple[float, float] = (0.0, 0.0)
 
 
 def ideal_pitch(area: float, n: int) -> float:
-    """The pitch at which n points of a hexagonal lattice take up an area, px."""
+    """Return the pitch, px, at which n points of a hexagonal lattice take up an area, px^2."""
     return math.sqrt(2 * area / (math.sqrt(3) * n))
 
 
 def lattice_points(region: BaseGeometry, pitch: float, placement: Lattice) -> FloatArray:
-    """The points of a lattice inside a region, row by row, (k, 2)."""
+    """Return the points of a lattice inside a region, row by row, (k, 2)."""
     cx, cy = region.envelope.centroid.x, region.envelope.centroid.y
     x0, y0, x1, y1 = region.bounds
     c, s = math.cos(placement.turn), math.sin(placement.turn)
@@ -53,7 +53,10 @@ def lattice_points(region: BaseGeometry, pitch: float, placement: Lattice) -> Fl
 def densest_lattice(
     region: BaseGeometry, pitch: float, placements: Sequence[Lattice]
 ) -> FloatArray:
-    """The points of a lattice of a pitch in a region, in the placement that has the most."""
+    """Return the points of a lattice in a region, in the placement that fits the most, (k, 2).
+
+    A representative point of the region if none fits.
+    """
     shapely.prepare(region)
     best = max((lattice_points(region, pitch, placement) for placement in placements), key=len)
     return best if len(best) else shapely.get_coordinates(region.representative_point())
@@ -62,16 +65,16 @@ def densest_lattice(
 def widest_lattice(
     region: BaseGeometry, n: int, placements: Sequence[Lattice], least: float = 0.0
 ) -> FloatArray:
-    """Exactly n points of the widest lattice that has n in a region, without gaps inside.
+    """Return exactly n points of the widest lattice with n in a region, without gaps inside.
 
     Args:
-        region: a polygon or several.
-        n: how many.
-        placements: the turns and phases tried.
-        least: a pitch known to give n or more, px; 0 where none is known.
+        region: one or more polygons.
+        n: number of points.
+        placements: the turns and phases to try.
+        least: a pitch known to give n or more, px; 0 if none is known.
 
     Returns:
-        (n, 2); fewer only where the region is too thin for a lattice.
+        (n, 2); fewer only if the region is too thin for a lattice.
     """
     shapely.prepare(region)
     low = max(least, NARROWEST * ideal_pitch(region.area, n))
@@ -87,9 +90,9 @@ def widest_lattice(
 def _widest_pitch(
     region: BaseGeometry, n: int, placement: Lattice, low: float
 ) -> tuple[FloatArray, float]:
-    """The points of the widest pitch that gives n or more, found by bisection, and that pitch.
+    """Return the points of the widest pitch that gives n or more, by bisection, and that pitch.
 
-    The count does not fall steadily with the pitch; the last pitch that gave enough is taken.
+    The count does not fall steadily with the pitch; the last pitch that gave enough is used.
     """
     kept = lattice_points(region, low, placement)
     for _ in range(20):
@@ -111,7 +114,7 @@ def _widest_pitch(
 def _thinned_at_boundary(
     region: BaseGeometry, points: FloatArray, surplus: int, pitch: float
 ) -> FloatArray:
-    """The points less some that lie next to the boundary, far apart from each other."""
+    """Return the points less `surplus` of those next to the boundary, chosen far apart."""
     depth = distances(region.boundary, points)
     outermost = np.argsort(depth, kind="stable")
     count = max(int((depth < pitch / 2).sum()), surplus)

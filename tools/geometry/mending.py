@@ -1,7 +1,7 @@
-"""Mends outlines that cross themselves where it is clear what was meant.
+"""Mends outlines that cross themselves if it is clear what was meant.
 
-A hand that closes an outline overshoots, or names two vertices in the wrong order: such a crossing
-says nothing of the thing.
+People overshoot when they close an outline, or give two vertices in the wrong order; such a
+crossing says nothing about the object.
 """
 
 from collections.abc import Sequence
@@ -14,19 +14,20 @@ from shapely.geometry import Polygon
 from .outline import largest_part
 
 WHOLE = 0.9
-"""The share of all that is enclosed which one part must hold to stand for it."""
+"""Share of the enclosed area that one part must hold to stand for the whole."""
 MOST_VERTICES, MOST_CROSSINGS = 2_000, 50
-"""What has more is a scribble, of which every part would take long to find."""
+"""An outline with more is a scribble, and finding all its parts would take too long."""
 MOST_SWAPPED = 60
-"""Vertices up to which it is tried whether two of them changed places."""
+"""Most vertices for which swapping two of them is tried."""
 AS_SHORT, ALIKE = 1.1, 0.8
-"""Another order, no longer than so many times the shortest, must overlap with it so far."""
+"""Every other order at most AS_SHORT times as long as the shortest must overlap with it by at least
+ALIKE (intersection over union)."""
 
 
 def mended(vertices: Sequence[tuple[float, float]]) -> tuple[Polygon, str] | None:
-    """An outline that crosses itself as one that does not, and what was done in words.
+    """Return a self-crossing outline as one that does not, and a text that says what was done.
 
-    None where it could mean several things.
+    None if it could mean several things.
     """
     if len(vertices) > MOST_VERTICES or _crossings(vertices) > MOST_CROSSINGS:
         return None
@@ -42,7 +43,7 @@ def mended(vertices: Sequence[tuple[float, float]]) -> tuple[Polygon, str] | Non
 
 
 def _crossings(vertices: Sequence[tuple[float, float]]) -> int:
-    """How often its sides meet beside where one follows the other."""
+    """Return how often its sides meet, other than where one follows the other."""
     ring = np.asarray(vertices, dtype=float)
     sides = np.asarray(shapely.linestrings(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)))
     pairs = shapely.STRtree(sides).query(sides, predicate="intersects")
@@ -50,7 +51,7 @@ def _crossings(vertices: Sequence[tuple[float, float]]) -> int:
 
 
 def _swapped(vertices: Sequence[tuple[float, float]]) -> list[Polygon]:
-    """The outlines that do not cross themselves once two vertices change places, shortest first."""
+    """Return the outlines without crossings that swapping two vertices gives, shortest first."""
     pairs = np.array(list(combinations(range(len(vertices)), 2)))
     order = np.tile(np.arange(len(vertices)), (len(pairs), 1))
     np.put_along_axis(order, pairs, pairs[:, ::-1], axis=1)

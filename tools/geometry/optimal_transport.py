@@ -1,8 +1,8 @@
 """Approximate assignment of robots to places, for teams too large for an exact one.
 
-A multilevel scheme with prices: blocks of robots are assigned first, then the robots within.
+A multilevel scheme with prices: blocks of robots are assigned first, then the robots within them.
 Prices (the linear program's dual) bound what a better assignment could save. Memory is linear.
-Least sums of squared distances; coordinates are image pixels, any common shift cancels.
+The cost is the sum of squared distances; coordinates are image pixels, any common shift cancels.
 """
 
 import math
@@ -16,47 +16,47 @@ from .outline import FloatArray
 IntArray = NDArray[np.intp]
 
 BASE = 600
-"""Robots up to which a level is solved exactly: a few hundredths of a second."""
+"""Most robots for which a level is solved exactly: a few hundredths of a second."""
 FINER = 4
-"""Robots to a block of the next coarser level."""
+"""Most robots in a block that the next coarser level treats as one."""
 LEAF = 64
-"""Robots to a block that is solved exactly when improving; time grows faster than blocks do."""
+"""Most robots in a block solved exactly for improvement; time grows faster than block size."""
 PASSES = 4
-"""Times the blocks are laid anew, turned by the golden angle so that none keeps its borders."""
+"""Number of block layouts, each turned by the golden angle so that no block border persists."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 NEAR, CHEAP = 8, 8
-"""Robots a place may change to: nearest ones of its own, and those cheapest at the prices."""
+"""Candidate robots for a place: the NEAR ones nearest to its own, and the CHEAP cheapest ones."""
 SWEEPS, STEPS = 12, 8
-"""Searches for cycles of exchanges a round, and relaxations of the prices before each."""
+"""Searches for exchange cycles in a round, and relaxations of the prices before each search."""
 ROUNDING = 1e-12
-"""Share of the largest cost that counts as nothing."""
+"""Differences up to this share of the largest cost count as zero."""
 
 
 @dataclass(frozen=True)
 class Matching:
-    """Which robot each goal takes, (n,), and a price for every robot, (n,), px^2."""
+    """The robot that each goal takes, (n,), and the price of each robot, (n,), px^2."""
 
     robots: IntArray
     prices: FloatArray
 
 
 def sum_of_squares(goals: FloatArray, starts: FloatArray, robots: IntArray) -> float:
-    """The sum of squared distances, px^2."""
+    """Return the sum of squared distances, px^2."""
     return float(_squared(goals, starts[robots]).sum())
 
 
 def lower_bound(goals: FloatArray, starts: FloatArray, prices: FloatArray) -> float:
-    """What every assignment costs at least, px^2: weak duality, valid for any prices.
+    """Return a lower bound on the cost of any assignment, px^2, by weak duality for any prices.
 
-    Each goal pays its cheapest robot's squared distance less its price. That robot is the nearest
-    one in a space with a third coordinate that holds the prices (power diagram, Aurenhammer 1987).
+    Each goal pays the squared distance less the price of its cheapest robot. That robot is the
+    nearest in a space whose third coordinate holds the prices (power diagram, Aurenhammer 1987).
     """
     cheapest, _ = _cheapest(goals, starts, prices, 1)
     return float((cheapest[:, 0] + prices).sum())
 
 
 def multilevel_matching(goals: FloatArray, starts: FloatArray) -> Matching:
-    """Nearly the least sum of squared distances, (n, 2) each, by levels."""
+    """Nearly minimise the sum of squared distances by levels; goals and starts are (n, 2) each."""
     n = len(goals)
     if n <= BASE:
         return Matching(_least_squares(goals, starts)[1], np.zeros(n))
@@ -70,7 +70,7 @@ def multilevel_matching(goals: FloatArray, starts: FloatArray) -> Matching:
 
 
 def _least_squares(goals: FloatArray, starts: FloatArray) -> tuple[IntArray, IntArray]:
-    """The exact assignment: goals and their robots, as many as the smaller of the two sets has."""
+    """Return the exact assignment as indices of goals and robots, as many as the smaller set."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
@@ -79,7 +79,7 @@ def _least_squares(goals: FloatArray, starts: FloatArray) -> tuple[IntArray, Int
 
 
 def _blockwise(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matching:
-    """Exact reassignments within blocks of neighbours, laid anew a few times."""
+    """Reassign exactly within blocks of neighbours, for several layouts of the blocks."""
     robots = matching.robots.copy()
     for k in range(PASSES):
         by = starts[robots] if k % 2 else goals
@@ -90,10 +90,10 @@ def _blockwise(goals: FloatArray, starts: FloatArray, matching: Matching) -> Mat
 
 
 def improved_by_cycles(goals: FloatArray, starts: FloatArray, matching: Matching) -> Matching:
-    """A round of cycles of exchanges that save (Klein 1967), and prices nearer to the dual's.
+    """Exchange robots along cycles that save (Klein 1967) and move prices towards the dual optimum.
 
     Prices fall by Bellman-Ford: a robot is worth no more than the price at which another goal
-    would rather take it. Where they fall in a circle, exchanging robots around it saves.
+    would rather take it. If they keep falling around a cycle, exchanging robots along it saves.
     """
     goal, robot, cost = _candidate_pairs(goals, starts, matching)
     nothing = ROUNDING * float(cost.max())
@@ -122,19 +122,22 @@ def improved_by_cycles(goals: FloatArray, starts: FloatArray, matching: Matching
 def _exchange(
     robots: IntArray, robot: IntArray, rival: IntArray, more: FloatArray, nothing: float
 ) -> IntArray:
-    """Hand robots on around the cycles of a graph in which each has one rival at most.
+    """Pass robots on around the cycles of a graph in which each robot has at most one rival.
 
     Args:
-        robots: (n,) for each goal its robot.
-        robot, rival: (m,) edges: the rival's goal would rather have the robot.
-        more: (m,) what the rival's goal would pay more for it, px^2.
-        nothing: what is no saving, px^2.
+        robots: (n,) the robot of each goal.
+        robot, rival: (m,) edges: the goal of `rival` would rather have `robot`.
+        more: (m,) how much more that goal would pay for it, px^2.
+        nothing: savings up to this count as none, px^2.
+
+    Returns:
+        (n,) the new robot of each goal.
     """
     n = len(robots)
     before, extra = np.arange(n), np.zeros(n)
     before[robot], extra[robot] = rival, more
     far, name = before, np.arange(n)
-    for _ in range(n.bit_length()):  # pointer jumping: all end on a cycle, named by its least
+    for _ in range(n.bit_length()):  # pointer jumping: all end on a cycle, named by its least index
         name, far = np.minimum(name, name[far]), far[far]
     on_cycle = np.zeros(n, dtype=bool)
     on_cycle[far] = True
@@ -150,7 +153,7 @@ def _exchange(
 def _candidate_pairs(
     goals: FloatArray, starts: FloatArray, matching: Matching
 ) -> tuple[IntArray, IntArray, FloatArray]:
-    """Pairs worth considering, ordered by robot: goal, robot, squared distance, (m,) each."""
+    """Return candidate pairs ordered by robot: goal, robot and squared distance, (m,) each."""
     from scipy.spatial import cKDTree
 
     n = len(goals)
@@ -165,13 +168,13 @@ def _candidate_pairs(
 def _cheapest(
     goals: FloatArray, starts: FloatArray, prices: FloatArray, k: int
 ) -> tuple[FloatArray, IntArray]:
-    """Squared distance less price of each goal's k cheapest robots, and which they are, (n, k)."""
+    """Return each goal's k cheapest robots: squared distance less price, and index, (n, k) each."""
     from scipy.spatial import cKDTree
 
     top = prices.max()
     lifted = np.column_stack([starts, np.sqrt(top - prices)])
     flat = np.column_stack([goals, np.zeros(len(goals))])
-    # Shrunk nodes and small leaves make queries from so far off the points several times slower.
+    # Compact nodes and small leaves make queries from so far off the points several times slower.
     tree = cKDTree(lifted, compact_nodes=False, leafsize=32)
     distance, robot = tree.query(flat, k=range(1, k + 1))
     return np.asarray(distance, dtype=float) ** 2 - top, np.asarray(robot, dtype=np.intp)
@@ -184,7 +187,10 @@ def _spread_out(
     start_blocks: list[IntArray],
     takes: IntArray,
 ) -> IntArray:
-    """Robots for single goals where blocks go to blocks; their sizes may differ by one."""
+    """Return the robot of each goal, (n,), where each block of goals takes a block of starts.
+
+    The sizes of the blocks may differ by one.
+    """
     robots = np.full(len(goals), -1, dtype=np.intp)
     for block, taken in zip(goal_blocks, takes, strict=True):
         team = start_blocks[int(taken)]
@@ -206,10 +212,10 @@ def _interpolated_prices(
     goals: FloatArray,
     coarse: Matching,
 ) -> FloatArray:
-    """Prices of robots from those of their blocks, (n,).
+    """Interpolate the prices of robots, (n,), from those of their blocks.
 
-    The squared length of a start less its price is convex where prices are optimal, and its
-    gradient is twice the goal (Brenier 1991): a first-order step from the block's centre.
+    At optimal prices, the squared length of a start less its price is convex and its gradient is
+    twice the goal (Brenier 1991); this takes a first-order step from the block's centre.
     """
     to = np.empty_like(goals)
     to[coarse.robots] = goals
@@ -227,9 +233,10 @@ def _centres(points: FloatArray, blocks: list[IntArray]) -> FloatArray:
 def _median_blocks(
     goals: FloatArray, starts: FloatArray, size: int
 ) -> tuple[list[IntArray], list[IntArray]]:
-    """Both sets cut at medians, again and again, into as many blocks of `size` or fewer, in step.
+    """Cut both sets repeatedly at medians, in step, into blocks of `size` points or fewer.
 
-    Block i of one has as many points as block i of the other; any two differ by one at most.
+    Block i of one set has as many points as block i of the other; the sizes of any two blocks
+    differ by at most one.
     """
     n, count = len(goals), 1
     labels = [np.zeros(n, dtype=np.intp), np.zeros(n, dtype=np.intp)]

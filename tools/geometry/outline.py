@@ -1,8 +1,8 @@
 """The shape of a target as an immutable value: polygon, graph G = (V, E), corners, axes.
 
 Frame everywhere: image pixels, x right, y down, pixel centres at integer coordinates.
-A contour of pixels is dense and noisy; V and E are its simplification, found by an epsilon
-sweep, with a judgement whether the thing is polygonal or smooth.
+A pixel contour is dense and noisy; V and E are its simplification, found by an epsilon sweep that
+also decides whether the object is polygonal or smooth.
 """
 
 import math
@@ -24,22 +24,25 @@ Kind = Literal["polygonal", "smooth"]
 
 SWEEP_STEPS = 8
 SMOOTH_SLOPE = -0.40
-"""Vertex count falls as eps**-1/2 on smooth curves and stays put on polygons; this divides them."""
+"""As the tolerance eps grows, the vertex count falls as eps**-1/2 on smooth curves and is constant
+on polygons; this log-log slope divides the two."""
 CORNER_TURN = math.radians(25)
 """A vertex turning less than this is a bend of the contour, not a corner."""
 MAX_VERTICES = 5_000
 FARTHEST = 1e6
-"""Coordinates beyond this, px, are no place in a picture."""
+"""Largest absolute coordinate, px, that is accepted as a place in a picture."""
 RECESS_SHARE = 0.5
-"""Recesses narrower than twice this share of the size are bridged where sides are meant."""
+"""Recesses narrower than twice this share of the size are bridged to find an object's sides."""
 KNOB_SHARE, BULK_SHARE = 0.05, 0.93
-"""What an opening by this share of the size removes is a knob, if this share of the area stays."""
+"""What a morphological opening by KNOB_SHARE of the size removes counts as a knob, provided that
+BULK_SHARE of the area is left."""
 WALKED = 200_000
-"""Points times vertices up to which walking along a geometry for each point is quick."""
+"""Number of points times vertices below which walking along a geometry for each point is quick."""
 HALF_SPAN, SPAN_STEPS = 0.5, 100
-"""A side of the bulk lies where the region spans this share of its widest; looked for in steps."""
+"""A side of the bulk lies where the region still spans HALF_SPAN of its widest span; searched for
+in SPAN_STEPS steps."""
 MIN_AREA = 4.0
-"""Square pixels below which an outline has no usable shape."""
+"""Area in square pixels below which an outline has no usable shape."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Outline:
     Attributes:
         polygon: the exact boundary; valid, positive area, exterior counter-clockwise in (x, y).
         vertices: V, the simplified exterior, in the exterior's order, (k, 2).
-        kind: whether V are real corners (polygonal) or samples of a curve (smooth).
+        kind: polygonal if V are real corners, smooth if they are samples of a curve.
         kind_confidence: 0.5 (undecided) to 1.
     """
 
@@ -60,7 +63,7 @@ class Outline:
 
     @property
     def edges(self) -> tuple[tuple[int, int], ...]:
-        """E, index pairs into V; edge i runs from vertex i to the next, the last one closes."""
+        """E, index pairs into V; edge i runs from vertex i to the next, the last one back to 0."""
         count = len(self.vertices)
         return tuple((i, (i + 1) % count) for i in range(count))
 
@@ -87,12 +90,12 @@ class Outline:
 
     @cached_property
     def filled(self) -> Polygon:
-        """The region with its holes filled: what robots outside have to keep off."""
+        """The region with its holes filled, which robots outside have to keep off."""
         return Polygon(self.polygon.exterior)
 
     @cached_property
     def envelope(self) -> Polygon:
-        """The filled region with its recesses bridged, as robots in a line beside it meet it."""
+        """The filled region with its recesses bridged: what a line of robots beside it faces."""
         reach = RECESS_SHARE * self.size
         closed = self.filled.buffer(reach).buffer(-reach).union(self.filled)
         bridged = largest_part(closed)
@@ -105,10 +108,10 @@ class Outline:
 
     @cached_property
     def bulk_rectangle(self) -> FloatArray:
-        """The rectangle of the bulk alone, without what sticks out of a side: mirrors, a porch.
+        """The rectangle of the bulk without what sticks out of it, such as mirrors or a porch.
 
-        Its sides lie where the region still spans half of what it does at its widest, as seen
-        along the side; corners, (4, 2), in the exterior's direction.
+        Its sides lie where the region, measured along the side, still spans half of its widest
+        span; corners, (4, 2), in the exterior's direction.
         """
         reach = KNOB_SHARE * self.size
         bulk = self.filled.buffer(-reach, join_style="mitre").buffer(reach, join_style="mitre")
@@ -118,7 +121,7 @@ class Outline:
 
     @property
     def min_width(self) -> float:
-        """The smallest distance of two parallel lines that hold the region between them, px."""
+        """The smallest distance between two parallel lines that enclose the region, px."""
         points = shapely.get_coordinates(self.polygon.convex_hull)
         along = np.diff(points, axis=0)
         along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -128,7 +131,7 @@ class Outline:
 
     @cached_property
     def long_axis(self) -> tuple[FloatArray, float, float]:
-        """Unit vector along the rectangle's long side, its length and the short side's, px."""
+        """Unit vector along the rectangle's long side, then the long and short lengths, px."""
         sides = np.roll(self.rectangle, -1, axis=0) - self.rectangle
         lengths = np.linalg.norm(sides, axis=1)
         longest = int(np.argmax(lengths[:2]))
@@ -139,7 +142,7 @@ class Outline:
 
     @cached_property
     def centre(self) -> tuple[float, float]:
-        """The centroid where it lies well inside, else the centre of the largest inscribed disc."""
+        """The centroid if it lies well inside, else the centre of the largest inscribed disc."""
         with np.errstate(all="ignore"):  # GEOS on denormal coordinates
             disc = shapely.maximum_inscribed_circle(self.polygon)
         centroid = self.polygon.centroid
@@ -151,10 +154,10 @@ class Outline:
 
     @cached_property
     def corners(self) -> FloatArray:
-        """The corners robots can be sent to, (k, 2).
+        """The corners that robots can be sent to, (k, 2).
 
-        Of a polygonal outline the vertices that turn by more than 25 degrees, where they
-        rebuild the region; else the corners of the bulk's rectangle.
+        The vertices of a polygonal outline that turn by more than 25 degrees, if they overlap
+        the filled region by more than 0.9 (IoU); else the corners of the bulk's rectangle.
         """
         if self.kind == "polygonal":
             turning = [
@@ -167,7 +170,7 @@ class Outline:
         return self.bulk_rectangle
 
     def graph(self) -> tuple[FloatArray, NDArray[np.intp]]:
-        """G = (V, E) as arrays: (k, 2) coordinates and (k, 2) index pairs."""
+        """Return G = (V, E) as arrays: (k, 2) coordinates and (k, 2) index pairs."""
         return np.asarray(self.vertices, dtype=float), np.asarray(self.edges, dtype=np.intp)
 
 
@@ -179,7 +182,8 @@ def make_outline(exterior: ArrayLike, holes: tuple[ArrayLike, ...] = ()) -> Outl
         holes: rings of the same form.
 
     Raises:
-        InputError: no pairs of numbers, fewer than 3, or enclosing under 4 square pixels.
+        InputError: points are not pairs of numbers, number fewer than 3, lie beyond FARTHEST, or
+            enclose under 4 square pixels.
     """
     outer, *inner = (_checked_ring(ring) for ring in (exterior, *holes))
     region = shapely.make_valid(Polygon(outer))
@@ -201,12 +205,13 @@ def _checked_ring(points: ArrayLike) -> FloatArray:
 
 
 def outline_of(polygon: BaseGeometry) -> Outline:
-    """Build an outline from a polygon; an invalid one is mended, of several parts the largest kept.
+    """Build an outline from a polygon.
 
-    More than 5,000 vertices are thinned out, moving the boundary by a fraction of a pixel.
+    An invalid polygon is mended, and of several parts the largest is used. More than 5,000 vertices
+    are thinned out, which moves the boundary by a fraction of a pixel.
 
     Raises:
-        InputError: the region has under 4 square pixels.
+        InputError: the region has an area under 4 square pixels.
     """
     tolerance = 0.05
     while shapely.get_num_coordinates(polygon) > MAX_VERTICES:
@@ -222,7 +227,7 @@ def outline_of(polygon: BaseGeometry) -> Outline:
 
 
 def distances(geometry: BaseGeometry, points: FloatArray) -> FloatArray:
-    """Distance of each of (n, 2) points to a geometry, 0 inside a polygon, (n,), px."""
+    """Return the distance of each point (n, 2) to a geometry, (n,), px; 0 inside a polygon."""
     places = np.asarray(shapely.points(points), dtype=object)
     if len(places) * shapely.get_num_coordinates(geometry) < WALKED:
         return np.asarray(shapely.distance(geometry, places), dtype=float)
@@ -236,10 +241,10 @@ def distances(geometry: BaseGeometry, points: FloatArray) -> FloatArray:
 def nearest_segments(
     geometry: BaseGeometry, places: NDArray[np.object_]
 ) -> tuple[NDArray[np.intp], FloatArray]:
-    """The nearest segment of lines or boundaries to each of (n,) places, and its distance, px.
+    """Return each place's (n,) nearest segment of lines or boundaries, and its distance, px.
 
-    Segments count through all lines in their order. A tree answers where GEOS, asked for a
-    distance, walks along the whole of the geometry for each place.
+    Segments are numbered through all lines in order. A tree is used because GEOS's own distance
+    walks along the whole geometry for each place.
     """
     points, line = shapely.get_coordinates(
         shapely.get_parts(_lines_of(geometry)), return_index=True
@@ -253,18 +258,22 @@ def nearest_segments(
 
 
 def _lines_of(geometry: BaseGeometry) -> BaseGeometry:
-    """The boundary of what has an area, else the lines themselves."""
+    """Return the boundary of a geometry with an area, else the lines themselves."""
     return geometry.boundary if shapely.area(geometry) > 0 else geometry
 
 
 def largest_part(geometry: shapely.Geometry) -> Polygon | None:
-    """The polygon of largest area in any geometry, or None where there is none."""
+    """Return the polygon of largest area in any geometry, or None if it has none."""
     parts = [g for g in shapely.get_parts(shapely.get_parts(geometry)) if isinstance(g, Polygon)]
     return max(parts, key=lambda g: g.area, default=None)
 
 
 def _simplify(ring: FloatArray) -> tuple[FloatArray, Kind, float]:
-    """V by sweeping the Douglas-Peucker tolerance and taking the commonest vertex count."""
+    """Return V, the kind and its confidence, by sweeping the Douglas-Peucker tolerance.
+
+    For a polygonal ring, V is the first candidate with the commonest vertex count; for a smooth
+    one, that of the smallest tolerance.
+    """
     start = int(np.argmax(((ring - ring.mean(axis=0)) ** 2).sum(axis=1)))
     closed = np.concatenate([np.roll(ring, -start, axis=0), ring[start : start + 1]])
     line = shapely.LineString(closed)
@@ -288,10 +297,10 @@ def _douglas_peucker(line: shapely.LineString, tolerance: float) -> FloatArray:
 
 
 def rectangle_of(geometry: BaseGeometry) -> FloatArray:
-    """Corners of the minimum-area rectangle, (4, 2), counter-clockwise in (x, y).
+    """Return the corners of the minimum-area rectangle, (4, 2), counter-clockwise in (x, y).
 
-    One side of it lies on a side of the convex hull (Freeman and Shapira 1975), so all are tried.
-    GEOS's own (3.14) can leave a part of the geometry outside.
+    One of its sides lies on a side of the convex hull (Freeman and Shapira 1975), so all are tried.
+    The rectangle of GEOS 3.14 can leave a part of the geometry outside.
     """
     hull = shapely.get_coordinates(geometry.convex_hull)
     sides = np.diff(hull, axis=0)
@@ -307,7 +316,7 @@ def rectangle_of(geometry: BaseGeometry) -> FloatArray:
 
 
 def _half_spanned(region: BaseGeometry, rectangle: FloatArray) -> FloatArray:
-    """The rectangle with each side moved in to where the region spans half its widest, (4, 2)."""
+    """Return the rectangle, (4, 2), with each side moved in to where the region spans HALF_SPAN."""
     corner, sides = rectangle[0], (rectangle[1] - rectangle[0], rectangle[3] - rectangle[0])
     steps = (np.arange(SPAN_STEPS) + 0.5) / SPAN_STEPS
     bounds: list[tuple[float, float]] = []
@@ -323,7 +332,7 @@ def _half_spanned(region: BaseGeometry, rectangle: FloatArray) -> FloatArray:
 
 
 def _contour_noise(closed: FloatArray) -> float:
-    """Noise of a pixel contour: robust deviation from its smoothed self, px."""
+    """Return the noise of a pixel contour, px: its robust deviation from its smoothed version."""
     ring = closed[:-1]
     if len(ring) < 60 or shapely.LineString(closed).length / len(ring) > 2:
         return 0.0  # a drawn polygon, not a traced one
@@ -338,7 +347,7 @@ def _contour_noise(closed: FloatArray) -> float:
 
 
 def _turning_angles(vertices: tuple[tuple[float, float], ...]) -> FloatArray:
-    """Turning angle at each vertex, radians, signed."""
+    """Return the signed turning angle at each vertex, (k,), radians."""
     points = np.asarray(vertices, dtype=float)
     before = points - np.roll(points, 1, axis=0)
     after = np.roll(points, -1, axis=0) - points

@@ -1,4 +1,4 @@
-"""Rings of robots: with equal straight distances, several nested ones, or inside holes.
+"""Rings of robots: with equal chords, nested, or inside holes.
 
 Pure functions from outlines to points, built on the offset curves of `curves`. Frame: image
 pixels, x right, y down.
@@ -23,23 +23,24 @@ from .sampling import PHASES, along_curve, arc_length, nearest, split
 
 CHORD_STEPS = 200
 EQUAL = 0.999
-"""Shortest by longest chord at which the relaxation has come far enough."""
+"""Ratio of the shortest to the longest chord at which the relaxation stops."""
 DAMPING = 0.5
 MOST_STEP = 1.5
-"""Longest arc between neighbours by the mean one: beyond it other starts are tried, as a chord may
-only look short, straight through what the curve goes around."""
+"""Ratio of the longest arc between neighbours to the mean arc beyond which other starts are tried:
+a chord may be short only because it cuts straight through what the curve goes around."""
 BARE = 2.1
-"""From here on more of the ring is bare than equal chords are worth: arcs keep to MOST_STEP."""
+"""Beyond this ratio too much of the ring is bare to be worth equal chords, and arcs are kept within
+MOST_STEP."""
 
 
 def equal_chords(curve: Curve, n: int) -> FloatArray:
-    """N points on a curve in one piece, neighbours at equal straight distances.
+    """Return n points on a curve in one piece, with equal straight distances between neighbours.
 
     Equal arc lengths cut corners short; here each point moves along the curve until the chords to
-    its two neighbours are as long. Points that are no neighbours may still come near each other
-    across a neck: see `min_spacing`. A curve in several pieces keeps equal arc lengths; where
-    equal chords would leave much of a ring bare, as about something thin, they are as equal as they
-    get without.
+    its two neighbours are equally long. Points that are not neighbours may still come near each
+    other across a neck: see `min_spacing`. A curve in several pieces keeps equal arc lengths. If
+    equal chords would leave much of a ring bare, as around a thin object, chords are only as equal
+    as is possible without that.
 
     On an open curve the end robots stay at its ends.
 
@@ -62,7 +63,7 @@ def equal_chords(curve: Curve, n: int) -> FloatArray:
 
 
 class _Relaxed(NamedTuple):
-    """Points, the shortest by the longest chord, and the longest by the mean arc."""
+    """Points, the ratio of shortest to longest chord, and that of longest to mean arc."""
 
     points: FloatArray
     even: float
@@ -70,9 +71,9 @@ class _Relaxed(NamedTuple):
 
 
 def _relaxed(curve: Curve, at: FloatArray, most: float = np.inf) -> _Relaxed:
-    """Points slid from given arc lengths until chords are equal, or as even as they got.
+    """Slide points from the given arc lengths until chords are equal, or as even as they get.
 
-    No arc gets longer than `most` times the mean one.
+    No arc gets longer than `most` times the mean arc.
     """
     best = _Relaxed(np.empty((0, 2)), -1.0, np.inf)
     for _ in range(CHORD_STEPS):
@@ -102,20 +103,20 @@ def nested_rings(
     count: int,
     frame: Frame | None = None,
 ) -> tuple[FloatArray, ...]:
-    """N robots over several rings of an outline, shared by length, each ring further out.
+    """Share n robots by length over several rings around an outline, each further out.
 
-    Every second ring stands in the gaps of the one before it, as far as their counts allow.
+    Each ring is staggered into the gaps of the one inside it, as far as their counts allow.
 
     Args:
         outline: what to go around.
-        n: how many over all rings.
-        offset: distance of the first ring, px.
-        step: from one ring to the next, px.
-        count: how many rings.
+        n: number of robots over all rings.
+        offset: distance of the first ring from the outline, px.
+        step: distance from one ring to the next, px.
+        count: number of rings.
         frame: where robots may stand, which may cut rings open; None for the whole plane.
 
     Returns:
-        Per ring (k, 2), the innermost first; the k sum to n unless the picture leaves no room.
+        For each ring (k, 2), innermost first; the k sum to n unless the picture leaves no room.
     """
     offsets = [offset + k * step for k in range(count)]
     curves = [ring(outline, away, away, frame, keep=away) for away in offsets]
@@ -133,15 +134,15 @@ def nested_rings(
 
 
 def hole_rings(outline: Outline, n: int, offset: float) -> tuple[FloatArray, ...]:
-    """N robots inside the holes of an outline, along their edges, shared by length.
+    """Share n robots by length over the holes of an outline, along the holes' edges.
 
     Args:
-        outline: with holes; without any there is nowhere to stand.
-        n: how many over all holes.
+        outline: an outline with holes; without any there is nowhere to stand.
+        n: number of robots over all holes.
         offset: distance kept from the hole's edge, px.
 
     Returns:
-        Per hole with room (k, 2); none where there is no hole that wide.
+        (k, 2) for each hole with room and robots; empty if no hole is wide enough.
     """
     reach = offset * ROUND_JOIN_DIP
     holes = [Polygon(hole) for hole in outline.polygon.interiors]
@@ -156,7 +157,7 @@ def hole_rings(outline: Outline, n: int, offset: float) -> tuple[FloatArray, ...
 
 
 def _staggered(curve: Curve, points: FloatArray, before: FloatArray) -> FloatArray:
-    """The same ring turned to where its robots are furthest from those of the ring before."""
+    """Rotate a ring to where its robots are furthest from those of the ring before it."""
     line, gap = curve.lines[0], curve.length / len(points)
     first = _first(line, points)
     stations = first + gap * (np.arange(len(points)) + np.arange(PHASES)[:, None] / PHASES)
@@ -166,12 +167,15 @@ def _staggered(curve: Curve, points: FloatArray, before: FloatArray) -> FloatArr
 
 
 def _first(line: FloatArray, points: FloatArray) -> float:
-    """Arc length of the first of some points that lie on a polyline, px."""
+    """Return the arc length of the first of the points along a polyline, px."""
     return float(shapely.line_locate_point(LineString(line), shapely.Point(points[0])))
 
 
 def _arc_lengths(curve: Curve, points: FloatArray) -> FloatArray:
-    """Where `along_curve` put its points on a curve in one piece, px; past a loop's end too."""
+    """Return the arc lengths, (n,), px, of points from `along_curve` on a curve in one piece.
+
+    They may run past a loop's end.
+    """
     count: FloatArray = np.arange(len(points), dtype=float)
     cut = 0.0 if curve.closed else curve.cut(len(points))
     if cut is None:

@@ -1,4 +1,4 @@
-"""Where N robots stand on a curve, at corners or around a point, and how near they are.
+"""Places N robots on a curve, at corners or around a point, and measures their spacing.
 
 Pure functions from shapes to (n, 2) float arrays in image pixels (x right, y down).
 """
@@ -13,21 +13,21 @@ from .curves import Curve, interpolate
 from .outline import FloatArray, Outline
 
 PHASES = 24
-"""Rotations tried when the start of a closed curve is free."""
+"""Number of starts tried on a closed curve, whose start is free."""
 PAIRS = 64
-"""Up to this many robots all pairs are compared at once; past it a tree is quicker."""
+"""Up to this many robots all pairs are compared at once; beyond it a tree is quicker."""
 
 
 def along_curve(curve: Curve, n: int) -> FloatArray:
-    """N points at equal arc length.
+    """Return n points at equal arc lengths along a curve.
 
     On a loop the start is free and chosen so that nearest neighbours are as far apart as
-    possible. On an open curve the first and last robot stand at its ends, but where that is a
-    loop with a cut narrower than a gap, the cut counts as one of the gaps. Several pieces share
-    the robots by length, half a gap from their ends.
+    possible. On an open curve the first and last robots stand at its ends; if it is a loop with a
+    cut narrower than a gap, though, the cut counts as one of the gaps. Several pieces share the
+    robots by length, half a gap from their ends.
 
     Returns:
-        (n, 2); empty when nothing of the curve is left.
+        (n, 2); empty if nothing of the curve is left.
     """
     if curve.length <= 0:
         return np.empty((0, 2))
@@ -52,7 +52,7 @@ def along_curve(curve: Curve, n: int) -> FloatArray:
 
 
 def at_corners(outline: Outline, n: int, standoff: float) -> FloatArray:
-    """Places off the `corner_points` of n robots, each `standoff` px from the outline, (k, 2)."""
+    """Return a place off each of the `corner_points`, `standoff` px from the outline, (k, 2)."""
     corners = corner_points(outline, n)
     before = _unit(corners - np.roll(corners, 1, axis=0))
     after = _unit(np.roll(corners, -1, axis=0) - corners)
@@ -63,16 +63,19 @@ def at_corners(outline: Outline, n: int, standoff: float) -> FloatArray:
 
 
 def corner_points(outline: Outline, n: int) -> FloatArray:
-    """The corners that n robots are matched with, (k, 2).
+    """Return the corners that n robots are matched with, (k, 2).
 
-    Four robots on an outline with another number of corners take the bulk's rectangle's.
+    Four robots take the corners of the bulk's rectangle if the outline does not have four corners.
     """
     corners = outline.corners
     return outline.bulk_rectangle if n == 4 and len(corners) != 4 else corners
 
 
 def around_point(centre: tuple[float, float], n: int, spacing: float) -> FloatArray:
-    """N points of a hexagonal lattice nearest to a centre, their mean on it, (n, 2)."""
+    """Return the n points of a hexagonal lattice nearest to a centre, their mean on it, (n, 2).
+
+    `spacing` is the lattice's pitch, px.
+    """
     reach = math.ceil(math.sqrt(n)) + 1
     i, j = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
     lattice = np.stack([i + j / 2, j * math.sqrt(3) / 2], axis=-1).reshape(-1, 2) * spacing
@@ -83,14 +86,14 @@ def around_point(centre: tuple[float, float], n: int, spacing: float) -> FloatAr
 
 
 def min_spacing(points: FloatArray) -> float:
-    """Distance of the closest pair, px; infinite for fewer than two points."""
+    """Return the distance of the closest pair, px; infinite for fewer than two points."""
     if len(points) < 2:
         return math.inf
     return float(nearest(points, points, 2)[0][:, 1].min())
 
 
 def nearest(points: FloatArray, queries: FloatArray, k: int) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Distances to and indices of the k nearest points, (m,) each for k = 1, else (m, k)."""
+    """Return distances to and indices of the k nearest points, (m,) each for k = 1, else (m, k)."""
     from scipy.spatial import cKDTree
 
     distance, index = cKDTree(points).query(queries, k=k)
@@ -98,7 +101,10 @@ def nearest(points: FloatArray, queries: FloatArray, k: int) -> tuple[FloatArray
 
 
 def open_points(line: FloatArray, n: int) -> FloatArray:
-    """N points at equal arc length of a polyline (m, 2), with both its ends; one in its middle."""
+    """Return n points at equal arc lengths of a polyline (m, 2), both ends included.
+
+    A single point lies in its middle.
+    """
     length = arc_length(line)
     return interpolate(line, np.array([length / 2]) if n == 1 else np.linspace(0, length, n))
 
@@ -112,7 +118,7 @@ def _best_phase(loop: FloatArray, n: int) -> FloatArray:
 
 
 def _closest_pairs(layouts: FloatArray) -> FloatArray:
-    """The distance of the closest pair of each layout (k, n, 2), (k,), px."""
+    """Return the distance of the closest pair of each layout (k, n, 2), (k,), px."""
     n = layouts.shape[1]
     if n > PAIRS:
         return np.array([min_spacing(points) for points in layouts])
@@ -123,12 +129,12 @@ def _closest_pairs(layouts: FloatArray) -> FloatArray:
 
 
 def arc_length(line: FloatArray) -> float:
-    """Length of a polyline (m, 2), px."""
+    """Return the length of a polyline (m, 2), px."""
     return float(LineString(line).length)
 
 
 def split(lengths: FloatArray, n: int) -> list[int]:
-    """Shares of n robots by length (k,), rounded by largest remainder."""
+    """Split n robots in proportion to lengths (k,), rounding by largest remainder."""
     ideal = n * lengths / lengths.sum()
     counts = np.floor(ideal).astype(int)
     for index in np.argsort(counts - ideal, kind="stable")[: n - counts.sum()]:
@@ -154,7 +160,7 @@ def _push(outline: Outline, corner: FloatArray, outward: FloatArray, standoff: f
 
 
 def spread_subset(points: FloatArray, n: int) -> NDArray[np.intp]:
-    """Indices of n points far apart, by farthest-point selection, in their given order."""
+    """Return the indices of n points far apart, by farthest-point selection, in ascending order."""
     distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
     chosen = [int(np.argmax(distance))]
     nearest = np.linalg.norm(points - points[chosen[0]], axis=1)

@@ -1,1 +1,1 @@
-"""Positions against a contract: every violation at once, with numbers."""
+"""Checks positions against a contract and reports every violation at once, with numbers."""

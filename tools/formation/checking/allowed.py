@@ -1,4 +1,4 @@
-"""Where robots of a group may stand, as an area: to be shown, and for those that are dragged.
+"""The area in which robots of a group may stand, for display and for dragging robots.
 
 Frame: image pixels, x right, y down.
 """
@@ -15,9 +15,9 @@ from .verdict import Part
 
 
 def allowed_area(part: Part) -> BaseGeometry | None:
-    """Where the centres of a group's robots may be; None where that is no area.
+    """Return the area in which a group's robots may have their centres; None if it is not an area.
 
-    It is what the group's clearance and sides leave; spacing is not looked at.
+    It follows from the group's clearance and sides; spacing is ignored.
     """
     group, radius = part.group, part.radius
     if group.relation == "centre":
@@ -29,7 +29,7 @@ def allowed_area(part: Part) -> BaseGeometry | None:
         return None
     least, greatest = (limit + radius for limit in part.clearance)
     solid = part.outline.filled
-    # What lies far outside the picture is never seen, and costs time to make.
+    # What lies far outside the picture is never seen, but takes time to compute.
     reach = min(greatest, part.site.width + part.site.height)
     ring = solid.buffer(reach).difference(solid.buffer(least))
     if group.sides is not None:
@@ -41,7 +41,7 @@ def allowed_area(part: Part) -> BaseGeometry | None:
 
 
 def curve_of(part: Part) -> Curve | None:
-    """The curve that the group stands on; None where the picture leaves nothing of it."""
+    """Return the curve that the group stands on; None if nothing of it lies in the picture."""
     try:
         curve = reference_curve(part.group, part.site, part.radius)
     except ToolError:

@@ -1,6 +1,6 @@
-"""Whether a cage holds: the verdict, the measures and the finding.
+"""The verdict, measures and finding on whether a cage holds.
 
-The geometry proves or disproves it; here is what is run when, and what a model is told.
+The geometry proves or disproves it; this module decides which tests to run and what to report.
 """
 
 import math
@@ -11,16 +11,16 @@ from ..placement.caging import escape_proof, walls_of
 from .verdict import Audit, Escape, Part
 
 WORDS = {"caged": "certified", "not certified": "not certified", "escape": "gets out"}
-"""What the measure `escape_proof` says of each state; the worst one last."""
+"""The value of the measure `escape_proof` for each state, the worst one last."""
 WORSE = tuple(WORDS.values())
 
 
 def judge(part: Part, curve: Curve, audit: Audit) -> None:
-    """Report whether the target is caged, and find fault if it must be and is not.
+    """Report whether the target is caged, with a finding if it has to be and is not.
 
-    The disc test is always run. Where it does not certify, up to 300 robots have the
-    configuration space flooded: all levels for an escape-proof closure (up to about a second of
-    CPU time for ten robots), the two coarsest for a ring (under a tenth).
+    The disc test is always run. If it does not certify, the configuration space is flooded for up
+    to 300 robots: on all levels for an escape-proof closure (up to about a second of CPU time for
+    ten robots), on the two coarsest for a ring (under a tenth).
     """
     levels = THOROUGH if escape_proof(part.group) else QUICK
     found = cage(

@@ -1,7 +1,7 @@
-"""The checker: positions against a contract, every violation at once, with numbers.
+"""Checks positions against a contract and reports every violation at once, with numbers.
 
-It measures with exact distances on float polygons and trusts nothing about where the
-positions came from. Frame: image pixels, x right, y down; robots count from 1 over all groups.
+It measures exact distances on float polygons and assumes nothing about how the positions came
+about. Frame: image pixels, x right, y down; robots are numbered from 1 over all groups.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,18 +28,18 @@ from .figure_check import on_figure
 from .verdict import TOLERANCE, Audit, Part, Verdict, parts_of
 
 SPACING_SHARE, COVER_SHARE = 0.6, 1.4
-"""inside, even: against a Lloyd tessellation of the same region at least this share of its
-smallest spacing, at most this multiple of its coverage radius."""
+"""For an even `inside` group, compared with a Lloyd tessellation of the same region: at least
+SPACING_SHARE of its smallest spacing, at most COVER_SHARE times its coverage radius."""
 SAMPLED = 7
-"""Of the ground the ideal places cover every so-manieth cell is looked at first."""
+"""The coverage of the ideal places is first estimated from every 7th cell."""
 LINE_SHARE = 0.03
-"""How far off a straight line a robot may stand, as a share of its length in the picture."""
+"""How far off a straight line a robot may stand, as a share of the line's length in the picture."""
 HEADING_SLACK = 1.0
-"""How far a robot may look past what it is to look at, degrees."""
+"""Tolerance on a robot's heading, degrees."""
 AT_POINT = 0.5
-"""As near to a point, px, a robot is at it."""
+"""A robot within this distance of a point, px, is at it."""
 WHOLE = 0.995
-"""A curve of which the picture leaves this share is not cut."""
+"""A curve does not count as cut if at least this share of it lies in the picture."""
 
 
 def certify(
@@ -48,15 +48,16 @@ def certify(
     site: Site,
     headings: Sequence[float | None] | None = None,
 ) -> Verdict:
-    """Check positions against a contract whose defaults are written out.
+    """Check positions against a contract whose defaults are filled in.
 
     Args:
         positions: (N, 2) image pixels, robots in order over all groups.
-        site: with every target the contract names.
-        headings: degrees in the same order; None where they are not looked at.
+        contract: with its defaults, in px.
+        site: with every target that the contract names.
+        headings: headings in the same order, degrees; None to skip their check.
 
     Raises:
-        InputError: the positions are no (N, 2) array.
+        InputError: the positions are not an (N, 2) array.
     """
     audit = Audit(site.metres_per_pixel)
     points = np.asarray(positions, dtype=float)
@@ -100,28 +101,28 @@ def _check_bounds(points: FloatArray, contract: Contract, site: Site, audit: Aud
 
 
 def _check_crowding(points: FloatArray, contract: Contract, audit: Audit) -> None:
-    """Robots whose nearest neighbour is nearer than their group allows, each once."""
+    """Report robots whose nearest neighbour is nearer than their group allows, each pair once."""
     if len(points) < 2:
         return
     least = np.concatenate(
         [np.full(g.robots, g.min_spacing or contract.spacing_floor) for g in contract.groups]
     )
     apart, other = nearest(points, points, 2)
-    own = other[:, 1] == np.arange(len(points))  # of robots on one spot any may come first
+    own = other[:, 1] == np.arange(len(points))  # robots in one spot may come in any order
     partner = np.where(own, other[:, 0], other[:, 1])
     for i in np.flatnonzero(apart[:, 1] < least - TOLERANCE):
         j = partner[i]
         if j > i and partner[j] == i and apart[j, 1] < least[j] - TOLERANCE:
-            continue  # robot j has the finding
+            continue  # reported for robot j
         audit.find("too_close", apart[i, 1], least[i], robot=i, others=(j,))
 
 
 def _check_keep_out(points: FloatArray, contract: Contract, site: Site, audit: Audit) -> None:
-    """No robot stands on what is kept out of, or on what another group stands around."""
+    """Report robots on a keep-out, or on a target of another group that no group enters."""
     groups = np.repeat(np.arange(len(contract.groups)), [g.robots for g in contract.groups])
     for name in contract.solid_targets:
         owners = [k for k, g in enumerate(contract.groups) if name in g.targets]
-        foreign = ~np.isin(groups, owners)  # a group's own rule speaks of its own target
+        foreign = ~np.isin(groups, owners)  # a group's own target is checked by its own rule
         if not foreign.any():
             continue
         distance = distances(site.solid(name, contract), points)
@@ -130,17 +131,18 @@ def _check_keep_out(points: FloatArray, contract: Contract, site: Site, audit: A
 
 
 def _check_outside(part: Part, audit: Audit) -> None:
-    """Robots stand off the filled outline, their edges within the clearance range.
+    """Check that robots are off the filled outline and their edges within the clearance range.
 
-    At corners the distance to the corner is the upper limit: rounded outlines fall short of it.
+    At corners the upper limit is the distance to the corner, checked elsewhere, because rounded
+    outlines fall short of their corners.
     """
     distance = distances(part.outline.filled, part.points)
     clearance = distance - part.radius
-    beyond = clearance  # a line beside a side passes its recesses by
-    if part.group.relation == "along" and part.group.edges is None:
+    beyond = clearance
+    if part.group.relation == "along" and part.group.edges is None:  # it bridges recesses
         beyond = distances(part.outline.envelope, part.points) - part.radius
     least, greatest = part.clearance
-    most = (greatest + part.radius) * ROUND_JOIN_DIP - part.radius  # a ring there is a polyline
+    most = (greatest + part.radius) * ROUND_JOIN_DIP - part.radius  # such a ring is a polyline
     audit.least("min_clearance_px", clearance.min())
     audit.greatest("max_clearance_px", clearance.max())
     name = part.group.targets[0]
@@ -172,7 +174,7 @@ def _check_around(part: Part, audit: Audit) -> None:
 
 
 def _nowhere(curve: Curve, name: str, audit: Audit) -> bool:
-    """Whether nothing of a curve lies inside the picture, which is a finding."""
+    """Return whether nothing of a curve lies inside the picture, and report that."""
     if curve.length > 0:
         return False
     audit.find("nothing_in_picture", about=name)
@@ -180,7 +182,7 @@ def _nowhere(curve: Curve, name: str, audit: Audit) -> bool:
 
 
 def _note_cut(curve: Curve, name: str, audit: Audit) -> float:
-    """Note which share of a curve the picture leaves."""
+    """Note and return the share of a curve that lies inside the picture."""
     share = curve.length / curve.whole_length
     audit.notes.append(
         f"Only {share:.0%} of {name} lies inside the picture; the robots spread over that."
@@ -204,7 +206,7 @@ def _check_along(part: Part, audit: Audit) -> None:
 
 
 def _check_gaps(part: Part, curve: Curve, audit: Audit) -> None:
-    """How far neighbours on a curve are from each other, as the contract has it."""
+    """Check the distances between neighbours on a curve by whatever the contract demands."""
     group = part.group
     if group.opens:
         gaps.opening_left(part, curve, audit)
@@ -279,7 +281,7 @@ def _check_inside(part: Part, audit: Audit) -> None:
 
 
 def _check_depth(part: Part, audit: Audit) -> None:
-    """Every robot as deep inside the target as it must and may be."""
+    """Check that every robot is inside the target, as deep as it must and no deeper than it may."""
     polygon, name = part.outline.polygon, part.group.targets[0]
     sign = np.where(shapely.intersects_xy(polygon, part.points), 1.0, -1.0)
     depth = sign * distances(polygon.boundary, part.points) - part.radius
@@ -313,9 +315,9 @@ def _check_spread(part: Part, audit: Audit) -> None:
 def _uncovered_at_most(
     cover: float, region: Outline, ideal: FloatArray, cells: FloatArray
 ) -> float:
-    """How far ground may be from the nearest robot, px, or less where that suffices.
+    """Return how far ground may be from the nearest robot, px, or less if `cover` meets that.
 
-    A part of the ground is no further from the ideal places than all of it.
+    A sample of the ground gives a lower bound, which saves measuring all of it.
     """
     most = np.inf
     for every in (SAMPLED, 1) if len(ideal) else ():
@@ -335,7 +337,7 @@ def _check_centre(part: Part, audit: Audit) -> None:
 
 
 def _check_at(part: Part, audit: Audit) -> None:
-    """Everybody at a point of their own, and off the group's targets."""
+    """Check that every robot is at its own point, and off the group's targets."""
     _check_off_targets(part, audit)
     wanted = np.asarray(part.group.points, dtype=float)
     off = np.linalg.norm(part.points - wanted, axis=1)

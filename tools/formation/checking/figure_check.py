@@ -1,6 +1,6 @@
-"""Whether robots draw the shape a contract names: on its lines, no part of them bare, none crowded.
+"""Checks that robots draw the shape a contract names: on its lines, none of them bare or crowded.
 
-The yardstick is the placement that `figure` itself would make on the same lines.
+The reference is the placement that `figure` itself would make on the same lines.
 """
 
 from shapely.geometry import LineString, MultiLineString
@@ -16,13 +16,13 @@ from .verdict import TOLERANCE, Audit, Part
 LINE_SHARE = 0.03
 """How far off a shape's lines a robot may stand, as a share of its shorter side."""
 GRID_SHARE = 0.25
-"""How far off its place in a grid, as a share of the grid's pitch."""
+"""How far off its place in a grid a robot may stand, as a share of the grid's pitch."""
 LEAST_REACH = 2.0
-"""Whatever the size, a robot this near, px, stands on the line."""
+"""A robot within this distance, px, stands on the line, whatever the shape's size."""
 
 
 def on_figure(part: Part, figure: Sketch, audit: Audit) -> None:
-    """Robots against the lines, or the places, of a shape."""
+    """Check robots against the lines, or the grid places, of a shape."""
     ideal = robots_on(figure, part.group.robots)
     apart = min_spacing(ideal)
     if figure.places is not None:
@@ -52,7 +52,7 @@ def on_figure(part: Part, figure: Sketch, audit: Audit) -> None:
 
 
 def _in_grid(part: Part, places: FloatArray, pitch: float, audit: Audit) -> None:
-    """Every robot near a place of its own."""
+    """Check that every robot is near a place of its own."""
     reach = max(GRID_SHARE * pitch, LEAST_REACH) if len(places) > 1 else LEAST_REACH
     distance, place = nearest(places, part.points, 1)
     audit.greatest("max_from_place_px", distance.max())

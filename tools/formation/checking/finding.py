@@ -1,4 +1,4 @@
-"""What the checker finds wrong: a kind and its numbers, from which its sentence is made.
+"""What the checker finds wrong: a kind and numbers, from which a sentence is made.
 
 Code reacts to the kind and reads the numbers; sentences are for people and models.
 """
@@ -13,9 +13,9 @@ from ..value import Value
 
 _TEXTS = json.loads(resources.files(__package__ or "").joinpath("findings.json").read_text("utf-8"))
 SENTENCES: dict[str, str] = _TEXTS["sentences"]
-"""Every kind of finding, and what it says."""
+"""The sentence template of every kind of finding."""
 REMEDIES: dict[str, tuple[str, str]] = _TEXTS["remedies"]
-"""What helps, where a number of robots does and where none is known to."""
+"""What helps: the text if a number of robots is known to do, and the text if none is."""
 
 
 class Finding(Value):

@@ -1,4 +1,4 @@
-"""Gaps between neighbours on a curve: exact ones, widest ones, an opening, and none elsewhere."""
+"""Checks gaps between neighbours on a curve: an exact pitch, a greatest gap, and an opening."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,16 +8,16 @@ from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import nearest
 from ..contract import nominal, pitch_slack
 from ..placement.ring_parts import opening_station, ring_line, sides_of
-from ..placement.spacing import NARROWEST, WIDEST, enough, stations_on
+from ..placement.spacing import NARROWEST, WIDEST, count_for_max_gap, stations_on
 from .verdict import TOLERANCE, Audit, Part
 
 IntArray = NDArray[np.intp]
 CLEARLY = 1.5
-"""An opening is at least so many times as wide as the widest other gap, along the ring."""
+"""An opening is at least this many times as wide as the widest other gap, along the ring."""
 
 
 def on_sides(part: Part, audit: Audit) -> None:
-    """Nobody stands off the sides of the target that were named."""
+    """Check that no robot stands off the sides of the target that were named."""
     off = distances(sides_of(part.group, part.site), part.points)
     for i in np.flatnonzero(off > TOLERANCE):
         about = " and ".join(part.group.sides or ())
@@ -25,7 +25,7 @@ def on_sides(part: Part, audit: Audit) -> None:
 
 
 def _neighbours(part: Part, curve: Curve) -> tuple[IntArray, IntArray, FloatArray]:
-    """Indices of robots next to each other along a curve, and how far apart they are, straight."""
+    """Return indices of neighbours along a curve and their straight distances, px, (m,) each."""
     station, piece = stations_on(part.points, curve)
     order = np.argsort(station, kind="stable")
     after = np.roll(order, -1)
@@ -37,12 +37,12 @@ def _neighbours(part: Part, curve: Curve) -> tuple[IntArray, IntArray, FloatArra
 
 
 def pitch_kept(part: Part, curve: Curve, audit: Audit) -> None:
-    """Neighbours along a curve stand exactly as far apart as the contract has it."""
+    """Check that neighbours along a curve stand exactly the contract's pitch apart."""
     _compare(part, *_neighbours(part, curve), audit)
 
 
 def pitch_nearest(part: Part, audit: Audit) -> None:
-    """Everybody on a shape has the nearest other robot exactly as far away."""
+    """Check that the nearest neighbour of every robot on a shape is exactly the pitch away."""
     if len(part.points) > 1:
         apart, other = nearest(part.points, part.points, 2)
         _compare(part, np.arange(len(part.points)), other[:, 1], apart[:, 1], audit)
@@ -58,18 +58,20 @@ def _compare(part: Part, one: IntArray, other: IntArray, apart: FloatArray, audi
 
 
 def no_wider(part: Part, curve: Curve, audit: Audit) -> None:
-    """No gap between neighbours' edges is wider than the contract allows."""
+    """Check that no gap between neighbours' edges is wider than the contract allows."""
     one, other, apart = _neighbours(part, curve)
     limit, wide = part.group.max_gap or 0.0, apart - 2 * part.radius
     if len(wide):
         audit.greatest("widest_opening_px", wide.max())
     for k in np.flatnonzero(wide > limit + TOLERANCE):
         i, j = part.first + one[k], part.first + other[k]
-        audit.find("opening", wide[k], limit, robot=i, others=(j,), needed=enough(part, curve))
+        audit.find(
+            "opening", wide[k], limit, robot=i, others=(j,), needed=count_for_max_gap(part, curve)
+        )
 
 
 def opening_left(part: Part, curve: Curve, audit: Audit) -> None:
-    """The ring has its opening where it is to be, clearly wider than the gaps of all others."""
+    """Check that the ring has its opening where demanded, clearly wider than all other gaps."""
     group = part.group
     offset = nominal(group.offsets()) + part.radius
     loop = ring_line(group, part.site, part.radius, offset)
@@ -79,7 +81,7 @@ def opening_left(part: Part, curve: Curve, audit: Audit) -> None:
     first, last = order[0], order[-1]
     along, gaps = float(station[first] + length - station[last]), np.diff(station[order])
     ends = part.points[[first, last]]
-    if along > length / 2:  # wider than the ring is: as wide as it
+    if along > length / 2:  # more than half the ring: measure to the opposite point
         ends[1] = interpolate(loop, (locate(loop, ends[:1]) - length / 2) % length)[0]
     width = float(np.linalg.norm(ends[0] - ends[1])) - 2 * part.radius
     audit.greatest("opening_px", width)

@@ -1,6 +1,6 @@
-"""The plain facts of an instruction, held against the contract that is to carry it out.
+"""Compares the plain facts of an instruction with the contract that is to carry it out.
 
-Only words that hardly mean anything else count: a doubt is a question to the model, which may
+Only words that can hardly mean anything else count. A doubt is a question to the model, which may
 answer that the contract is right.
 """
 
@@ -23,7 +23,7 @@ PLAIN: tuple[tuple[str, str, frozenset[Relation]], ...] = (
     (r"\b(?:cage|caging|imprison|lock in)\b", "cage", frozenset({"cage"})),
     (r"\b(?:surround|encircle)\b", "surround", frozenset({"around", "cage", "corners"})),
 )
-"""A pattern, the word to quote, and the relations that can be meant by it."""
+"""A pattern, the word to quote, and the relations it can mean."""
 ROBOTS = re.compile(r"\W+(?:[\w-]+\W+){0,2}?(?:robots?|bots?|agents?|drones?|rovers?)\b")
 SIDE = r"(?:left|right|top|bottom|upper|lower|north|south|east|west)(?:ern)?(?:[ -]hand)?"
 WEIGHTY: tuple[tuple[str, str], ...] = (
@@ -38,10 +38,10 @@ WEIGHTY: tuple[tuple[str, str], ...] = (
      "targets"),
     (r"\b(?:all|everything|anything|everyone) (?:but|except)\b|\bexcept\b", "sides"),
 )  # fmt: skip
-"""Words that a contract has to answer, and the part of it that does."""
+"""A pattern of words that a contract has to account for, and the part of it that does."""
 ACROSS = re.compile(r"\s*(?:across|wide|in diameter)\b")
 SAME = 0.05
-"""Share by which a length of the contract may differ from the one named."""
+"""Share by which a length in the contract may differ from the one in the instruction."""
 
 
 def doubts(
@@ -52,14 +52,14 @@ def doubts(
     measured: bool = False,
     scale: float | None = None,
 ) -> list[str]:
-    """Where a contract says something else than the plain words; each one clause.
+    """Return where a contract contradicts the plain words of an instruction, one clause each.
 
     Args:
-        instruction: in the person's words; words of other languages count nothing.
-        contract: as a model stated it, in px.
-        counted: whether the person gave the number of robots apart from the words.
-        measured: whether the person gave lengths apart from the words.
-        scale: metres per pixel; without one only lengths in px are looked for.
+        instruction: the person's words; words in languages other than English are ignored.
+        contract: the contract as a model stated it, in px.
+        counted: whether the person gave the number of robots separately from the words.
+        measured: whether the person gave lengths separately from the words.
+        scale: metres per pixel; without it only lengths in px are checked.
     """
     text = " ".join(instruction.split())
     quantities = quantities_in(text)
@@ -75,7 +75,10 @@ def doubts(
 def overruled(
     instruction: str, contract: Contract, *, counted: bool, measured: bool, scale: float | None
 ) -> list[str]:
-    """The note that what the person gave beside the words holds against them; see `doubts`."""
+    """Return a note, if needed, that what the person gave separately overrides the words.
+
+    For the arguments see `doubts`.
+    """
     left = doubts(instruction, contract, counted=counted, measured=measured, scale=scale)
     said = [d for d in doubts(instruction, contract, scale=scale) if d not in left]
     return [f"What was given beside the words holds: {'; '.join(said)}."] if said else []
@@ -106,7 +109,7 @@ def _weight_doubts(text: str, contract: Contract) -> Iterator[str]:
 
 
 def _answers(contract: Contract, part: str) -> bool:
-    """Whether a contract has something to say of a part."""
+    """Return whether a contract specifies a part."""
     if part == "keep_out":
         return bool(contract.keep_out)
     if part == "targets":
@@ -123,7 +126,10 @@ def _answers(contract: Contract, part: str) -> bool:
 def _length_doubts(
     text: str, quantities: Sequence[Quantity], contract: Contract, scale: float | None
 ) -> Iterator[str]:
-    """Lengths of the words that the contract has not; forms have lengths of their own."""
+    """Yield doubts about lengths in the words that the contract lacks.
+
+    Nothing is checked if any group draws a shape, as shapes have lengths of their own.
+    """
     if any(group.relation == "shape" for group in contract.groups):
         return
     radius = contract.robot_radius

@@ -1,6 +1,6 @@
-"""What there is to say of robots that stand about a thing: distances, openings, what closes it.
+"""Facts about robots around an object: their distances and openings, and what closes the ring.
 
-Answers to a person's questions come from here, so that they agree with the certificate.
+A person's questions are answered from these, so that the answers agree with the certificate.
 """
 
 import math
@@ -17,18 +17,18 @@ from ..site import Site
 from ..value import Value
 
 LEAST_OFFSET = 0.1
-"""As near to an outline, px, a ring is looked at where a robot stands on it."""
+"""Distance from the outline, px, at which a ring is measured if a robot stands on the outline."""
 
 
 class Ring(Value):
-    """The openings of robots around a thing.
+    """The openings between robots around an object.
 
     Attributes:
-        widest_opening_px: between the edges of two neighbours.
-        between: those two, counted from 0 within the group.
-        min_width_px: of the thing at its narrowest.
-        closed: whether the thing is enclosed and no opening is as wide as it at its narrowest.
-        robots_to_close: how many evenly on this ring would close it; None where none are known.
+        widest_opening_px: widest gap between the edges of two neighbours.
+        between: those two, as indices from 0 within the group.
+        min_width_px: width of the object at its narrowest.
+        closed: whether the object is enclosed and every opening is narrower than its min_width_px.
+        robots_to_close: how many robots evenly on this ring would close it; None if not known.
     """
 
     widest_opening_px: float
@@ -39,12 +39,13 @@ class Ring(Value):
 
 
 def ring_of(points: FloatArray, group: Group, site: Site, radius: float) -> Ring | None:
-    """How closed robots stand around a thing; None of fewer than 2.
+    """Measure the ring of robots around an object; None for fewer than 2 robots.
 
     Args:
         points: (n, 2), px.
-        group: theirs, about one thing.
-        radius: of a robot, px.
+        group: the robots' group, about one object.
+        site: with the outline of that object.
+        radius: radius of a robot, px.
     """
     if len(points) < 2:
         return None
@@ -72,15 +73,19 @@ def ring_of(points: FloatArray, group: Group, site: Site, radius: float) -> Ring
 
 
 def robots_to_close(group: Group, site: Site, radius: float, offset: float) -> int:
-    """How many robots evenly all round a group's target leave no gap that it could pass through.
+    """Return how many robots, evenly all round a group's target, leave no gap it could pass.
 
-    No gap is as wide as it at its narrowest, nor wider than the contract allows.
+    Every gap is then narrower than the target at its narrowest, and no wider than the contract
+    allows.
 
     Args:
-        offset: of robots' centres from the outline, px.
+        group: the group, about one target.
+        site: with the target's outline.
+        radius: radius of a robot, px.
+        offset: distance of robots' centres from the outline, px.
 
     Raises:
-        ToolError: no number does, or the picture cuts the ring.
+        ToolError: no number is known to close the ring, or the picture cuts it.
     """
     name = group.targets[0]
     outline, clearance = site.outlines[name], group.clearance or (offset - radius, offset - radius)
@@ -96,9 +101,9 @@ def robots_to_close(group: Group, site: Site, radius: float, offset: float) -> i
 
 
 def clearance_of(points: FloatArray, outline: Outline, group: Group, radius: float) -> FloatArray:
-    """Distances of robots' edges from the thing they are about, (n,) px; 0 on it.
+    """Return the distances of robots' edges from their object, (n,), px; 0 on it.
 
-    Of robots inside it, from its edge.
+    For robots that enter it, distances from its edge.
     """
     region = outline.polygon.boundary if group.enters else outline.filled
     return np.maximum(distances(region, points) - radius, 0.0)

@@ -1,4 +1,4 @@
-"""The certificate: findings, measures and notes, and the audit that gathers them."""
+"""The certificate, with findings, measures and notes, and the audit that collects them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,9 +13,9 @@ from ..value import Value
 from .finding import Finding
 
 TOLERANCE = 5e-3
-"""Slack of every comparison, px: rounding of positions to JSON must not turn a verdict."""
+"""Tolerance of every comparison, px, so that rounding positions for JSON changes no verdict."""
 DECIMALS = 3
-"""Places of a pixel that findings give."""
+"""Decimals of the numbers in findings."""
 
 
 class Escape(Value):
@@ -47,10 +47,10 @@ class Verdict(Value):
 
 @dataclass(frozen=True)
 class Part:
-    """One group with its robots: what the rule of a relation looks at.
+    """One group with its robots, as checked by the rule for its relation.
 
     Attributes:
-        points: (n, 2) image pixels.
+        points: (n, 2) positions of the group's robots, image pixels.
         first: index of the group's first robot in the whole formation, from 0.
     """
 
@@ -62,20 +62,20 @@ class Part:
 
     @property
     def outline(self) -> Outline:
-        """Of the group's (first) target."""
+        """The outline of the group's first target."""
         return self.site.outlines[self.group.targets[0]]
 
     @property
     def clearance(self) -> tuple[float, float]:
-        """Least and greatest, px; the contract's defaults are written out by now."""
+        """Least and greatest clearance, px; the contract's defaults have to be filled in."""
         return self.group.offsets()
 
 
 @dataclass
 class Audit:
-    """Gathers what the rules find, over all groups of one contract.
+    """Collects what the rules find, over all groups of one contract.
 
-    With metres per pixel the findings' sentences give lengths in metres too.
+    With metres per pixel, the findings' sentences give lengths in metres too.
     """
 
     metres_per_pixel: float | None = None
@@ -97,7 +97,10 @@ class Audit:
         """Record a violation, its numbers rounded to a thousandth.
 
         Args:
-            robot, others: indices, from 0; no robot where it is the formation as a whole.
+            kind: one of `SENTENCES`.
+            value: what was measured.
+            limit: what is allowed or needed.
+            robot, others: indices from 0; `robot` is None if it is the formation as a whole.
             more: further fields of the `Finding`.
         """
         self.findings.append(
@@ -113,15 +116,15 @@ class Audit:
         )
 
     def least(self, key: str, value: float) -> None:
-        """Keep the smallest value of a measure over the groups."""
+        """Record a measure; the smallest value over all groups is kept."""
         self.measures[key] = round(min(float(value), float(self.measures.get(key, "inf"))), 2)
 
     def greatest(self, key: str, value: float) -> None:
-        """Keep the greatest value of a measure over the groups."""
+        """Record a measure; the greatest value over all groups is kept."""
         self.measures[key] = round(max(float(value), float(self.measures.get(key, "-inf"))), 2)
 
     def verdict(self) -> Verdict:
-        """What was gathered, as a value."""
+        """Return what was collected as an immutable value."""
         return Verdict(
             certified=not self.findings,
             findings=tuple(self.findings),
@@ -132,7 +135,7 @@ class Audit:
 
 
 def parts_of(contract: Contract, points: FloatArray, site: Site) -> list[Part]:
-    """The groups with their robots, in order."""
+    """Return the groups with their robots, in order."""
     parts: list[Part] = []
     first = 0
     for group in contract.groups:

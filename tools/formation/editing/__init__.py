@@ -1,1 +1,1 @@
-"""Changes of a formation that stands, each certified anew."""
+"""Edits of an existing formation, each certified anew."""

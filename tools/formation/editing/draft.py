@@ -1,4 +1,4 @@
-"""A formation while it is edited: its groups, who is who in them, and who is to stay."""
+"""A formation during edits: its groups, the identity of their robots, and who has to stay."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -32,18 +32,20 @@ from .edit_kinds import (
 from .part import IntArray, Part, pairs
 
 NEW = 100_000
-"""Robots that were added are called by no number yet: later than all that are."""
+"""Number of an added robot, which has none yet: it sorts after all others."""
 
 
 @dataclass(frozen=True)
 class Draft:
-    """A formation on its way to the next one.
+    """A formation during edits.
 
     Attributes:
-        contract: of which all but the groups is meant.
-        numbers: what each robot is called by, and its place in the formation before, from 0.
-        held: those of these who are to stay where they are.
-        notes: what is to be said of it.
+        contract: the contract; its groups are replaced by those of `parts`.
+        parts: the groups as they are now.
+        numbers: from each robot's number to its index in the formation before, from 0.
+        site: the outlines and the picture.
+        held: the indices of the robots that have to stay where they are.
+        notes: notes for the person about the result.
     """
 
     contract: Contract
@@ -55,23 +57,23 @@ class Draft:
 
     @property
     def was(self) -> IntArray:
-        """For each robot its place in the formation before, from 0; -1 for one added."""
+        """For each robot its index in the formation before, from 0, (n,); -1 for an added one."""
         return np.concatenate([part.was for part in self.parts])
 
     @property
     def points(self) -> FloatArray:
-        """Where robots are, (n, 2)."""
+        """The robots' positions, (n, 2), px."""
         return np.concatenate([part.points for part in self.parts])
 
     def number(self, index: int) -> int:
-        """What a robot is called by."""
+        """Return the number of the robot with an index in the formation before; NEW if added."""
         return next((n for n, i in self.numbers.items() if i == index), NEW)
 
     def indices(self, robots: Collection[int]) -> IntArray:
-        """Places in the formation before of robots that are there, from 0.
+        """Return the indices in the formation before, from 0, of robots by number.
 
         Raises:
-            ToolError: one is not.
+            ToolError: there is no robot of some number.
         """
         here = {n: i for n, i in self.numbers.items() if i in set(self.was.tolist())}
         if strange := sorted(set(robots) - set(here)):
@@ -83,10 +85,10 @@ class Draft:
         return np.array([here[r] for r in robots], dtype=np.intp)
 
     def with_parts(self, parts: Iterable[Part]) -> "Draft":
-        """With other groups, those without robots left out.
+        """Return the draft with other groups, leaving out those without robots.
 
         Raises:
-            ToolError: nobody is left, or there is no such group.
+            ToolError: no robot is left, or a group would be invalid.
         """
         left = [_in_step(part) for part in parts if len(part.points)]
         if not left:
@@ -98,17 +100,17 @@ class Draft:
         return replace(self, parts=tuple(whole))
 
     def with_each(self, chosen: Collection[int], rule: Callable[[Part], Part]) -> "Draft":
-        """With some groups, from 0, changed one after another by the same rule."""
+        """Return the draft with the chosen groups, from 0, changed one by one by the same rule."""
         draft = self
         for k in chosen:
             draft = draft.with_parts(rule(p) if i == k else p for i, p in enumerate(draft.parts))
         return draft
 
     def agreed(self) -> Contract:
-        """The contract with the groups as they are now.
+        """Return the contract with the groups as they are now.
 
         Raises:
-            ToolError: they contradict it.
+            ToolError: the groups contradict the contract.
         """
         groups = tuple(part.group for part in self.parts)
         try:
@@ -117,10 +119,10 @@ class Draft:
             raise ToolError(f"That cannot be: {broken_rules(error)}.") from None
 
     def chosen(self, edit: Edit) -> list[int]:
-        """Which groups an edit is for, from 0.
+        """Return the indices, from 0, of the groups that an edit is for.
 
         Raises:
-            ToolError: there is no such group, or it is not said which.
+            ToolError: there is no such group, or the edit has to name one.
         """
         number, count = getattr(edit, "group", None), len(self.parts)
         if number is not None and number > count:
@@ -137,7 +139,7 @@ class Draft:
 
 
 def _suits(edit: Edit, group: Group) -> bool:
-    """Whether an edit that names no group can be meant for this one."""
+    """Return whether an edit that names no group can be meant for this one."""
     if isinstance(edit, Offset):
         return group.clearance is not None or group.stands_beside
     if isinstance(edit, Target):
@@ -150,16 +152,16 @@ def _suits(edit: Edit, group: Group) -> bool:
 
 
 def _in_step(part: Part) -> Part:
-    """A group that says how many robots it has, and where those at points of their own are."""
+    """Return the group with its robot count, and an `at` group's points, brought up to date."""
     points = pairs(part.points) if part.group.relation == "at" else None
     return replace(part, group=part.valid_group(robots=len(part.points), points=points))
 
 
 def draft_of(plan: Plan, site: Site) -> Draft:
-    """The formation of a plan, to be edited.
+    """Return the formation of a plan as a draft to edit.
 
     Raises:
-        ToolError: it is partial, or has not as many positions as robots.
+        ToolError: the plan is partial, or does not have one position for each robot.
     """
     contract, points = plan.formation.contract, plan.formation.points
     if plan.partial is not None:
@@ -184,7 +186,7 @@ def draft_of(plan: Plan, site: Site) -> Draft:
 
 
 def numbers_of(plan: Plan) -> dict[int, int]:
-    """What each robot is called by: its id where that is a number, else its rank in the fleet."""
+    """Map robots' numbers to their places: ids if all are numbers, else ranks in the fleet."""
     names = plan.formation.robot_of_place
     if all(name.isdecimal() for name in names):
         return {int(name): i for i, name in enumerate(names)}

@@ -1,8 +1,8 @@
-"""What becomes of a drawn form when a group is moved, enlarged, mirrored or turned.
+"""Updates a drawn shape when its group is moved, scaled, mirrored or turned.
 
-The contract goes on saying what is drawn wherever it can: in another box, or through points of its
-own. Letters stay readable in a mirror; turned letters and grids are free positions. Frame: image
-pixels, y down; maps take row vectors.
+The contract still says what is drawn if it can: in another box, or through points of its own.
+Mirrored letters stay readable; turned letters and grids become free positions. Frame: image pixels,
+y down; maps take row vectors.
 """
 
 from typing import NamedTuple
@@ -14,37 +14,36 @@ from ...geometry.outline import FloatArray
 from ..contract import Group, ShapeSpec
 
 DECIMALS = 6
-"""Places of a contract are rounded to so many, px."""
+"""Decimals that coordinates and lengths of an edited contract are rounded to, px."""
 WRITTEN = frozenset({"letters", "outlined_letters"})
 
 
 class Affine(NamedTuple):
-    """A map of the plane: p goes to (p - origin) linear + to."""
+    """An affine map of the plane that takes the row vector p to (p - origin) linear + to."""
 
     linear: FloatArray
     origin: FloatArray
     to: FloatArray
 
     def __call__(self, points: FloatArray) -> FloatArray:
-        """Points (k, 2) where the map takes them."""
+        """Return the images of points (k, 2)."""
         return (points - self.origin) @ self.linear + self.to
 
     @property
     def upright(self) -> bool:
-        """Whether it only moves and enlarges."""
+        """Whether it only translates and scales."""
         return bool((self.linear == np.eye(2) * self.linear[0, 0]).all()) and self.linear[0, 0] > 0
 
     @property
     def mirrors(self) -> bool:
-        """Whether it turns left into right."""
+        """Whether it reverses orientation."""
         return float(np.linalg.det(self.linear)) < 0
 
 
 def form_after(group: Group, figure: Sketch, there: Affine) -> tuple[Group, bool]:
-    """The group whose form a map has taken elsewhere, and whether it has places of its own.
+    """Return the group after a map has moved its shape, and whether its robots need new places.
 
-    Returns:
-        The second is true where the images of its robots' places are no places of the new form.
+    They do if the images of their places are not places of the new shape.
     """
     shape = group.shape
     assert shape is not None
@@ -66,7 +65,7 @@ def _with_shape(group: Group, shape: ShapeSpec | None) -> Group:
 
 
 def _boxed(shape: ShapeSpec, figure: Sketch, there: Affine) -> ShapeSpec:
-    """The same form in the box that its own is taken to."""
+    """Return the same shape in the box that the map takes its frame to."""
     middle = there(np.reshape(figure.frame, (2, 2)).mean(axis=0))
     half = np.asarray(figure.size) * np.sqrt(abs(np.linalg.det(there.linear))) / 2
     low, high = (middle - half).round(DECIMALS), (middle + half).round(DECIMALS)

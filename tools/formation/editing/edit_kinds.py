@@ -1,7 +1,7 @@
-"""The changes of a formation that can be asked for, as values with a `kind`.
+"""The edits of a formation that can be requested, as values with a `kind`.
 
-One union; the JSON Schema that a conversation is given is a flat one, as short as can be. Lengths
-are image pixels; robots are called by their numbers, groups are numbered from 1.
+They form one union; models get a flat JSON Schema of it, as short as possible. Lengths are image
+pixels; robots are referred to by their numbers, and groups are numbered from 1.
 """
 
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -19,7 +19,7 @@ Numbers = Annotated[tuple[Number, ...], Field(min_length=1)]
 
 
 class _Edit(Value):
-    """Fields of which exactly one is given are `ONE_OF`."""
+    """The base of all edits; exactly one of the fields in `ONE_OF`, if any, has to be given."""
 
     ONE_OF: ClassVar[tuple[str, ...]] = ()
 
@@ -32,7 +32,7 @@ class _Edit(Value):
 
 
 class _GroupEdit(_Edit):
-    """Of one group of the contract, from 1; of all it can be meant for where that is left out."""
+    """An edit of one group, numbered from 1; if none is given, of all it can be meant for."""
 
     group: int | None = Field(default=None, ge=1)
 
@@ -260,7 +260,7 @@ EDIT_SCHEMA: dict[str, Any] = {
     "properties": {"kind": {"type": "string"}, **{name: {} for name in _NAMES}},
     "required": ["kind"],
 }
-"""The union in short, as models are offered it; the union itself says what does not fit."""
+"""The short form of the union that models are offered; the union itself reports what is invalid."""
 
 Edit = Annotated[
     Offset

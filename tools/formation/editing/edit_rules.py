@@ -1,7 +1,7 @@
-"""What each kind of edit does to one group of a formation: new places and new demands.
+"""Edits of one group of a formation: new places and new fields for each kind of edit.
 
-Maps of the plane and shifts along a curve take every robot with them; only where places are new
-does the least sum of squared ways decide. Frame: image pixels, x right, y down.
+Maps of the plane and shifts along a curve take every robot along; only if places are new does the
+least sum of squared distances decide who goes where. Frame: image pixels, x right, y down.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,15 +17,17 @@ from ..placement.pitch import pitch_places
 from .edit_forms import DECIMALS
 from .edit_kinds import Offset, SideOnly
 from .moving import rigid
-from .part import ON_CURVE, RING, Part, check_room, taken, without_pitch
+from .part import ON_CURVE, RING, Part, assigned_slots, check_room, without_pitch
 from .respacing import Track, feet_on, moved_out, pushed, track, track_at
 
 
 def _offset(part: Part, edit: Offset) -> Part:
     group = part.group
     if group.stands_beside:
-        return beside(part, _by(edit, part.offset - part.radius, inward=False))
-    if group.solves_clearance:  # how far apart they stand gives way
+        return moved_from_target(
+            part, _distance_change(edit, part.offset - part.radius, inward=False)
+        )
+    if group.solves_clearance:  # the pitch gives way
         clearance = exact_clearance(group, part.offset - part.radius)
         group = group.model_copy(update={"clearance": clearance, **without_pitch(group)})
         part = replace(part, group=group)
@@ -39,7 +41,7 @@ def _offset(part: Part, edit: Offset) -> Part:
     here = track(group, part.points, part.site, part.radius) if group.relation in ON_CURVE else None
     nearest_px = here.offset if here else float(distances(base, part.points).min())
     clearance = nearest_px - part.radius
-    by = _by(edit, clearance, inward)
+    by = _distance_change(edit, clearance, inward)
     if clearance + by <= 0:
         raise ToolError(
             f"{part.site.length(-by)} nearer to the outline of {group.targets[0]} is too much: "
@@ -48,7 +50,7 @@ def _offset(part: Part, edit: Offset) -> Part:
     least, greatest = (round(max(bound + by, 0.0), DECIMALS) for bound in group.clearance)
     if group.clearance[1] >= MAX_LENGTH:
         stated, greatest = group.clearance[0], MAX_LENGTH
-        if by < 0 and clearance + by >= stated:  # "at least so far" holds on
+        if by < 0 and clearance + by >= stated:  # "at least" still holds
             least = stated
         elif by < 0 and edit.px is None:
             raise ToolError(
@@ -58,18 +60,22 @@ def _offset(part: Part, edit: Offset) -> Part:
             )
     if group.radius is not None:
         return _resized(part, (group.radius + by) / group.radius, (least, greatest))
-    moved = part.to(_beyond(part, here, by, (least, greatest)), clearance=(least, greatest))
+    moved = part.to(
+        _places_at_clearance(part, here, by, (least, greatest)), clearance=(least, greatest)
+    )
     if here is None or group.pitch is not None or moved.certified or not part.certified:
         return moved
     even = moved.evenly_at(moved.group, here.offset + by)
     return even if even.certified else moved
 
 
-def beside(part: Part, by: float) -> Part:
-    """Robots at places of their own further from a target, px: a form as it is, others each.
+def moved_from_target(part: Part, by: float) -> Part:
+    """Move robots placed independently `by` px further from their target.
+
+    A shape moves as a whole; robots at points move one by one.
 
     Raises:
-        ToolError: they would come upon it.
+        ToolError: they would come into contact with the target.
     """
     solid = part.site.outlines[part.group.targets[0]].filled
     if part.offset - part.radius + by <= 0:
@@ -83,13 +89,13 @@ def beside(part: Part, by: float) -> Part:
 
 
 def _resized(part: Part, factor: float, clearance: tuple[float, float]) -> Part:
-    """A circle of another radius about the same centre."""
+    """Scale a circle of robots about its centre."""
     points, radius = part.centre + (part.points - part.centre) * factor, part.group.radius or 0.0
     return part.to(points, radius=round(radius * factor, DECIMALS), clearance=clearance)
 
 
-def _by(edit: Offset, clearance: float, inward: bool) -> float:
-    """How much further from the outline, px; what is inside it goes out by going nearer."""
+def _distance_change(edit: Offset, clearance: float, inward: bool) -> float:
+    """Return how much further from the outline robots go, px; inside, out means nearer to it."""
     grows = (edit.kind == "out") != inward
     if edit.px is not None:
         return edit.px if grows else -edit.px
@@ -97,10 +103,10 @@ def _by(edit: Offset, clearance: float, inward: bool) -> float:
     return clearance * (factor - 1 if grows else 1 / factor - 1)
 
 
-def _beyond(
+def _places_at_clearance(
     part: Part, here: Track | None, by: float, clearance: tuple[float, float]
 ) -> FloatArray:
-    """Where robots stand with a new clearance, (n, 2)."""
+    """Return where robots stand with a new clearance, (n, 2)."""
     group, points = part.group.model_copy(update={"clearance": clearance}), part.points
     if here is not None:
         there = track_at(group, part.site, part.radius, here.offset + by)
@@ -108,14 +114,14 @@ def _beyond(
         if group.pitch is not None:
             slots = pitch_places(group, there.curve, part.site)
             if len(slots) == len(points):
-                return slots[taken(points, slots)]
+                return slots[assigned_slots(points, slots)]
         return moved_out(points, here, there)
     if group.relation == "corners":
         outline = part.site.outlines[group.targets[0]]
         corners = corner_points(outline, group.robots)
         return pushed(outline.filled, points, corners[nearest(corners, points, 1)[1]], by)
     slots = part.placed(len(points), clearance=clearance)
-    return slots[taken(points, slots)]
+    return slots[assigned_slots(points, slots)]
 
 
 def _to_side(part: Part, edit: SideOnly) -> Part:

@@ -1,7 +1,7 @@
-"""Motions of whole groups: turned, mirrored, moved and scaled as said.
+"""Motions of whole groups: rotation, reflection, translation and scaling.
 
-Where the arrangement demands what no longer holds then, robots keep their form at places of their
-own and a note says so; lengths that were stated are not given up. Frame: image pixels, y down.
+If a group no longer meets its demands, robots keep their form at places of their own and a note
+says so, but stated lengths are not given up. Frame: image pixels, y down.
 """
 
 import math
@@ -23,7 +23,7 @@ from ..placement.ring_parts import opening_way
 from .draft import Draft
 from .edit_forms import DECIMALS, Affine, form_after
 from .edit_kinds import Mirror, Rotate, Scale, Shift
-from .part import ON_CURVE, Part, at_points, free_targets, taken
+from .part import ON_CURVE, Part, assigned_slots, at_points, free_targets
 
 HELD_TO = {
     "wrong_side": "on their side of {thing}",
@@ -45,12 +45,12 @@ HELD_TO = {
     **dict.fromkeys(("gap", "crowded", "bare_end", "bare_stretch"), "evenly along {thing}"),
     **dict.fromkeys(("off_curve", "crowded_figure", "off_grid", "same_place"), "that form exactly"),
 }
-"""What a group can be free of, by the kind of the finding that says it is."""
+"""Demands that a group can be freed of, by the kind of finding that reports them violated."""
 SAME_WIDTH, HALVINGS = 1e-3, 40
 STRAIGHT = 0.5
-"""Robots this near to a line, px, stand on it."""
+"""Robots within this distance of a line, px, stand on it."""
 ALONG = 0.9
-"""Share of a way that leads along a row's side, from which on the row slides along it."""
+"""A row slides along its side if at least this share of the shift points along it."""
 QUARTERS: tuple[SideName, ...] = ("left", "top", "right", "bottom")
 """Clockwise as seen."""
 OPPOSITE: Mapping[str, Mapping[str, SideName]] = {
@@ -60,8 +60,8 @@ OPPOSITE: Mapping[str, Mapping[str, SideName]] = {
 ROUND = frozenset({"around", "cage", "corners", "inside", "centre"})
 
 
-def carried_out(draft: Draft, edit: Rotate | Mirror | Shift | Scale) -> Draft:
-    """The draft with groups moved as said, by name or as free places."""
+def moved_groups(draft: Draft, edit: Rotate | Mirror | Shift | Scale) -> Draft:
+    """Return the draft with groups moved, under their demands or as free places with a note."""
     for k in draft.chosen(edit):
         old = draft.parts[k]
         new, gone = _moved(old, edit)
@@ -75,7 +75,7 @@ def carried_out(draft: Draft, edit: Rotate | Mirror | Shift | Scale) -> Draft:
 
 
 def _moved(part: Part, edit: Rotate | Mirror | Shift | Scale) -> tuple[Part, tuple[Finding, ...]]:
-    """A group after a motion, and what it is free of then."""
+    """Return a group after a motion, and the findings for demands that it is then freed of."""
     if isinstance(edit, Rotate):
         there = _rotated(part, edit.degrees)
     elif isinstance(edit, Scale):
@@ -86,19 +86,19 @@ def _moved(part: Part, edit: Rotate | Mirror | Shift | Scale) -> tuple[Part, tup
     if findings and isinstance(edit, Mirror):
         there = _on_curve(there, part)
     elif part.group.relation not in ROUND and any(f.kind == "on_target" for f in findings):
-        there = _beside(there, part) if isinstance(edit, Rotate | Scale) else there
+        there = _moved_off_target(there, part) if isinstance(edit, Rotate | Scale) else there
     findings = there.findings if findings else ()
-    kept = _kept(part, edit) if findings else set[str]()
+    kept = _binding_findings(part, edit) if findings else set[str]()
     if not findings or any(f.kind in kept or f.kind not in HELD_TO for f in findings):
         slid = _slid(part, edit) if findings and isinstance(edit, Shift) else None
         return slid or there, ()
     return _freed(there), findings
 
 
-def _kept(part: Part, edit: Rotate | Mirror | Shift | Scale) -> set[str]:
-    """Kinds of findings that a group is not freed of: those of lengths that were stated.
+def _binding_findings(part: Part, edit: Rotate | Mirror | Shift | Scale) -> set[str]:
+    """Return the kinds of findings that a group is not freed of: those on stated lengths.
 
-    Gaps are as they were but in another size.
+    Those on gaps matter only to scaling, as other motions preserve gaps.
     """
     group, kept = part.group, set[str]()
     if escape_proof(group):
@@ -113,7 +113,7 @@ def _kept(part: Part, edit: Rotate | Mirror | Shift | Scale) -> set[str]:
 
 
 def _usual_range(part: Part) -> bool:
-    """Whether a clearance is as wide a range as the one of no stated distance, however far out."""
+    """Return whether a clearance range is as wide as the default one, at whatever distance."""
     if part.group.radius is not None or part.group.solves_clearance:
         return True
     usual = part.valid_group(clearance=None).clearance
@@ -122,7 +122,7 @@ def _usual_range(part: Part) -> bool:
 
 
 def _freed(part: Part) -> Part:
-    """A group at places of its own: on a line if they are on one, else at points."""
+    """Return the group at places of its own: on a line if they lie on one, else at points."""
     group, points = part.group, part.points
     if (group.relation in ("along", "between") or group.line) and len(points) > 1:
         way = points - points.mean(axis=0)
@@ -140,7 +140,7 @@ def _freed(part: Part) -> Part:
 
 
 def _on_curve(image: Part, old: Part) -> Part:
-    """A mirrored group on its curve where its target is not its own mirror image, if that does."""
+    """Spread a mirrored group along its curve, if certified, as its target may not be symmetric."""
     group = image.group
     if group.relation not in ON_CURVE or group.spacing == "free" or group.pitch is not None:
         return image
@@ -150,8 +150,8 @@ def _on_curve(image: Part, old: Part) -> Part:
     return image
 
 
-def _beside(part: Part, old: Part) -> Part:
-    """A form that was turned or enlarged onto its target, moved off it as far as it was before."""
+def _moved_off_target(part: Part, old: Part) -> Part:
+    """Move a form, rotated or scaled onto its target, off it to its distance before."""
     way = part.points.mean(axis=0) - part.centre
     if not free_targets(part.group) or not way.any():
         return part
@@ -165,7 +165,7 @@ def _beside(part: Part, old: Part) -> Part:
 
 
 def _pivot(part: Part) -> FloatArray:
-    """What a group is turned and scaled about: a target that it is round or in, else its middle."""
+    """Return the centre of rotation and scaling: the target it is around or in, else its mean."""
     group, centre = part.group, part.centre
     placed = group.shape is None and group.line is None and group.relation != "between"
     if group.relation in ROUND or (
@@ -180,7 +180,7 @@ def _rotated(part: Part, degrees: float) -> Part:
     if here is not None and here.curve.closed and here.holds(part.points):
         arc = here.clockwise * here.curve.length * degrees / 360
         points = here.at(here.stations(part.points) + arc)
-        return part.to(here.settled(points, distances(here.base, part.points)))
+        return part.to(here.at_distances(points, distances(here.base, part.points)))
     quarters = degrees / 90
     if part.group.opens or (part.group.sides and abs(quarters - round(quarters)) < 1e-9):
         return part.on_ring(part.valid_group(**_ring_turned(part, degrees)))
@@ -189,7 +189,7 @@ def _rotated(part: Part, degrees: float) -> Part:
 
 
 def _ring_turned(part: Part, degrees: float) -> dict[str, object]:
-    """Where the opening or the sides of a ring are after a turn, of sides by quarters."""
+    """Return where a ring's opening, or its sides, are after a turn; sides by quarter turns."""
     group = part.group
     if group.sides is None:
         x, y = opening_way(group, part.site)
@@ -201,7 +201,7 @@ def _ring_turned(part: Part, degrees: float) -> dict[str, object]:
 
 
 def _sides_by(after: Mapping[str, str], sides: tuple[str, ...]) -> tuple[str, ...]:
-    """Parts of the way round by other names: "left half" may become "top half"."""
+    """Rename the sides of a ring: "left half" may become "top half"."""
     words = (name.split() for name in sides)
     return tuple(" ".join([after.get(side, side), *half]) for side, *half in words)
 
@@ -221,7 +221,7 @@ def _mirrored(part: Part, edit: Mirror) -> Part:
 
 
 def _edges_after(part: Part, there: Affine) -> tuple[int, ...]:
-    """The edges of the target that lie where a map takes the middles of those chosen."""
+    """Return the edges of the target nearest to the images of the chosen edges' midpoints."""
     vertices, pairs = part.site.outlines[part.group.targets[0]].graph()
     ends = np.array([vertices[list(pair)] for pair in pairs])
     middles = there(ends[list(part.group.edges or ())].mean(axis=1))
@@ -230,13 +230,13 @@ def _edges_after(part: Part, there: Affine) -> tuple[int, ...]:
 
 
 def _shifted(part: Part, edit: Shift) -> Part:
-    """As it stands; a usual distance from the target makes room for that, a named one does not."""
+    """Translate a group as it stands; a default clearance range is widened to allow it."""
     group, centre = part.group, part.centre
     there = rigid(part, np.eye(2), centre, centre + np.array([edit.dx, edit.dy]))
     usual = has_default_clearance(group, part.site.outlines, part.site.room, part.radius)
     if group.clearance is None or group.relation not in ("around", "cage") or not usual:
         return there
-    off, (least, greatest) = _edges_off(there), group.clearance
+    off, (least, greatest) = _edge_clearances(there), group.clearance
     if off.min() <= 0:
         return there
     least, greatest = min(least, float(off.min())), max(greatest, float(off.max()))
@@ -245,10 +245,10 @@ def _shifted(part: Part, edit: Shift) -> Part:
 
 
 def _widened(part: Part, px: float) -> float:
-    """The factor that makes robots stand so wide, px.
+    """Return the factor that scales the robots to a width, px.
 
     Raises:
-        ToolError: they have no width, as one robot or a row up and down.
+        ToolError: they have no width, such as one robot or a vertical row.
     """
     width = float(np.ptp(part.points[:, 0]))
     if width < STRAIGHT:
@@ -257,7 +257,7 @@ def _widened(part: Part, px: float) -> float:
 
 
 def _slid(part: Part, edit: Shift) -> Part | None:
-    """A row moved along the side it keeps its distance to; None where that is not the way meant."""
+    """Slide a row along its side, or return None if the shift points elsewhere or that fails."""
     if part.group.relation != "along":
         return None
     here = part.track(len(part.points))
@@ -276,12 +276,12 @@ def _slid(part: Part, edit: Shift) -> Part | None:
 
 
 def scaled(part: Part, factor: float) -> Part:
-    """Rigid but for size; clearances demanded grow as those that are kept do."""
+    """Scale a group about its centre; its clearance range grows like its actual clearances."""
     there = rigid(part, np.eye(2) * factor, _pivot(part), _pivot(part))
     group = there.group
     if group.clearance is None or not group.targets:
         return there
-    old, new = (_edges_off(p) for p in (part, there))
+    old, new = (_edge_clearances(p) for p in (part, there))
     if min(old.min(), new.min()) <= 0:
         return there  # on the outline: the verdict says so
     if group.radius is not None:
@@ -293,8 +293,8 @@ def scaled(part: Part, factor: float) -> Part:
     return there.to(there.points, clearance=(least, greatest))
 
 
-def _edges_off(part: Part) -> FloatArray:
-    """How far each robot's edge is from the outline, (n,), px; negative on its wrong side."""
+def _edge_clearances(part: Part) -> FloatArray:
+    """Return how far robots' edges are from the outline, (n,), px; negative on the wrong side."""
     outline = part.site.outlines[part.group.targets[0]]
     within = np.asarray(shapely.intersects_xy(outline.polygon, part.points))
     apart = distances(outline.polygon.boundary, part.points)
@@ -302,7 +302,7 @@ def _edges_off(part: Part) -> FloatArray:
 
 
 def rigid(part: Part, linear: FloatArray, origin: FloatArray, to: FloatArray) -> Part:
-    """Every place, and a line or form of the contract, by the same map of row vectors."""
+    """Map every place, and a line or shape of the contract, by the same map of row vectors."""
     there = Affine(linear, origin, to)
     points, shape = there(part.points), part.group.shape
     if shape is not None:
@@ -311,7 +311,7 @@ def rigid(part: Part, linear: FloatArray, origin: FloatArray, to: FloatArray) ->
         moved = replace(part, group=group, points=points)
         if anew:
             slots = moved.placed(len(points))
-            moved = replace(moved, points=slots[taken(points, slots)])
+            moved = replace(moved, points=slots[assigned_slots(points, slots)])
         return moved
     if part.group.line is None:
         return part.to(points)

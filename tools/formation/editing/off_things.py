@@ -1,6 +1,6 @@
-"""Robots that an edit puts onto other things in the picture are slid off them, along their curve.
+"""Slides robots that an edit puts onto other objects in the picture off them, along their curve.
 
-So the distance that an edit gave stays. Frame: image pixels, x right, y down.
+This preserves the distance that an edit gave. Frame: image pixels, x right, y down.
 """
 
 from collections.abc import Collection, Iterator
@@ -19,27 +19,30 @@ from ..placement.caging import escape_proof
 from ..placement.place import Site
 from ..plan import Plan, make_plan
 from .draft import Draft
-from .part import ON_CURVE, IntArray, Part, taken
+from .part import ON_CURVE, IntArray, Part, assigned_slots
 from .respacing import Track
 
 EXACT = frozenset({"rotate", "mirror", "shift", "scale", "swap", "skip", "place", "heading"})
-"""What says where everybody is to be: nobody is moved off another thing for it."""
+"""Edits that say where all robots are to be; no robot is then moved off another object."""
 ANEW = frozenset({"target", "arrange", "merge"})
-"""What places robots anew: at any distance that is allowed."""
+"""Edits that place robots anew, at any allowed distance."""
 GIVEN = frozenset({"out", "in", "distance", "spacing"})
-"""What says how far from its target or from each other robots are to be."""
+"""Edits that say how far robots are to be from their target or from each other."""
 SLIDES, REACH = 24, 0.9
-"""Places on either side that a robot is slid to, up to this share of the way to its neighbours."""
+"""Number of places on either side that a robot is slid to, up to REACH as a share of the mean
+distance to its neighbours."""
 
 
 def off_things(plan: Plan, draft: Draft, before: FloatArray, kinds: Collection[str]) -> Plan:
-    """The plan, or one of whose robots that were moved fewer stand on other things that are sure.
+    """Return the plan, or one in which fewer of the moved robots stand on other sure objects.
 
-    Nobody who is to stay is moved.
+    Held robots are not moved.
 
     Args:
+        plan: the plan after the edits.
+        draft: the draft it was made from.
         before: places of the formation before, (n, 2), px.
-        kinds: of the edits that made it.
+        kinds: kinds of the edits that made it.
     """
     contract, was = plan.formation.contract, draft.was
     outlines = {name: draft.site.outlines[name] for name in contract.target_ids}
@@ -59,12 +62,14 @@ def off_things(plan: Plan, draft: Draft, before: FloatArray, kinds: Collection[s
 
 
 def _rearranged(plan: Plan, draft: Draft, site: Site) -> Plan:
-    """The plan, or one at other places its contract allows; who takes which by least motion."""
+    """Return the plan, or one at other places its contract allows, assigned by least motion."""
     off = off_others(plan, site)
     if off is plan:
         return plan
     contract, points, slots = plan.formation.contract, plan.formation.points, off.formation.points
-    order = np.concatenate([mine[taken(points[mine], slots[mine])] for mine in _members(draft)])
+    order = np.concatenate(
+        [mine[assigned_slots(points[mine], slots[mine])] for mine in _members(draft)]
+    )
     stays = np.isin(draft.was, list(draft.held))
     if (slots[order][stays] != points[stays]).any():
         return plan
@@ -73,7 +78,7 @@ def _rearranged(plan: Plan, draft: Draft, site: Site) -> Plan:
 
 
 def _members(draft: Draft) -> list[IntArray]:
-    """For each group which of all robots are its own."""
+    """Return for each group the indices of its robots."""
     ends = np.cumsum([len(part.points) for part in draft.parts])
     return np.split(np.arange(len(draft.was)), ends[:-1])
 
@@ -87,19 +92,23 @@ class _Slides:
         self._left = min(MOST_TRIED, TRIED_TOGETHER // plan.formation.contract.robots)
         contract = plan.formation.contract
         regions = [thing.region for thing in site.others if thing.sure]
-        # Robots that are points to the contract have bodies to a fleet.
+        # Robots may be points in the contract, but a fleet's robots have bodies.
         regions += [site.solid(name, contract).buffer(TOUCHING) for name in contract.keep_out]
         self._solid: BaseGeometry = shapely.union_all(regions)
         self._floor, self._near = contract.spacing_floor, contract.robot_radius + TOUCHING
 
     def _on(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Which of (n, 2) places are on a thing, (n,)."""
+        """Return a mask (n,) of the places (n, 2) on an object."""
         if self._solid.is_empty:
             return np.zeros(len(points), dtype=bool)
         return distances(self._solid, points) < self._near
 
     def found(self) -> Plan:
-        """Robots on things slid one by one; where that is not enough, their curve's together."""
+        """Slide robots on objects one by one, then, if needed, all of a curve together.
+
+        Returns:
+            The best plan found.
+        """
         for part, mine in zip(self._draft.parts, _members(self._draft), strict=True):
             line = _line_of(part)
             points = self._best.formation.points
@@ -107,13 +116,16 @@ class _Slides:
             if line is None or not len(bad):
                 continue
             for i in map(int, bad):
-                self._take(self._alone(line, mine, i))
+                self._take(self._slide_one(line, mine, i))
             if self._on(self._best.formation.points[bad]).any() and self._free[mine].all():
-                self._take(self._together(line, mine, points[mine]))
+                self._take(self._slide_all(line, mine, points[mine]))
         return self._best
 
     def _take(self, ways: Iterator[FloatArray]) -> None:
-        """The first of some arrangements with fewer robots on things that does not fail."""
+        """Adopt the first arrangement with fewer robots on objects that passes the check.
+
+        Findings on keep-outs are allowed.
+        """
         count = int(self._on(self._best.formation.points).sum())
         formation = self._best.formation
         better = (way for way in ways if int(self._on(way).sum()) < count)
@@ -124,8 +136,8 @@ class _Slides:
                 self._best = plan
                 return
 
-    def _alone(self, line: Track, mine: IntArray, i: int) -> Iterator[FloatArray]:
-        """One robot at other places of its curve, the nearest first."""
+    def _slide_one(self, line: Track, mine: IntArray, i: int) -> Iterator[FloatArray]:
+        """Yield arrangements with one robot at other places of its curve, nearest first."""
         points = self._best.formation.points
         reach = REACH * line.curve.length / len(mine)
         for shift in _shifts(reach):
@@ -136,8 +148,8 @@ class _Slides:
             if not len(apart) or apart.min() >= self._floor:
                 yield way
 
-    def _together(self, line: Track, mine: IntArray, points: FloatArray) -> Iterator[FloatArray]:
-        """All robots of a curve slid along it by as much, the fewest on things and least first."""
+    def _slide_all(self, line: Track, mine: IntArray, points: FloatArray) -> Iterator[FloatArray]:
+        """Yield all robots of a curve slid equally, by fewest on objects, then least motion."""
         ways = [_slid(line, points, s) for s in _shifts(REACH * line.curve.length / len(mine))]
         for own in sorted(ways, key=lambda way: int(self._on(way).sum())):
             whole = self._best.formation.points.copy()
@@ -152,7 +164,7 @@ def _shifts(reach: float) -> Iterator[float]:
 
 
 def _line_of(part: Part) -> Track | None:
-    """The curve in one piece that robots can be slid along."""
+    """Return the curve that a group's robots can be slid along; None unless it is in one piece."""
     if part.group.relation not in (*ON_CURVE, "between") and part.group.line is None:
         return None
     line = part.track(len(part.points))
@@ -160,7 +172,7 @@ def _line_of(part: Part) -> Track | None:
 
 
 def _slid(line: Track, points: FloatArray, by: float) -> FloatArray:
-    """Robots (n, 2) further along a curve, as far from the target as they were, px."""
+    """Slide robots (n, 2) along a curve by a length, px, keeping their distance from the target."""
     ends = (-np.inf, np.inf) if line.curve.closed else (0.0, line.curve.length)
     there = line.at(np.clip(line.stations(points) + by, *ends))
-    return there if line.base.is_empty else line.settled(there, distances(line.base, points))
+    return there if line.base.is_empty else line.at_distances(there, distances(line.base, points))

@@ -1,4 +1,4 @@
-"""One group of a formation while it is edited, and where its robots go when places are new.
+"""One group of a formation during an edit, and which robots take which of its new places.
 
 Frame: image pixels, x right, y down.
 """
@@ -27,16 +27,19 @@ from .respacing import Track, respaced, track, track_at
 IntArray = NDArray[np.intp]
 ON_CURVE = frozenset({"around", "cage", "along"})
 RING = ("closure", "walls", "radius", "sides", "opening", "opening_towards")
-"""What a group says of a ring alone."""
+"""Fields of a group that apply to rings only."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """One group while it is edited: positions (n, 2) and old numbers from 0, -1 for new ones.
+    """One group during an edit.
 
     Attributes:
+        points: positions of its robots, (n, 2), px.
+        was: each robot's index in the formation before, from 0, (n,); -1 for new robots.
+        radius: radius of a robot, px.
         beside: the other groups, which new places keep clear of.
-        keep_out: what no robot may stand on.
+        keep_out: ids of what no robot may stand on.
     """
 
     group: Group
@@ -48,12 +51,12 @@ class Part:
     keep_out: tuple[str, ...] = ()
 
     def to(self, points: FloatArray, **update: object) -> "Part":
-        """With its robots at other places, and other demands."""
+        """Return the group with its robots at other places, and other values of some fields."""
         return replace(self, points=points, group=self.group.model_copy(update=update))
 
     @property
     def free(self) -> bool:
-        """Whether its places follow from nothing but what was given."""
+        """Whether its places are given explicitly, rather than derived from its other fields."""
         group = self.group
         return group.relation == "at" or (
             group.relation == "shape" and group.line is None and group.shape is None
@@ -61,7 +64,7 @@ class Part:
 
     @property
     def centre(self) -> FloatArray:
-        """Of the target; of the robots where there is not one, or they are gathered in it."""
+        """The target's centroid, (2,); the robots' mean without one target or for `centre`."""
         if len(self.group.targets) != 1 or self.group.relation == "centre":
             return self.points.mean(axis=0)
         outline = self.site.outlines[self.group.targets[0]]
@@ -69,10 +72,10 @@ class Part:
 
     @property
     def offset(self) -> float:
-        """How far the nearest robot's centre is from the target, px.
+        """Distance of the nearest robot's centre from the target, px.
 
         Raises:
-            ToolError: it stands on it.
+            ToolError: a robot stands on the target.
         """
         name = self.group.targets[0]
         apart = float(distances(self.site.outlines[name].filled, self.points).min())
@@ -82,36 +85,36 @@ class Part:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """In what it alone is not what its group demands."""
+        """Findings on this group alone."""
         group = self.group.model_copy(update={"robots": len(self.points)})
         alone = Contract.model_construct(groups=(group,), robot_radius=self.radius)
         return certify(self.points, alone, self.site).findings
 
     @property
     def certified(self) -> bool:
-        """Whether it alone is what its group demands."""
+        """Whether this group alone is certified."""
         return not self.findings
 
     def track(self, count: int) -> Track:
-        """The curve its robots stand on, and would if there were `count`."""
+        """Return the curve its robots stand on, or would if there were `count`."""
         group = self.group.model_copy(update={"robots": count})
         if self.group.relation in ON_CURVE:
             return track(group, self.points, self.site, self.radius)
         return Track(Point(), 0.0, reference_curve(group, self.site, self.radius))
 
     def valid_group(self, **update: object) -> Group:
-        """The group with other demands, those that are left open written out.
+        """Return the group with some fields updated and defaults filled in.
 
         Raises:
-            ToolError: there is no such group.
+            ToolError: the group would be invalid.
         """
         return self.demanding({**self.group.model_dump(), **update})
 
     def demanding(self, demands: dict[str, Any]) -> Group:
-        """A group of its own demands, those that are left open written out.
+        """Return a group with these fields and defaults filled in.
 
         Raises:
-            ToolError: there is no such group, or no such thing in the picture.
+            ToolError: the group would be invalid, or names something not in the picture.
         """
         try:
             group = Group.model_validate(demands)
@@ -124,7 +127,7 @@ class Part:
         return with_defaults(contract, self.site.outlines, self.site.room).groups[0]
 
     def placed(self, count: int, **update: object) -> FloatArray:
-        """Places for `count` robots, computed anew beside the other groups, (count, 2)."""
+        """Compute new places for `count` robots beside the other groups, (count, 2)."""
         group = self.valid_group(**update, robots=count)
         others = tuple(stand.group for stand in self.beside)
         alone = Contract(groups=(group,), robot_radius=self.radius)
@@ -136,22 +139,26 @@ class Part:
         return stand_of(group, contract, list(self.beside), self.site, sound).points
 
     def anew(self, group: Group) -> "Part":
-        """Its robots at the places that other demands have, who goes where by the least motion."""
+        """Move its robots to the places of another group, assigned by least motion."""
         there = replace(self, group=group)
         slots = there.placed(len(self.points))
-        return replace(there, points=slots[taken(self.points, slots)])
+        return replace(there, points=slots[assigned_slots(self.points, slots)])
 
     def evenly_at(self, group: Group, offset: float) -> "Part":
-        """Its robots evenly on the curve of other demands at an offset of their centres, px."""
+        """Spread its robots evenly on the curve of another group at an offset of centres, px."""
         there = track_at(group, self.site, self.radius, offset)
         check_room(self, there)
         slots, takes = respaced(there, self.points, len(self.points))
         if not there.curve.closed:
-            takes = taken(self.points, slots)
+            takes = assigned_slots(self.points, slots)
         return replace(self, group=group, points=slots[takes])
 
     def on_ring(self, group: Group) -> "Part":
-        """Its robots evenly on the curve of other demands, as far from the target as they are."""
+        """Spread its robots evenly on the curve of another group at their present distance.
+
+        The distance is kept within the group's clearance; if the result is not certified, places
+        are computed anew.
+        """
         if group.pitch is not None:
             return self.anew(group)
         least, greatest = group.offsets(self.radius)
@@ -160,10 +167,10 @@ class Part:
 
 
 def check_known(name: str, site: Site) -> None:
-    """Refuse what is not in the picture.
+    """Check that a target is in the picture.
 
     Raises:
-        ToolError: listing what there is.
+        ToolError: it is not; the message lists the targets.
     """
     if name not in site.outlines:
         known = ", ".join(site.outlines) or "none"
@@ -171,7 +178,7 @@ def check_known(name: str, site: Site) -> None:
 
 
 def check_room(part: Part, here: Track) -> None:
-    """Refuse a curve of which the picture leaves nothing."""
+    """Raise a ToolError if nothing of a curve lies in the picture."""
     if here.curve.length <= 0:
         raise ToolError(
             f"Nothing of the place for the {part.group.relation} group would lie in the picture."
@@ -179,7 +186,7 @@ def check_room(part: Part, here: Track) -> None:
 
 
 def without_pitch(group: Group) -> dict[str, object]:
-    """What no longer holds of a group when neighbours need not stand an exact distance apart."""
+    """Return field updates that drop a group's pitch, and `min_spacing` if it follows from that."""
     if group.pitch is None:
         return {}
     follows = group.min_spacing == group.pitch - pitch_slack(group.pitch)
@@ -187,27 +194,30 @@ def without_pitch(group: Group) -> dict[str, object]:
 
 
 def skipped(part: Part, stay: FloatArray) -> Part:
-    """Nobody moves; a ring of a cage stays even by definition, and its verdict says so."""
+    """Let the remaining robots stay where they are.
+
+    A cage's ring stays even by definition, so its verdict may report the empty places.
+    """
     spacing = "even" if part.group.relation == "cage" else "free"
-    if part.group.relation == "between":  # its line would be that of fewer robots
+    if part.group.relation == "between":  # fewer robots would change its line
         line = np.concatenate(part.track(len(part.points)).curve.lines)[[0, -1]].ravel()
         ends = tuple(round(float(v), DECIMALS) for v in line)
         return part.to(stay, spacing=spacing, relation="shape", line=ends, layout="line")
     if part.group.shape is not None and part.group.shape.kind == "grid":
         return part.to(stay, spacing=spacing, shape=None, clearance=None, pitch=None)
     left = part.to(stay, spacing=spacing, pitch=None)
-    if part.group.relation == "corners" and not left.certified:  # fewer would be at other corners
+    if part.group.relation == "corners" and not left.certified:  # fewer would take other corners
         return part.to(stay, relation="at", clearance=None)
     return left
 
 
 def free_targets(group: Group) -> tuple[str, ...]:
-    """The thing that robots of a group stay off when they are at places of their own."""
+    """Return the target that a group's robots keep off when at their own points, or ()."""
     return () if group.enters or len(group.targets) != 1 else group.targets
 
 
 def at_points(part: Part, mine: NDArray[np.bool_]) -> Part:
-    """Those of a group's robots that are chosen, (n,), at points of their own."""
+    """Return the chosen robots of a group, by mask (n,), as a group at their own points."""
     group, points = part.group, part.points[mine]
     demands = {"relation": "at", "targets": free_targets(group), "robots": len(points)}
     single = part.demanding(demands | {"points": pairs(points), "heading": group.heading})
@@ -215,12 +225,12 @@ def at_points(part: Part, mine: NDArray[np.bool_]) -> Part:
 
 
 def pairs(points: FloatArray) -> tuple[tuple[float, float], ...]:
-    """Points (n, 2) as a contract has them."""
+    """Convert points (n, 2) to the rounded pairs of a contract."""
     return tuple((float(x), float(y)) for x, y in points.round(DECIMALS))
 
 
 def closed_up(part: Part, stay: FloatArray) -> Part:
-    """Those who stay share the place evenly; where spacing is free nobody moves."""
+    """Let the remaining robots spread evenly; no robot moves if spacing is free."""
     left = part.to(stay)
     at_corners = part.group.relation == "corners" and left.certified
     if part.free or part.group.spacing == "free" or at_corners:
@@ -230,7 +240,7 @@ def closed_up(part: Part, stay: FloatArray) -> Part:
 
 
 def slots_for(part: Part, count: int) -> tuple[FloatArray, IntArray]:
-    """Places for `count` robots, and which of them those that are there take."""
+    """Return places for `count` robots, and the index of the place each present robot takes."""
     drawn = part.group.shape is not None
     exact = part.group.pitch is not None or part.group.closure == "escape-proof"
     if not drawn and not exact and part.group.relation not in ("corners", "inside", "centre"):
@@ -238,17 +248,18 @@ def slots_for(part: Part, count: int) -> tuple[FloatArray, IntArray]:
         check_room(part, here)
         return respaced(here, part.points, count)
     slots = part.placed(count)
-    return slots, taken(part.points, slots)
+    return slots, assigned_slots(part.points, slots)
 
 
-def taken(points: FloatArray, slots: FloatArray) -> IntArray:
-    """For each robot one of as many slots or more, by least sum of squares."""
+def assigned_slots(points: FloatArray, slots: FloatArray) -> IntArray:
+    """Assign each robot one of as many slots or more by least sum of squares; indices, (n,)."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 
     if len(slots) <= EXACT:
         cost = cdist(points, slots, "sqeuclidean")
         return np.asarray(linear_sum_assignment(cost)[1], dtype=np.intp)
-    away, _ = nearest(points, slots, 1)  # many: the places furthest from anybody stay empty
+    # With too many slots for the exact method, those furthest from all robots stay empty.
+    away, _ = nearest(points, slots, 1)
     kept = np.sort(np.argsort(away, kind="stable")[: len(points)])
     return kept[np.argsort(assign(points, slots[kept]).robots)]

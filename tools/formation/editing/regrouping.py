@@ -1,4 +1,4 @@
-"""What edits do with whole groups: round another thing, together, in another arrangement.
+"""Edits of whole groups: around another target, merged, or in another arrangement.
 
 Frame: image pixels, x right, y down.
 """
@@ -18,27 +18,36 @@ from ..placement.group_conflicts import Stand
 from .draft import Draft
 from .edit_kinds import Arrange, Merge, Target
 from .moving import rigid
-from .part import ON_CURVE, IntArray, Part, check_known, closed_up, skipped, slots_for, taken
+from .part import (
+    ON_CURVE,
+    IntArray,
+    Part,
+    assigned_slots,
+    check_known,
+    closed_up,
+    skipped,
+    slots_for,
+)
 
 Leave = Callable[[Part, FloatArray], Part]
 KEPT = ("targets", "heading", "min_spacing", "max_gap", "pitch")
-"""What an arrangement of another kind takes over, where it can."""
+"""Fields that an arrangement with another relation takes over if it can."""
 EITHER = (
     ("line", "shape"),
     ("side", "edges", "facing"),
     ("sides", "opening"),
     ("sides", "opening_towards"),
 )
-"""Of these fields a group has one."""
+"""Alternatives: a group has only one field of each pair or triple."""
 
 
 def without(draft: Draft, gone: IntArray, leave: Leave) -> Draft:
-    """The draft without some robots; `leave` says what the others of their groups do."""
+    """Return the draft without some robots; `leave` rearranges the others of their groups."""
     return draft.with_parts(left_of(p, ~np.isin(p.was, gone), leave) for p in draft.parts)
 
 
 def left_of(part: Part, stays: NDArray[np.bool_], leave: Leave) -> Part:
-    """A group without some of its robots; of nobody where nobody stays."""
+    """Return a group with only the robots of the mask `stays` (n,); it may be empty."""
     if stays.all():
         return part
     fewer = part.to(part.points[stays]) if not stays.any() else leave(part, part.points[stays])
@@ -46,22 +55,29 @@ def left_of(part: Part, stays: NDArray[np.bool_], leave: Leave) -> Part:
 
 
 def more_of(part: Part, n: int, coming: Part | None = None) -> Part:
-    """A group with n more robots, those that come from another group or new ones.
+    """Return a group with n more robots, either `coming` from another group or new.
 
-    Who is in it takes the least ways; the others take what is left.
+    The robots already in it move as little as possible; the others take the places left.
+
+    Raises:
+        ToolError: the group's places are given explicitly.
     """
     if part.free:
         raise ToolError("A free shape has no places of its own for more robots: give positions.")
     slots, takes = slots_for(part, len(part.points) + n)
     new = np.setdiff1d(np.arange(len(slots)), takes)
     if coming is not None:
-        new = new[taken(coming.points, slots[new])]
+        new = new[assigned_slots(coming.points, slots[new])]
     was = np.full(n, -1, dtype=np.intp) if coming is None else coming.was
     return replace(part.to(slots[np.concatenate([takes, new])]), was=np.append(part.was, was))
 
 
 def _retargeted(part: Part, to: str) -> dict[str, Any]:
-    """The demands of a group round another thing: those that say something of its own go along."""
+    """Return a group's fields for another target, adapting those that refer to the old one.
+
+    Raises:
+        ToolError: the group has no single target, or the new one is unknown.
+    """
     group, site = part.group, part.site
     check_known(to, site)
     if group.relation == "between":
@@ -86,7 +102,7 @@ def _retargeted(part: Part, to: str) -> dict[str, Any]:
 
 
 def _all_to(draft: Draft, chosen: Sequence[int], to: str) -> Draft:
-    """Whole groups round another thing; those of one relation are one group there."""
+    """Move whole groups to another target, where those of one relation become one group."""
     joined: dict[str, list[Part]] = {}
     done: list[Part] = []
     for k, part in enumerate(draft.parts):
@@ -109,18 +125,18 @@ def _all_to(draft: Draft, chosen: Sequence[int], to: str) -> Draft:
 
 
 def _taken_to(part: Part, to: str) -> Part:
-    """A group round another thing; what has its place without one is moved as things lie."""
+    """Move a group to another target; one placed independently of its target is translated."""
     group = part.group
     if len(group.targets) == 1 and (part.free or _placeless(group.model_dump())):
         check_known(to, part.site)
         there = replace(part, group=group.model_copy(update={"targets": (to,)}))
         moved = rigid(part, np.eye(2), part.centre, there.centre)
         return moved.to(moved.points, targets=(to,))
-    return _as_near(part, part.demanding(_retargeted(part, to)))
+    return _at_same_distance(part, part.demanding(_retargeted(part, to)))
 
 
-def _as_near(part: Part, group: Group) -> Part:
-    """A group round another thing, as far from it as from the one before where there is room."""
+def _at_same_distance(part: Part, group: Group) -> Part:
+    """Place a group at its new target, at the same distance as before if there is room."""
     usual = group.clearance
     if usual is not None and group.relation in ON_CURVE and group.pitch is None:
         exact = exact_clearance(group, part.offset - part.radius)
@@ -133,20 +149,20 @@ def _as_near(part: Part, group: Group) -> Part:
 
 
 def _side_of(part: Part) -> str:
-    """The side of its target on which a group stands."""
+    """Return the side of its target on which a group stands."""
     way = part.points.mean(axis=0) - part.centre
     return max(DIRECTIONS, key=lambda name: float(np.dot(way, DIRECTIONS[name])))
 
 
 def targeted(draft: Draft, edit: Target) -> Draft:
-    """Groups, or some of their robots, round another thing; they join who is there already."""
+    """Move groups, or some of their robots, to another target; they join robots already there."""
     check_known(edit.to, draft.site)
     if edit.robots is None:
         chosen = [k for k in draft.chosen(edit) if draft.parts[k].group.targets != (edit.to,)]
         if not chosen:
             raise ToolError(f"The robots are at {edit.to} already.")
         return _all_to(draft, chosen, edit.to)
-    going = _going(draft, edit)
+    going = _robots_to_move(draft, edit)
     first = next(p for p in draft.parts if np.isin(p.was, going).any())
     where = {int(i): point for i, point in zip(draft.was, draft.points, strict=True)}
     coming = replace(first, points=np.array([where[int(i)] for i in going]), was=going)
@@ -158,14 +174,14 @@ def targeted(draft: Draft, edit: Target) -> Draft:
         for k, part in enumerate(others):
             if (part.group.relation, part.group.targets) == (group.relation, group.targets):
                 return left.with_each((k,), lambda part: more_of(part, len(going), coming))
-    return draft.with_parts((*others, _as_near(_beside_others(coming, others), group)))
+    return draft.with_parts((*others, _at_same_distance(_beside_others(coming, others), group)))
 
 
 def added_about(draft: Draft, number: int, n: int, to: str) -> Draft:
-    """With n new robots that stand around another thing as those of a group, from 1, do.
+    """Add n robots at another target, arranged like those of group `number` (from 1).
 
     Raises:
-        ToolError: there is no such thing or group.
+        ToolError: there is no such target or group.
     """
     if number > len(draft.parts):
         raise ToolError(f"There is no group {number}: they go from 1 to {len(draft.parts)}.")
@@ -176,15 +192,17 @@ def added_about(draft: Draft, number: int, n: int, to: str) -> Draft:
     for k, part in enumerate(draft.parts):
         if (part.group.relation, part.group.targets) == (group.relation, group.targets):
             return draft.with_each((k,), lambda part: more_of(part, n))
-    return draft.with_parts((*draft.parts, _as_near(_beside_others(coming, draft.parts), group)))
+    return draft.with_parts(
+        (*draft.parts, _at_same_distance(_beside_others(coming, draft.parts), group))
+    )
 
 
 def _beside_others(part: Part, others: Sequence[Part]) -> Part:
     return replace(part, beside=tuple(Stand(p.group, p.points) for p in others))
 
 
-def _going(draft: Draft, edit: Target) -> IntArray:
-    """Who goes to another target: those named, or so many of the nearest to it."""
+def _robots_to_move(draft: Draft, edit: Target) -> IntArray:
+    """Return who goes to another target: the robots named, or as many of those nearest to it."""
     if isinstance(edit.robots, tuple):
         return draft.indices(edit.robots)
     mine = [draft.parts[k] for k in draft.chosen(edit)]
@@ -202,7 +220,7 @@ def _going(draft: Draft, edit: Target) -> IntArray:
 
 
 def merged(draft: Draft, edit: Merge) -> Draft:
-    """Groups of one relation as one, with those who stand at points of their own."""
+    """Merge groups of one relation, and robots at their own points, into one group."""
     first = next((p for p in draft.parts if p.group.relation != "at"), draft.parts[0])
     rings = ("around", "cage") if first.group.relation in ("around", "cage") else ()
     same = {first.group.relation, "at", *rings}
@@ -224,7 +242,7 @@ def merged(draft: Draft, edit: Merge) -> Draft:
 
 
 def _gathered(parts: Sequence[Part], demands: dict[str, Any], others: Sequence[Part]) -> Part:
-    """Several groups as one of some demands, beside others."""
+    """Join several groups into one with the given fields, placed beside others."""
     points = np.concatenate([part.points for part in parts])
     was = np.concatenate([part.was for part in parts])
     whole = replace(_beside_others(parts[0], others), points=points, was=was)
@@ -232,7 +250,7 @@ def _gathered(parts: Sequence[Part], demands: dict[str, Any], others: Sequence[P
 
 
 def arranged(draft: Draft, edit: Arrange) -> Draft:
-    """Robots of each target in another arrangement; all in one if it names targets of its own."""
+    """Rearrange the robots of each target; all in one group if targets or places are given."""
     demands = {name: value for name, value in edit.demands.items() if name != "robots"}
     numbers = draft.chosen(edit) if edit.group else range(len(draft.parts))
     chosen = [draft.parts[k] for k in numbers]
@@ -251,13 +269,13 @@ def arranged(draft: Draft, edit: Arrange) -> Draft:
 
 
 def _placeless(demands: dict[str, Any]) -> bool:
-    """Whether the demands give an arrangement its place without a target."""
+    """Return whether these fields place an arrangement independently of any target."""
     shape: dict[str, Any] = demands.get("shape") or {}
     return demands.get("relation") in ("shape", "at") and not shape.get("where")
 
 
 def _rearranged(part: Part, demands: dict[str, Any]) -> dict[str, Any]:
-    """The demands of a group after those that are named anew; what else it says stays if it can."""
+    """Return a group's fields after some are newly demanded; the others are kept if possible."""
     group = part.group
     relation = demands.get("relation", group.relation)
     usual = has_default_clearance(group, part.site.outlines, part.site.room, part.radius)

@@ -1,7 +1,8 @@
-"""Where robots of a standing arrangement go when it is changed: along its curve, in their order.
+"""Moves robots of an existing arrangement along its curve, preserving their order.
 
-A curve is the offset curve robots are found to stand on, not the one a clearance would aim at,
-so that a change and its inverse bring everybody back. Frame: image pixels, x right, y down.
+The curve is the offset curve that robots are found to stand on, not the nominal one of their
+clearance, so that a change and its inverse bring all robots back. Frame: image pixels, x right,
+y down.
 """
 
 from dataclasses import dataclass
@@ -22,12 +23,12 @@ from ..placement.spacing import stations_on
 IntArray = NDArray[np.intp]
 
 OFF_TRACK = 0.05
-"""Robots within this, px, and what a polyline falls short of its arc, stand on a curve."""
+"""Robots within this distance of a curve, px, plus the error of its polyline, stand on it."""
 FARTHEST_PUSH = 30.0
-"""A robot in a recess is pushed along its way at most this many times the distance meant."""
+"""A robot in a recess is pushed by at most this many times the intended distance."""
 HALVINGS = 60
 PHASES = 8
-"""Phases from which the least motion onto a ring is looked for."""
+"""Number of initial phases in the search for the least motion onto a ring."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,9 @@ class Track:
     """The curve a group of robots stands on.
 
     Attributes:
-        base: what distances are measured from: the outline, or for a side its envelope.
+        base: what distances are measured from: the filled outline, or for a side its envelope.
         offset: distance of the curve from it, px.
-        curve: in the picture.
+        curve: the curve, as far as it lies in the picture.
     """
 
     base: BaseGeometry
@@ -45,33 +46,34 @@ class Track:
     curve: Curve
 
     def holds(self, points: FloatArray) -> bool:
-        """Whether all of (n, 2) points stand on the curve."""
+        """Return whether all points (n, 2) are on the curve."""
         if not self.curve.lines:
             return False
         slack = OFF_TRACK + (ROUND_JOIN_DIP**2 - 1) * self.offset
         return bool((distances(self.curve.geometry(), points) <= slack).all())
 
     def stations(self, points: FloatArray) -> FloatArray:
-        """Arc lengths of (n, 2) points' feet, pieces laid end to end, (n,), px."""
+        """Return the arc lengths of the feet of points (n, 2), pieces end to end, (n,), px."""
         return stations_on(points, self.curve)[0]
 
     def at(self, stations: FloatArray) -> FloatArray:
-        """Points of a curve in one piece at arc lengths, on a loop all the way round, (n, 2)."""
+        """Return points (n, 2) of a curve in one piece at arc lengths, px; a loop wraps around."""
         line = LineString(self.curve.lines[0])
         wrapped = np.mod(stations, line.length) if self.curve.closed else stations
         return shapely.get_coordinates(shapely.line_interpolate_point(line, wrapped))
 
     @property
     def clockwise(self) -> float:
-        """1.0 where arc length grows clockwise as seen in the picture, else -1.0."""
+        """1.0 if arc length grows clockwise as seen in the picture, else -1.0."""
         return 1.0 if LinearRing(self.curve.lines[0]).is_ccw else -1.0  # y points down
 
-    def settled(self, points: FloatArray, apart: FloatArray) -> FloatArray:
-        """Points of the polyline put exactly at distances it only approximates, (n, 2).
+    def at_distances(self, points: FloatArray, apart: FloatArray) -> FloatArray:
+        """Move points of the polyline exactly to distances that it only approximates, (n, 2).
 
         Args:
             points: (n, 2) on the curve.
-            apart: (n,) from the base, px; points much further off, over a recess, stay.
+            apart: (n,) distances from the base, px; points that are off theirs by more than the
+                polyline's error, as over a recess, are not moved.
         """
         now = distances(self.base, points)
         feet = feet_on(self.base, points)
@@ -81,21 +83,22 @@ class Track:
 
 
 def track(group: Group, points: FloatArray, site: Site, radius: float) -> Track:
-    """The curve a ring or side group's robots stand on, found from where they are."""
+    """Return the curve that a ring or side group's robots are on, from their positions."""
     base = _base(group, site)
     return track_at(group, site, radius, float(distances(base, points).min()))
 
 
 def track_at(group: Group, site: Site, radius: float, offset: float) -> Track:
-    """A ring or side group's curve at an offset of robots' centres, px, > 0."""
+    """Return a ring or side group's curve at an offset of robots' centres, px, > 0."""
     return Track(_base(group, site), offset, reference_curve(group, site, radius, offset))
 
 
 def moved_out(points: FloatArray, old: Track, new: Track) -> FloatArray:
-    """The robots of a ring or side on a curve further out or in.
+    """Move the robots (n, 2) of a ring or side to a curve further out or in.
 
-    On a loop one of them moves straight out and the others keep their shares of the way round.
-    Where robots, (n, 2), are spread over several curves each moves straight out.
+    On a loop one of them moves straight out and the others keep their shares of the way round. If
+    a curve is cut or in several pieces, robots are spread anew in their order; if they are not on
+    their curve, each moves straight out.
     """
     by = new.offset - old.offset
     apart = distances(old.base, points)
@@ -108,21 +111,23 @@ def moved_out(points: FloatArray, old: Track, new: Track) -> FloatArray:
         return slots[_ordered(new, points, slots)]
     stations, share = old.stations(points), new.curve.length / old.curve.length
     if not loops:
-        return new.settled(new.at(stations * share), apart + by)
+        return new.at_distances(new.at(stations * share), apart + by)
     anchor = int(np.argmax(apart <= old.offset + OFF_TRACK))
     foot = feet_on(old.base, points[anchor : anchor + 1])
     start = new.stations(pushed(old.base, points[anchor : anchor + 1], foot, by))[0]
     turn = new.clockwise * old.clockwise
-    return new.settled(new.at(start + turn * share * (stations - stations[anchor])), apart + by)
+    return new.at_distances(
+        new.at(start + turn * share * (stations - stations[anchor])), apart + by
+    )
 
 
 def pushed(base: BaseGeometry, points: FloatArray, origins: FloatArray, by: float) -> FloatArray:
-    """Points moved straight away from their origins until they are further from a geometry.
+    """Move points straight away from their origins until they are further from a geometry, (n, 2).
 
     Args:
         base: what distances are measured from.
-        points: (n, 2), off it.
-        origins: (n, 2) what they move away from, or towards.
+        points: (n, 2), off the base.
+        origins: (n, 2), which they move away from, or towards.
         by: how much the distance grows, px; negative to move nearer.
     """
     ways = points - origins
@@ -136,19 +141,19 @@ def pushed(base: BaseGeometry, points: FloatArray, origins: FloatArray, by: floa
         beyond = (distances(base, points + middle[:, None] * unit) >= aim) == (by > 0)
         near, far = np.where(beyond, near, middle), np.where(beyond, middle, far)
     there = distances(base, points + far[:, None] * unit)
-    step = np.where(np.abs(there - aim) < OFF_TRACK, far, by)  # a way that leads nowhere: as it is
+    step = np.where(np.abs(there - aim) < OFF_TRACK, far, by)  # not reached: plain step
     return points + step[:, None] * unit
 
 
 def respaced(here: Track, points: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
-    """Slots evenly along a curve for as many robots as stand on it or more, and who takes which.
+    """Return even slots along a curve for its robots, or for more, and who takes which.
 
-    Robots keep their order along the curve; on a loop its phase is free. Both are chosen for
-    the least sum of squared ways along it, so that robots put in and taken out again leave
-    everybody where they were.
+    Robots keep their order along the curve; on a loop the phase is free. Both are chosen for the
+    least sum of squared distances along it, so that adding robots and removing them again leaves
+    all others where they were.
 
     Returns:
-        slots, (count, 2), and for each of the (n, 2) robots that stay its slot, (n,).
+        The slots (count, 2), and for each of the robots (n, 2) the index of its slot, (n,).
     """
     if not here.curve.closed:
         slots = along_curve(here.curve, count)
@@ -164,13 +169,13 @@ def respaced(here: Track, points: FloatArray, count: int) -> tuple[FloatArray, I
     takes = np.empty(len(points), dtype=np.intp)
     takes[order] = taken % count
     slots = here.at(phase + step * np.arange(count, dtype=float))
-    return here.settled(slots, np.full(count, here.offset)), takes
+    return here.at_distances(slots, np.full(count, here.offset)), takes
 
 
 def _fitted(
     stations: FloatArray, step: float, count: int, phase: float
 ) -> tuple[float, float, IntArray]:
-    """Sum of squares, phase and slots for ascending stations on a loop, from a first phase."""
+    """Fit ascending stations on a loop from an initial phase: sum of squares, phase and slots."""
     taken = np.arange(len(stations))
     for _ in range(PHASES):
         taken = _monotone((stations - phase) / step, None, count)
@@ -179,7 +184,7 @@ def _fitted(
 
 
 def _ordered(here: Track, points: FloatArray, slots: FloatArray) -> IntArray:
-    """For each point a slot, in the order of both along a curve, by least squares of the ways."""
+    """Return a slot for each point, (n,), keeping their order on the curve, by least squares."""
     stations, places = here.stations(points), here.stations(slots)
     order, by_place = np.argsort(stations, kind="stable"), np.argsort(places, kind="stable")
     wish = np.interp(stations[order], places[by_place], np.arange(len(slots), dtype=float))
@@ -189,9 +194,10 @@ def _ordered(here: Track, points: FloatArray, slots: FloatArray) -> IntArray:
 
 
 def _monotone(wish: FloatArray, first: int | None, count: int) -> IntArray:
-    """Increasing integers nearest to ascending wishes, all within `count` of each other.
+    """Return increasing integers nearest to ascending wishes, within a range of `count` values.
 
-    The real solution is an isotonic regression; rounding it keeps it optimal.
+    The range begins at `first`, or anywhere if None. The real-valued solution is an isotonic
+    regression; rounding it keeps it optimal.
     """
     from scipy.optimize import isotonic_regression
 
@@ -207,7 +213,7 @@ def _one_piece(old: Curve, new: Curve) -> bool:
 
 
 def feet_on(base: BaseGeometry, points: FloatArray) -> FloatArray:
-    """The nearest point of a geometry to each of (n, 2) points, (n, 2)."""
+    """Return the nearest point of a geometry to each of the points (n, 2), (n, 2)."""
     lines = shapely.shortest_line(base, shapely.points(points))
     return shapely.get_coordinates(lines).reshape(-1, 2, 2)[:, 0]
 

@@ -1,4 +1,4 @@
-"""What edits do to a group around a target: its distance, spacing, sides, opening and closure."""
+"""Edits of a group around a target: its distance, spacing, sides, opening and closure."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -21,16 +21,16 @@ from ..contract import (
 from ..placement.pitch import pitch_offset
 from .edit_forms import DECIMALS
 from .edit_kinds import Closure, Distance, Heading, Opening, Sides, Spacing
-from .edit_rules import beside
+from .edit_rules import moved_from_target
 from .moving import QUARTERS, scaled
 from .part import ON_CURVE, RING, Part, check_room, without_pitch
 from .respacing import moved_out, track, track_at
 
 ROUNDS, HALVINGS, INSIDE_SLACK = 2, 12, 0.15
-"""How often robots inside are spread anew, by halving for the room they need; and how exactly they
-are then so far apart."""
+"""For robots inside: how often they are spread anew, steps of the search for the room they need,
+and tolerance on the spacing reached, as a share."""
 NARROWER = 0.98
-"""An opening that is to be narrower is at most this share of what it was."""
+"""An opening counts as narrower only below this share of its former width."""
 OTHER_HALF: Mapping[str, RingPart] = {
     "left half": "right half",
     "right half": "left half",
@@ -40,12 +40,12 @@ OTHER_HALF: Mapping[str, RingPart] = {
 
 
 def _distant(part: Part, edit: Distance) -> Part:
-    """Everybody straight to the distance where the curve is one; else to places anew."""
+    """Move all robots straight to a distance if their curve allows that; else place them anew."""
     group = part.group
     if group.stands_beside:
-        return beside(part, edit.px + part.radius - part.offset)
+        return moved_from_target(part, edit.px + part.radius - part.offset)
     clearance = exact_clearance(group, edit.px)
-    if group.relation == "centre":  # so far from a thing is round it
+    if group.relation == "centre":  # at a distance from an object means around it
         demands = {"relation": "around", "targets": group.targets, "heading": group.heading}
         return part.anew(part.demanding(demands | {"robots": group.robots, "clearance": clearance}))
     if group.clearance is None or not group.targets:
@@ -65,7 +65,7 @@ def _distant(part: Part, edit: Distance) -> Part:
 
 
 def _spaced(part: Part, edit: Spacing) -> Part:
-    """Neighbours nearer or further: on a closed ring by its distance, else where they stand."""
+    """Change the spacing of neighbours: of a whole ring by its distance, otherwise in place."""
     group, count = part.group, len(part.points)
     if count < 2:
         raise ToolError("One robot alone has no neighbours.")
@@ -89,10 +89,10 @@ def _spaced(part: Part, edit: Spacing) -> Part:
 
 
 def _inside_spaced(part: Part, px: float, loose: dict[str, object]) -> Part:
-    """Robots spread evenly over as much of a target's middle as has them so far apart.
+    """Spread robots evenly over as much of a target's middle as gives the spacing.
 
     Raises:
-        ToolError: they are nearer to each other even over all of it.
+        ToolError: the spacing reached differs from the one demanded by more than INSIDE_SLACK.
     """
     outline, (margin, deep) = part.site.visible(part.group.targets[0]), part.group.offsets()
     best = part
@@ -115,7 +115,7 @@ def _inside_spaced(part: Part, px: float, loose: dict[str, object]) -> Part:
 
 
 def _ring_spaced(part: Part, px: float, *, exact: bool, loose: dict[str, object]) -> Part:
-    """A whole ring at the distance at which its robots stand so far apart."""
+    """Place a whole ring at the distance at which its robots have the spacing."""
     solved = {"clearance": (LEAST_SOLVED, MAX_LENGTH), "radius": None, "spacing": "even"}
     if exact and part.group.relation == "around":
         return part.anew(part.valid_group(**loose | solved | {"pitch": px}))
@@ -126,7 +126,7 @@ def _ring_spaced(part: Part, px: float, *, exact: bool, loose: dict[str, object]
 
 
 def neighbours_px(part: Part) -> float:
-    """How far neighbours are apart on average, straight, px."""
+    """Return the mean straight distance between neighbours, px; on a curve, less the widest gap."""
     if part.group.relation not in ON_CURVE and part.group.line is None:
         return float(nearest(part.points, part.points, 2)[0][:, 1].mean())
     steps = _steps(part)
@@ -134,7 +134,7 @@ def neighbours_px(part: Part) -> float:
 
 
 def _steps(part: Part) -> FloatArray:
-    """Ways from robot to robot along a curve, straight; round a target all the way round."""
+    """Return the straight distances between successive robots on a curve, px; closed for a ring."""
     here = part.track(len(part.points))
     ordered = part.points[np.argsort(here.stations(part.points), kind="stable")]
     if part.group.relation in ("around", "cage"):
@@ -143,10 +143,10 @@ def _steps(part: Part) -> FloatArray:
 
 
 def ringed(part: Part, relation: str = "around", **demands: object) -> Group:
-    """The group as a ring of other demands round the same target.
+    """Return the group as a ring around the same target, with other fields as given.
 
     Raises:
-        ToolError: it is not round one.
+        ToolError: it is not outside a target.
     """
     group = part.group
     if group.relation not in OUTSIDE:
@@ -193,7 +193,7 @@ def _opened(part: Part, edit: Opening) -> Part:
 
 
 def closed(part: Part, edit: Closure) -> Part:
-    """A group as a closed ring all round, as one that nothing gets out of, or as an open one."""
+    """Make a group a closed ring, an escape-proof cage, or a ring without such a demand."""
     group = part.group
     if edit.kind == "open":
         if group.relation != "cage":

@@ -1,7 +1,7 @@
-"""Robots that are not to move while the others do.
+"""Keeps robots in place while the others move.
 
-Where a ring can be turned so that a robot that stays is on its place again, it is; else the robot
-stands at a point of its own from then on, and the others are edited without it.
+If a ring can be turned so that a held robot is at its place again, it is turned. Otherwise the
+robot stands at a point of its own from then on, and the others are edited without it.
 """
 
 from collections.abc import Collection
@@ -14,24 +14,24 @@ from .draft import Draft
 from .part import Part, at_points, skipped
 
 STILL = 0.5
-"""Px by which a robot that stays may miss its place on a curve, before it is put there."""
+"""A held robot that misses its place on a curve by at most this, px, is put back there."""
 
 
-def holding(draft: Draft, robots: Collection[int]) -> Draft:
-    """The draft in which robots are to stay; nobody is chosen to leave or go who does."""
+def with_held(draft: Draft, robots: Collection[int]) -> Draft:
+    """Return the draft with robots held, by number; none of them is chosen to leave or move."""
     return replace(draft, held=frozenset(draft.indices(robots).tolist()))
 
 
-def moved_in(draft: Draft, before: Draft) -> list[int]:
-    """The numbers of the robots that stay in a draft and have no place where they were."""
+def displaced_robots(draft: Draft, before: Draft) -> list[int]:
+    """Return the numbers of a draft's held robots that are not where they were before."""
     there = dict(zip(draft.was.tolist(), draft.points, strict=True))
     old = before.points
     gone = [i for i in draft.held if i not in there or (there[i] != old[i]).any()]
     return sorted(map(draft.number, gone))
 
 
-def settled(draft: Draft, before: Draft) -> Draft:
-    """The draft with its rings turned so that who stays is where they were, as far as that goes."""
+def with_rings_turned_back(draft: Draft, before: Draft) -> Draft:
+    """Return the draft with rings turned so that held robots are where they were, if possible."""
     if not draft.held:
         return draft
     return draft.with_parts(_turned_back(part, draft.held, before.points) for part in draft.parts)
@@ -45,7 +45,7 @@ def _turned_back(part: Part, held: frozenset[int], old: FloatArray) -> Part:
         if here.curve.closed and here.holds(points) and here.holds(wanted):
             by = here.stations(wanted) - here.stations(points[mine])
             turned = here.at(here.stations(points) + by)
-            points = here.settled(turned, distances(here.base, points))
+            points = here.at_distances(turned, distances(here.base, points))
     near = np.linalg.norm(points[mine] - wanted, axis=1) <= STILL
     if not near.all():
         return part
@@ -53,23 +53,24 @@ def _turned_back(part: Part, held: frozenset[int], old: FloatArray) -> Part:
     return part.to(points)
 
 
-def held(draft: Draft, robots: Collection[int]) -> Draft:
-    """The draft in which robots that stay stand at points of their own, out of their groups.
+def with_held_at_points(draft: Draft, robots: Collection[int]) -> Draft:
+    """Return the draft with held robots at points of their own, out of their groups.
 
-    Groups all of whose robots stay are left alone.
+    Groups whose robots are all held are left alone.
     """
-    draft = holding(draft, robots)
+    draft = with_held(draft, robots)
     names = ", ".join(map(str, sorted(robots)))
     who = f"Robot {names} stays" if len(robots) == 1 else f"Robots {names} stay"
     note = f"{who} as it is, by itself." if len(robots) == 1 else f"{who} as they are."
-    return replace(alone(draft, draft.held), notes=(*draft.notes, note))
+    return replace(at_own_points(draft, draft.held), notes=(*draft.notes, note))
 
 
-def alone(draft: Draft, robots: Collection[int]) -> Draft:
-    """The draft in which robots stand at points of their own, and their places are empty.
+def at_own_points(draft: Draft, robots: Collection[int]) -> Draft:
+    """Return the draft with robots at points of their own and their old places empty.
 
     Args:
-        robots: their places in the formation before.
+        draft: the draft.
+        robots: the robots' indices in the formation before.
     """
     left: list[Part] = []
     singles: list[Part] = []
@@ -80,13 +81,13 @@ def alone(draft: Draft, robots: Collection[int]) -> Draft:
             continue
         singles.append(at_points(part, mine))
         if not mine.all():
-            rest = skipped(_unringed(part), part.points[~mine])
+            rest = skipped(_without_closure(part), part.points[~mine])
             left.append(replace(rest, was=part.was[~mine]))
     return draft.with_parts([*left, *singles])
 
 
-def _unringed(part: Part) -> Part:
-    """A group of which a robot is taken out: its ring has a hole, and is no cage any more."""
+def _without_closure(part: Part) -> Part:
+    """Return a group from which robots are taken out: with its ring broken, it is not a cage."""
     group = part.group
     hole = dict.fromkeys(("closure", "walls", "max_gap", "opening", "opening_towards"))
     relation = "around" if group.relation == "cage" else group.relation

@@ -1,4 +1,4 @@
-"""What edits do across the groups of a formation: who belongs to which, and round what.
+"""Edits across the groups of a formation: which robots belong to which group, around which target.
 
 Frame: image pixels, x right, y down.
 """
@@ -37,18 +37,18 @@ from .edit_kinds import (
     Skip,
     Swap,
 )
-from .moving import carried_out
+from .moving import moved_groups
 from .part import ON_CURVE, Part, check_known, closed_up, skipped, without_pitch
 from .regrouping import added_about, arranged, left_of, merged, more_of, targeted, without
 from .ring_rules import closed, ringed
-from .staying import alone
+from .staying import at_own_points
 
 EXACT = 0.01
-"""How far inside of its limits, px, a distance is kept that is made exact."""
+"""How far inside its limits, px, a corrected distance is kept."""
 
 
 def _swapped(draft: Draft, edit: Swap) -> Draft:
-    """Each stands where the other did, for the other's group."""
+    """Let two robots take each other's place, and group."""
     if edit.a == edit.b:
         raise ToolError(f"Robot {edit.a} cannot swap with itself: name two robots.")
     a, b = draft.indices((edit.a, edit.b))
@@ -75,7 +75,7 @@ def _removed(draft: Draft, edit: Remove) -> Draft:
 
 
 def _fewer(draft: Draft, k: int, n: int) -> Draft:
-    """Without the n robots of a group that have the last numbers."""
+    """Remove n robots of a group: those with the highest numbers, held robots last."""
     part = draft.parts[k]
     if n > len(part.points):
         raise ToolError(f"{n} robots cannot be removed: there are {len(part.points)}.")
@@ -128,10 +128,10 @@ def _with_count(draft: Draft, k: int, count: int) -> Draft:
 
 
 def _needed(part: Part) -> int:
-    """How many robots close a group's ring; for an escape-proof one, as many as surely do.
+    """Return how many robots close a group's ring, or are certified to for an escape-proof one.
 
     Raises:
-        ToolError: none are known to.
+        ToolError: no number is known to.
     """
     if not escape_proof(part.group):
         return robots_to_close(part.group, part.site, part.radius, part.offset)
@@ -143,16 +143,19 @@ def _needed(part: Part) -> int:
 
 
 def _with_as_many_as_fit(draft: Draft, k: int, px: float | None) -> Draft:
-    loose = draft.with_each((k,), lambda part: _loosened(part, px))
-    for count in range(_fitting(loose.parts[k]), 0, -1):
+    loose = draft.with_each((k,), lambda part: _with_least_spacing(part, px))
+    for count in range(_capacity_estimate(loose.parts[k]), 0, -1):
         fits = _with_count(loose, k, count)
         if "too_close" not in {f.kind for f in fits.parts[k].findings}:
             return fits
     return _with_count(loose, k, 1)
 
 
-def _loosened(part: Part, px: float | None) -> Part:
-    """A group whose robots are to be as far apart as asked, or as it says, wherever they are."""
+def _with_least_spacing(part: Part, px: float | None) -> Part:
+    """Return the group with its pitch replaced by a least spacing, `px` or its own.
+
+    Without `px`, a group is changed only if its clearance follows from its pitch.
+    """
     group = part.group
     if px is None and not group.solves_clearance:
         return part
@@ -163,17 +166,18 @@ def _loosened(part: Part, px: float | None) -> Part:
     return replace(part, group=part.valid_group(**demands))
 
 
-def _fitting(part: Part) -> int:
-    """How many robots the place of a group holds at the spacing asked for.
+def _capacity_estimate(part: Part) -> int:
+    """Return an upper estimate of how many robots fit into a group's place at its spacing.
 
     Raises:
-        ToolError: none was, and any number of points would fit.
+        ToolError: no spacing was stated, so any number of point robots would fit, or the number
+            is not known for this relation.
     """
     group = part.group
     apart = group.pitch or group.min_spacing or 0.0
     if group.relation != "corners" and part.radius == 0 and apart <= MIN_SPACING:
         raise ToolError("Say how far apart they are to be: robots are points, so any number fits.")
-    if group.relation in ON_CURVE and group.pitch is None:  # fewer where it is bent
+    if group.relation in ON_CURVE and group.pitch is None:  # fewer on bends
         return min(int(part.track(len(part.points)).curve.length / apart) + 1, MAX_ROBOTS)
     if group.relation in ("corners", "centre"):
         most = MAX_ROBOTS
@@ -193,18 +197,18 @@ def _fitting(part: Part) -> int:
 
 
 def _placed(draft: Draft, edit: Place) -> Draft:
-    """One robot elsewhere; its group has a hole where it stood, and says so."""
+    """Move one robot elsewhere; unless it stays in its group, a note says its place is empty."""
     (index,) = draft.indices((edit.robot,))
     before = len(draft.parts)
     if edit.stays is None:
-        draft = alone(draft, (int(index),))
+        draft = at_own_points(draft, (int(index),))
     k = next(k for k, part in enumerate(draft.parts) if index in part.was)
     part = draft.parts[k]
     i = int(np.flatnonzero(part.was == index)[0])
     points = part.points.copy()
     if edit.target is not None:
         check_known(edit.target, draft.site)
-        points[i] = _beside(part, points[i], edit.target)
+        points[i] = _nearest_beside(part, points[i], edit.target)
     else:
         points[i] = edit.to if edit.to is not None else points[i] + np.asarray(edit.by)
     if edit.stays == "near":
@@ -219,14 +223,14 @@ def _placed(draft: Draft, edit: Place) -> Draft:
 
 
 def _allowed_near(part: Part, point: FloatArray) -> FloatArray:
-    """The nearest point that the group's clearance allows; itself where that is no area."""
+    """Return the nearest point that the group's clearance allows; the point itself if no area."""
     area = allowed_area(Placed(part.group, part.points, 0, part.radius, part.site))
     if area is None or area.is_empty:
         return point
     near = shapely.get_coordinates(shapely.shortest_line(area, shapely.Point(point)))[0]
     if part.group.relation not in OUTSIDE:
         return near
-    # The area's round corners are polygons: the distance itself is made exact.
+    # The area's round corners are polygonal, so the distance is corrected.
     solid = part.site.outlines[part.group.targets[0]].filled
     foot = shapely.get_coordinates(shapely.shortest_line(solid, shapely.Point(near)))[0]
     off, (least, most) = float(np.linalg.norm(near - foot)), part.group.offsets(part.radius)
@@ -234,8 +238,8 @@ def _allowed_near(part: Part, point: FloatArray) -> FloatArray:
     return foot + (near - foot) * np.clip(off, least + slack, most - slack) / off if off else near
 
 
-def _beside(part: Part, point: FloatArray, name: str) -> FloatArray:
-    """The place beside a thing that is nearest to a robot."""
+def _nearest_beside(part: Part, point: FloatArray, name: str) -> FloatArray:
+    """Return the place beside an object that is nearest to a robot, (2,)."""
     outline, group = part.site.outlines[name], part.group
     clearance = default_clearance(outline, part.site.room, part.radius)
     if group.clearance is not None:
@@ -266,5 +270,5 @@ TEAM_RULES: Mapping[str, Callable[..., Draft]] = {
     "arrange": arranged,
     "place": _placed,
     "keep-out": _kept_off,
-    **dict.fromkeys(("rotate", "mirror", "shift", "scale"), carried_out),
+    **dict.fromkeys(("rotate", "mirror", "shift", "scale"), moved_groups),
 }

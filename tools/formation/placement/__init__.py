@@ -1,1 +1,1 @@
-"""Positions that satisfy a contract, computed from it and the outlines alone."""
+"""Computes positions that satisfy a contract from it and the outlines alone."""

@@ -1,4 +1,4 @@
-"""Moves the places of a certified plan off other things in the picture, to others as certified.
+"""Moves the places of a certified plan off other objects in the picture, keeping it certified.
 
 Frame: image pixels, x right, y down.
 """
@@ -24,29 +24,29 @@ from .spacing import stations_on
 
 ON_CURVE = frozenset({"around", "cage", "along", "between"})
 SLIDES, STEPS = 24, 720
-"""Places along a gap that the robots of a curve are slid to; steps along it in search of what
-things leave."""
+"""Number of positions along a gap that the robots of a curve are slid to; number of samples along
+the curve in search of stretches free of objects."""
 OFFSETS = (0.0, -0.45, 0.45, -0.9, 0.9)
-"""Shares of the way from the clearance aimed at to the least (below 0) and to the greatest."""
+"""Offsets tried, as shares of the way from the nominal clearance to the least (negative) or the
+greatest (positive)."""
 MOST_ROBOTS, MOST_TRIED, TRIED_TOGETHER = 500, 60, 4_000
-"""Robots of a plan that is searched for a better one, arrangements that are certified, and robots
-in all of those."""
+"""Most robots in a plan that is improved, most arrangements that are certified, and most robots in
+all of those together."""
 PLACE_SHARE = 0.6
-"""The room wanted beside a place, as a share of that on the way."""
+"""The room wanted around a place, as a share of the room wanted on the way."""
 RINGS, REACH, TURNS = 10, 10, 16
-"""A robot is moved in TURNS directions to RINGS circles about it, up to REACH times the room."""
+"""A robot is moved in TURNS directions onto RINGS circles around it, up to REACH times the room."""
 NEAR = 2
-"""From here on costs are mild: robots are rearranged together for them, but not moved alone."""
+"""Costs from this index on are mild: a group is rearranged for them, but no robot moved alone."""
 Cost = tuple[int, ...]
-"""How many places are on a hard keep-out, on a thing, near a thing, on what may be a thing."""
+"""How many places are on a hard keep-out, on a sure object, near one, and on an unsure one."""
 
 
 def off_others(plan: Plan, site: Site) -> Plan:
-    """The plan, or one for the same contract whose robots stand on fewer other things.
+    """Return the plan, or one for the same contract with fewer robots on other objects.
 
-    Robots of a curve are slid along it and to other clearances that are allowed; what still stands
-    on a thing that is sure is moved off it alone. A plan that fails only where robots may not be
-    is mended.
+    Robots on a curve are slid along it and to other allowed clearances; robots still on a sure
+    object are then moved off one by one. A plan that fails only because of keep-outs is repaired.
     """
     kinds = {finding.kind for finding in plan.verdict.findings}
     contract = plan.formation.contract
@@ -70,12 +70,12 @@ class _Search:
         self._left = min(MOST_TRIED, TRIED_TOGETHER // self._contract.robots)
         hard = [site.solid(name, self._contract) for name in self._contract.keep_out]
         sure, faint = ([t.region for t in site.others if t.sure is yes] for yes in (True, False))
-        # Robots that are points to the contract have bodies to a fleet.
+        # Robots may be points in the contract, but a fleet's robots have bodies.
         sure += [region.buffer(TOUCHING) for region in hard]
         self._regions = [shapely.union_all(regions) for regions in (hard, sure, faint)]
 
-    def _bad(self, points: FloatArray) -> NDArray[np.bool_]:
-        """In which way each of (n, 2) places is bad, (n, 4), as of `Cost`."""
+    def _violations(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return in which ways each of the places (n, 2) is bad: a mask (n, 4), as in `Cost`."""
         hard, sure, faint = (
             np.full(len(points), np.inf) if region.is_empty else distances(region, points)
             for region in self._regions
@@ -84,31 +84,31 @@ class _Search:
         return np.stack([hard <= self._radius, sure < on, sure < near, faint < on], axis=1)
 
     def _cost(self, points: FloatArray) -> Cost:
-        return tuple(self._bad(points).sum(axis=0).tolist())
+        return tuple(self._violations(points).sum(axis=0).tolist())
 
     def rearrange(self, group: Group, mine: slice) -> None:
-        """Take the best arrangement of a group's robots that is found certified."""
+        """Adopt the cheapest certified arrangement found for a group's robots, if it is better."""
         points = self.best.formation.points
         before = self._cost(points[mine])
         ways = list(self._arrangements(group, points[mine])) if any(before) else []
         costs = sorted((self._cost(way), k) for k, way in enumerate(ways))
         for _, k in [c for c in costs if c[0] < before][: self._left // 2]:
             points[mine] = ways[k]
-            if self._accepts(points):
+            if self._adopt_if_better(points):
                 return
 
     def nudge(self) -> None:
-        """Move robots that still stand on something off it, one after another."""
-        bad = self._bad(self.best.formation.points)[:, :NEAR].any(axis=1)
+        """Move robots that still stand on a hard keep-out or a sure object off it, one by one."""
+        bad = self._violations(self.best.formation.points)[:, :NEAR].any(axis=1)
         for i in map(int, np.flatnonzero(bad)):
             points = self.best.formation.points
             for place in self._places_near(points, i)[: max(self._left, 0)]:
                 points[i] = place
-                if self._accepts(points):
+                if self._adopt_if_better(points):
                     break
 
-    def _accepts(self, points: FloatArray) -> bool:
-        """Whether places make a better plan, which is then the best."""
+    def _adopt_if_better(self, points: FloatArray) -> bool:
+        """Adopt the places as the best plan if they make a better one; return whether they do."""
         before, self._left = self.best, self._left - 1
         if self._cost(points) >= self._cost(before.formation.points):
             return False
@@ -120,9 +120,9 @@ class _Search:
         return True
 
     def _arrangements(self, group: Group, points: FloatArray) -> Iterator[FloatArray]:
-        """Other places for all robots on a curve, the most like their own first.
+        """Yield other places for all robots on a curve, those most like their own first.
 
-        They are slid along it, at other clearances too, or spread over what things leave of it.
+        Robots are slid along it, also at other clearances, or spread over its free stretches.
         """
         if group.relation not in ON_CURVE and group.line is None:
             return
@@ -139,7 +139,7 @@ class _Search:
                 at = own + shift
                 if new.closed or (at.min() >= 0 and at.max() <= new.length):
                     yield interpolate(line, at % new.length if new.closed else at)
-            bad = self._bad(interpolate(line, steps))[:, : NEAR + 1].any(axis=1)
+            bad = self._violations(interpolate(line, steps))[:, : NEAR + 1].any(axis=1)
             begins = np.flatnonzero(np.roll(bad, 1) & ~bad).tolist() if new.closed else [0]
             for begin in begins:
                 free = np.cumsum(~np.roll(bad, -begin))
@@ -147,7 +147,10 @@ class _Search:
                 yield interpolate(line, steps[(free.searchsorted(shares) + begin) % STEPS])
 
     def _curve(self, group: Group, share: float | None) -> Curve:
-        """The group's curve, at a share of the way to the ends of its clearance."""
+        """Return the group's curve at a share, as in `OFFSETS`, of its clearance range.
+
+        For a share of None it is the usual curve; it is empty if there is no such curve.
+        """
         offset = None
         if group.clearance is not None and share is not None:
             aim, (least, greatest) = nominal(group.clearance), group.clearance
@@ -159,12 +162,12 @@ class _Search:
             return Curve((), False, 0.0)
 
     def _places_near(self, points: FloatArray, i: int) -> FloatArray:
-        """Places off all things and clear of other robots, the nearest to robot i's own first."""
+        """Return places off all objects and clear of other robots, nearest to robot i first."""
         reach = np.linspace(0, REACH * self._room, RINGS + 1)[1:]
         turns = np.arange(TURNS) * (2 * math.pi / TURNS)
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         places = points[i] + (reach[:, None, None] * ways).reshape(-1, 2)
-        free = ~self._bad(places).any(axis=1)
+        free = ~self._violations(places).any(axis=1)
         free &= shapely.intersects_xy(self._site.frame(self._radius).box, places)
         others = np.delete(points, i, axis=0)
         if len(others):

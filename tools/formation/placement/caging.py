@@ -1,4 +1,4 @@
-"""Robots placed so that they certainly cage a target, as a contract asks for it.
+"""Places robots so that they certainly cage a target, as a contract demands.
 
 Frame: image pixels, x right, y down; a target's holes do not matter to what surrounds it.
 """
@@ -20,9 +20,9 @@ class CageError(PlacementError):
     """A group's robots cannot be placed so that they certainly cage its target.
 
     Attributes:
-        needed: how many robots would do, or None where no number is known to.
+        needed: how many robots would do, or None if no number is known to.
         group: the group.
-        fits: how many of the robots have room on the ring where that is fewer than all, else 0.
+        fits: how many of the robots have room on the ring if that is fewer than all, else 0.
     """
 
     def __init__(self, group: Group, needed: int | None, fits: int, site: Site) -> None:
@@ -44,15 +44,15 @@ class CageError(PlacementError):
 
 
 def escape_proof(group: Group) -> bool:
-    """Whether a certificate is demanded that the target cannot get out."""
+    """Return whether the group demands a certificate that the target cannot get out."""
     return group.closure == "escape-proof"
 
 
 def caged_places(group: Group, site: Site, radius: float, curve: Curve) -> FloatArray:
-    """Places that certainly cage the group's target, evenly on the curve where that does.
+    """Return places that certainly cage the group's target, evenly on the curve if that suffices.
 
     Raises:
-        CageError: none were found; it says how many robots would do.
+        CageError: none were found; it says how many robots would do, if known.
     """
     demand = demand_of(group, site, radius)
     points = caging_places(demand, group.robots, (curve,))
@@ -66,7 +66,7 @@ def caged_places(group: Group, site: Site, radius: float, curve: Curve) -> Float
 
 
 def demand_of(group: Group, site: Site, radius: float) -> Demand:
-    """What a cage of a group is made for."""
+    """Return the requirements on a group's cage."""
     return Demand(
         site.outlines[group.targets[0]],
         group.offsets(),
@@ -78,7 +78,7 @@ def demand_of(group: Group, site: Site, radius: float) -> Demand:
 
 
 def walls_of(group: Group, room: tuple[float, float]) -> BaseGeometry | None:
-    """The picture's border, where the contract makes it a wall."""
+    """Return the picture's border if the contract makes it a wall, else None."""
     if not group.walls:
         return None
     return shapely.box(-0.5, -0.5, room[0] - 0.5, room[1] - 0.5).boundary

@@ -1,6 +1,6 @@
-"""Where a drawn shape lies, and the robots on it: placer and checker both ask here.
+"""Positions a drawn shape and the robots on it, for both placement and checking.
 
-The size and place follow from the contract and the site alone. Frame: image pixels, y down.
+Size and place follow from the contract and the site alone. Frame: image pixels, y down.
 """
 
 import math
@@ -42,15 +42,15 @@ STAR_TIPS, POLYGON_CORNERS = 5, 6
 HALF_CIRCLE = {"up": (0, 180), "right": (90, 270), "down": (180, 360), "left": (-90, 90)}
 BESIDE = {"left": (-1, 0), "right": (1, 0), "above": (0, -1), "below": (0, 1)}
 ROOMY = 1.02
-"""A shape too small for the spacing is enlarged by so much more than it takes."""
+"""Factor by which a shape too small for the spacing is made larger than needed."""
 SEARCH = 40
-"""Halvings of the search for a size."""
+"""Most steps of the search for a size or a place."""
 SHRINKS = 0.95 ** np.arange(90)
-"""Sizes tried within a target, as parts of the largest that could be: down to a hundredth."""
+"""Sizes tried inside a target, as shares of the largest conceivable one, down to a hundredth."""
 
 
 def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sketch:
-    """The shape a group, with its defaults written out, draws, in its place.
+    """Return the shape that a group draws, in its place; the group's defaults are filled in.
 
     Raises:
         ToolError: there is no room for it.
@@ -72,7 +72,7 @@ def figure_of(group: Group, shape: ShapeSpec, site: Site, radius: float) -> Sket
 
 
 def place_figure(group: Group, shape: ShapeSpec, site: Site, radius: float) -> FloatArray:
-    """The group's robots on its shape, (n, 2), image pixels.
+    """Place a group's robots on its shape, (n, 2), image pixels.
 
     Raises:
         CapacityError: they would stand nearer to each other than allowed.
@@ -100,12 +100,12 @@ def place_figure(group: Group, shape: ShapeSpec, site: Site, radius: float) -> F
 
 
 def robots_on(figure: Sketch, n: int) -> FloatArray:
-    """N robots on a shape, (n, 2), image pixels."""
+    """Spread n robots over a shape, (n, 2), image pixels."""
     return spread(figure.lines, n) if figure.places is None else figure.places
 
 
 def drawn_by(figure: Sketch) -> MultiLineString | MultiPoint:
-    """What a shape is made of: its lines, or the places of a grid."""
+    """Return the geometry of a shape: its lines, or the places of a grid."""
     return MultiLineString(figure.lines) if figure.places is None else MultiPoint(figure.places)
 
 
@@ -130,12 +130,12 @@ def _sketch(group: Group, shape: ShapeSpec) -> Sketch:
         "outlined_letters": lambda: polyline_sketch(*letter_outlines(shape.text or "")),
     }
     if shape.kind == "arc" and shape.mouth is not None and shape.where != "around":
-        return cup_sketch("arc", shape.mouth)  # placed by what is drawn, not by the whole circle
+        return cup_sketch("arc", shape.mouth)  # placed by the arc itself, not by its whole circle
     return made[shape.kind]()
 
 
 def _rows(n: int, box: tuple[float, float, float, float] | None) -> int:
-    """Rows that make the grid's cells as square as they come."""
+    """Return the number of rows that makes the grid's cells as square as possible."""
     tall = 1.0 if box is None else (box[3] - box[1]) / max(box[2] - box[0], 1e-9)
     return min(max(round(math.sqrt(n * tall)), 1), n)
 
@@ -159,7 +159,10 @@ def _figure_placed(
 
 
 def _figure_inside(sketch: Sketch, group: Group, site: Site, margin: float) -> Sketch:
-    """As large as it lies in the target about one of its centres, holes left out."""
+    """Return the sketch as large as fits inside the target, off its holes, about a centre of it.
+
+    With a pitch, the size follows from that.
+    """
     outline = site.visible(group.targets[0])
     room = outline.polygon.buffer(-margin * ROUND_JOIN_DIP, quad_segs=QUAD_SEGMENTS)
     x0, y0, x1, y1 = outline.bounds
@@ -177,7 +180,10 @@ def _figure_inside(sketch: Sketch, group: Group, site: Site, margin: float) -> S
 
 
 def _figure_around(sketch: Sketch, outline: Outline, gap: float, shape: ShapeSpec) -> Sketch:
-    """As small as it holds the outline and keeps off it; an arc as the whole circle holds it."""
+    """Return the smallest sketch that encloses the outline at a distance of `gap`.
+
+    An arc counts as its whole circle.
+    """
     circle = shapely.minimum_bounding_circle(outline.filled)
     centre = (float(circle.centroid.x), float(circle.centroid.y))
 
@@ -200,7 +206,7 @@ def _figure_around(sketch: Sketch, outline: Outline, gap: float, shape: ShapeSpe
 
 
 def _pitch_scale(sketch: Sketch, group: Group) -> float:
-    """The scale at which robots on a shape stand their pitch apart."""
+    """Return the scale at which robots on a shape stand their pitch apart."""
     apart = min_spacing(robots_on(sketch, group.robots))
     return (group.pitch or 0.0) / apart if 0 < apart < math.inf else 1.0
 
@@ -208,7 +214,11 @@ def _pitch_scale(sketch: Sketch, group: Group) -> float:
 def _figure_beside(
     sketch: Sketch, group: Group, site: Site, where: str, gap: float, radius: float
 ) -> Sketch:
-    """As high (as wide) as the target or as the spacing takes, beside it, inside the picture."""
+    """Return the sketch beside the target, inside the picture.
+
+    It is as high (left, right) or as wide (above, below) as the target, or larger if the spacing
+    needs it; with a pitch, its size follows from that.
+    """
     dx, dy = BESIDE[where]
     x0, y0, x1, y1 = site.outlines[group.targets[0]].bounds
     free = site.frame(radius).box
@@ -227,7 +237,7 @@ def _figure_beside(
     scale = min(extent, most) if width or height else 1.0
     apart = min_spacing(robots_on(sketch, group.robots)) * scale
     if group.pitch is not None:
-        scale = min(most, _pitch_scale(sketch, group))  # where it is less the checker finds it
+        scale = min(most, _pitch_scale(sketch, group))  # the checker reports a smaller one
     elif apart < (group.min_spacing or 0.0):
         scale = min(most, ROOMY * scale * (group.min_spacing or 0.0) / max(apart, 1e-9))
     half_x, half_y = scale * width / 2, scale * height / 2
@@ -247,11 +257,11 @@ def _brought_near(
     beside: tuple[int, int],
     radius: float,
 ) -> Sketch:
-    """Beside the outline, not only its box: no further off than allowed."""
+    """Move a sketch from beside the target's box to no further from its outline than allowed."""
     x, y, scale = place
     solid, gap = site.outlines[group.targets[0]].filled, nominal(group.offsets()) + radius
     placed = sketch.at((x, y), scale)
-    for _ in range(SEARCH):  # no step is longer than what is free
+    for _ in range(SEARCH):  # no step is longer than the free distance
         off = drawn_by(placed).distance(solid)
         if off <= group.offsets(radius)[1]:
             break

@@ -1,6 +1,6 @@
-"""Other places for a group whose usual ones come too near to the robots of groups before it.
+"""Alternative places for a group whose usual ones are too near to robots of earlier groups.
 
-What is even along a curve stays so: the places are turned or slid along it together.
+Even spacing along a curve is preserved: its places are turned or slid along it together.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,15 +18,15 @@ from ..contract import Group
 from ..site import PlacementError
 
 PHASES = 24
-"""Places along a gap that the first robot of a curve is tried at."""
+"""Number of positions along a gap that are tried for the first robot of a curve."""
 DISC_SEGMENTS, LEAST_DISC = 8, 0.1
 NEARLY = 1 - 1e-6
-"""Rounding is no conflict."""
+"""Factor on a required distance, so that rounding is not a conflict."""
 
 
 @dataclass(frozen=True)
 class Stand:
-    """A group and where its robots are, (n, 2), image pixels."""
+    """A group and its robots' positions, (n, 2), image pixels."""
 
     group: Group
     points: FloatArray
@@ -36,7 +36,7 @@ class CrowdedError(PlacementError):
     """Two groups would stand in each other's way.
 
     Attributes:
-        first, second: their places in the contract, from 0.
+        first, second: the groups' indices in the contract, from 0.
     """
 
     def __init__(self, first: int, second: int, apart: str, need: str) -> None:
@@ -50,34 +50,42 @@ class CrowdedError(PlacementError):
         self.first, self.second = first, second
 
 
-def need(first: Group, second: Group) -> float:
-    """Least distance of a robot of one group from one of another, px."""
+def least_distance(first: Group, second: Group) -> float:
+    """Return the least distance between robots of two groups, px."""
     return max(first.min_spacing or 0.0, second.min_spacing or 0.0)
 
 
 def conflict(stand: Stand, earlier: Sequence[Stand]) -> tuple[int, float, float] | None:
-    """The first group that is come too near: its index, how near, and what is needed, px."""
+    """Return the first earlier group that a stand comes too near to, or None.
+
+    Returns:
+        Its index, the actual distance and the distance needed, px.
+    """
     for index, other in enumerate(earlier):
         if not len(other.points) or not len(stand.points):
             continue
         apart = float(nearest(other.points, stand.points, 1)[0].min())
-        least = need(stand.group, other.group)
+        least = least_distance(stand.group, other.group)
         if apart < least * NEARLY:
             return index, apart, least
     return None
 
 
-def clear(points: FloatArray, group: Group, earlier: Sequence[Stand]) -> NDArray[np.bool_]:
-    """Which of (n, 2) places of a group are far enough from the robots of others, (n,)."""
+def clear_of_earlier(
+    points: FloatArray, group: Group, earlier: Sequence[Stand]
+) -> NDArray[np.bool_]:
+    """Return a mask (n,) of a group's places (n, 2) far enough from robots of earlier groups."""
     kept = np.ones(len(points), dtype=bool)
     for other in earlier:
         if len(other.points) and len(points):
-            kept &= nearest(other.points, points, 1)[0] >= need(group, other.group) * NEARLY
+            kept &= (
+                nearest(other.points, points, 1)[0] >= least_distance(group, other.group) * NEARLY
+            )
     return kept
 
 
-def slid(curve: Curve, n: int) -> Iterator[FloatArray]:
-    """N places evenly along a curve, started from one place in a gap after another."""
+def shifted_places(curve: Curve, n: int) -> Iterator[FloatArray]:
+    """Yield n places evenly along a curve, starting at one phase of a gap after another."""
     if curve.length <= 0:
         return
     cut = None if curve.closed else curve.cut(n)
@@ -97,18 +105,21 @@ def slid(curve: Curve, n: int) -> Iterator[FloatArray]:
         )
 
 
-def without(
+def region_left_by(
     outline: Outline, group: Group, earlier: Sequence[Stand], margin: float
 ) -> Outline | None:
-    """What is left of a region around the robots of other groups; None where nothing is.
+    """Return what the robots of earlier groups leave of a region; None if nothing is left.
 
     Args:
-        margin: that is kept from the edge of what is left, px.
+        outline: the region.
+        group: the group to place in it.
+        earlier: the groups placed before.
+        margin: distance that will be kept from the edge of what is left, px.
     """
     discs = [
         shapely.buffer(
             shapely.multipoints(other.points),
-            max(need(group, other.group) - margin, LEAST_DISC),
+            max(least_distance(group, other.group) - margin, LEAST_DISC),
             quad_segs=DISC_SEGMENTS,
         )
         for other in earlier

@@ -1,6 +1,6 @@
-"""The best that can be done where a contract cannot be met: fewer robots, or a nearer clearance.
+"""Finds the best plan if a contract cannot be met: with fewer robots, or a nearer clearance.
 
-Whatever comes of it is certified by the same checker, and says of itself what it falls short of.
+The result is certified by the same checker, and states what it falls short of.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,17 +14,17 @@ from .caging import CUT_SHORT, CageError, escape_proof
 from .group_conflicts import CrowdedError
 
 ROUNDS = 60
-"""Times that robots are taken out of one group or another."""
+"""Most times that robots are taken out of a group."""
 TENTH = 10
 """Clearances are tried in steps of a tenth of a pixel."""
 LESS = tuple(k / 12 for k in range(1, 12))
-"""Shares of two groups' robots taken out in search of places where they are not in each other's
-way."""
+"""Shares of robots to take out of two groups, tried until they no longer crowd each other."""
 COARSE = 5
-"""Halvings of a clearance for an escape-proof cage, each of which may take a second or more."""
+"""Steps of the search for the clearance of an escape-proof cage, each of which may take a second or
+more."""
 ROUND = frozenset({"around", "cage"})
 OPEN = 1000.0
-"""A greatest clearance from here on, px, only says that there is none."""
+"""A greatest clearance of this or more, px, means that there is none."""
 
 
 Attempt = Callable[[Contract], Plan]
@@ -34,16 +34,19 @@ Counts = tuple[int, int]
 def best_partial(
     contract: Contract, site: Site, scene_version: str, refusal: PlacementError | None
 ) -> Plan | None:
-    """A certified plan that falls as little short of a contract as is known, marked as partial.
+    """Return a certified plan that falls as little short of a contract as is known, as partial.
 
-    As many robots as fit; where none does, all of them at the nearest clearance to the one stated
-    that can be held. Nothing is done about a clearance that was left open.
+    It places as many robots as fit or, if that gives no plan, all of them at the greatest clearance
+    up to the stated one that can be held. A clearance that was left open is not changed.
 
     Args:
-        refusal: why the robots cannot all be placed; None where they can, but not certified.
+        contract: the contract as stated, in px.
+        site: the outlines and the picture.
+        scene_version: version of the scene.
+        refusal: why not all robots can be placed; None if they can, but the plan is not certified.
 
     Returns:
-        None where nothing that is certified was found, as where a cage needs more robots.
+        None if no certified plan was found, for example because a cage needs more robots.
     """
     if isinstance(refusal, CageError) and refusal.needed is not None:
         return None
@@ -55,16 +58,16 @@ def best_partial(
         return make_plan(smaller, site, scene_version)
 
     with search_budget():
-        fewer = None if refusal is None else _fewer(full, attempt)
-        found = fewer or _nearer(contract, full, attempt, site)
+        fewer = None if refusal is None else _with_fewer_robots(full, attempt)
+        found = fewer or _at_smaller_clearance(contract, full, attempt, site)
         if found is None or found.partial is None or not cut_short():
             return found
         short = found.partial.model_copy(update={"sentence": found.partial.sentence + CUT_SHORT})
         return found.model_copy(update={"partial": short})
 
 
-def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
-    """As many robots as fit, group after group."""
+def _with_fewer_robots(full: Contract, attempt: Attempt) -> Plan | None:
+    """Return a partial plan with as many robots as fit, reducing group after group, or None."""
     smaller, names = full, list(range(len(full.groups)))
     for _ in range(ROUNDS):
         try:
@@ -90,23 +93,23 @@ def _fewer(full: Contract, attempt: Attempt) -> Plan | None:
 
 
 def _with_counts(contract: Contract, robots: Mapping[int, int]) -> Contract | None:
-    """The contract with other numbers of robots in some groups; None where one has too few."""
+    """Return the contract with other robot counts, by group index; None if one is too small."""
     if any(n < (3 if contract.groups[k].relation == "cage" else 1) for k, n in robots.items()):
         return None
     return _changed(contract, {index: {"robots": count} for index, count in robots.items()})
 
 
 def _changed(contract: Contract, updates: Mapping[int, Mapping[str, Any]]) -> Contract:
-    """The contract with other values in some groups, by their index."""
+    """Return the contract with some groups' fields updated, by group index."""
     groups = enumerate(contract.groups)
     changed = tuple(g.model_copy(update=updates.get(index, {})) for index, g in groups)
     return contract.model_copy(update={"groups": changed})
 
 
 def _parted(contract: Contract, pair: tuple[int, int], attempt: Attempt) -> Contract | None:
-    """Fewer robots in two groups that crowd each other: most of those found that do not.
+    """Reduce two groups that crowd each other until they do not, keeping the most robots.
 
-    The second group gives way, or the first, or both by the same share.
+    Either the second group gives way, or the first, or both by the same share.
     """
     first, second = pair
     n, m = (contract.groups[index].robots for index in pair)
@@ -131,7 +134,10 @@ def _parted(contract: Contract, pair: tuple[int, int], attempt: Attempt) -> Cont
 def _fewest_less(
     counts: Callable[[int], Counts], most: int, works: Callable[[Counts], bool]
 ) -> Counts | None:
-    """The counts with the fewest robots taken out that work, as far as halving finds them."""
+    """Return the counts with the fewest robots taken out that work, as far as bisection finds them.
+
+    `counts` maps the number taken out to the two groups' counts.
+    """
     tried = sorted({k for share in LESS if 0 < (k := round(share * most)) < most})
     high = next((k for k in tried if works(counts(k))), None)
     if high is None:
@@ -149,7 +155,7 @@ def _without_group(contract: Contract, index: int) -> Contract:
 
 
 def _shortfall(full: Contract, smaller: Contract, names: list[int]) -> Shortfall:
-    """What is short, given which groups are left, from 0."""
+    """Return the shortfall in robots; `names` are the original indices of the groups left."""
     asked, placed = full.robots, smaller.robots
     have = "has a place" if placed == 1 else "have places"
     left = dict(zip(names, smaller.groups, strict=True))
@@ -162,10 +168,13 @@ def _shortfall(full: Contract, smaller: Contract, names: list[int]) -> Shortfall
     return Shortfall(asked=asked, placed=placed, sentence=sentence)
 
 
-def _nearer(stated: Contract, full: Contract, attempt: Attempt, site: Site) -> Plan | None:
-    """All robots at the greatest clearance that can be held, of the first group it helps.
+def _at_smaller_clearance(
+    stated: Contract, full: Contract, attempt: Attempt, site: Site
+) -> Plan | None:
+    """Return a partial plan with the greatest clearance that can be held in some group, or None.
 
-    A ring that goes all the way round comes before a wider one of which the picture leaves a part.
+    The first group for which this succeeds is reduced. A ring all the way round is preferred to a
+    wider one that the picture cuts.
     """
     for index, (said, group) in enumerate(zip(stated.groups, full.groups, strict=True)):
         if said.clearance is None or not group.keeps_clearance:
@@ -197,7 +206,7 @@ def _greatest(
     attempt: Attempt,
     suits: Callable[[Plan], bool] = lambda plan: True,
 ) -> Plan | None:
-    """The plan at the greatest clearance of a group that certifies and suits, found by halving."""
+    """Return the plan at a group's greatest clearance that is certified and suits, by bisection."""
     group = full.groups[index]
     least, greatest = group.offsets()
     aim = least or greatest
@@ -221,7 +230,7 @@ def _uncut(plan: Plan) -> bool:
 
 
 def _at_share(group: Group, share: float) -> tuple[float, float]:
-    """A share of the group's clearance; inside only the least one is in the way."""
+    """Scale the group's clearance by a share; for inside only the least, which is what hinders."""
     least, greatest = group.offsets()
     deep = greatest >= OPEN or group.relation == "inside"
     return round(least * share, 3), greatest if deep else max(round(greatest * share, 3), 0.1)

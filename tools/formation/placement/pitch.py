@@ -1,6 +1,7 @@
-"""Robots whose neighbours stand an exact distance apart, centre to centre and straight.
+"""Places robots with neighbours at an exact straight distance between centres, the pitch.
 
-All round a target the ring's distance from it follows; on anything else they stand in the middle.
+All round a target, the ring's distance from it follows; on any other curve robots stand in its
+middle.
 """
 
 import math
@@ -20,16 +21,16 @@ from ..site import Site
 from .ring_parts import whole_ring
 
 ROUNDS, CLOSE = 16, 0.01
-"""Rings, or stretches of a line, tried; how near to the pitch is near enough, px."""
+"""Most rings, or stretches of a line, that are tried; tolerance on the pitch, px."""
 UNCUT = 0.999
-"""A ring is not led along the picture's border if this share of its length is left."""
+"""A ring does not count as cut by the picture's border if this share of its length is left."""
 
 
 def pitch_offset(group: Group, site: Site, radius: float) -> float:
-    """How far from its target a group's robots stand the pitch apart all round, px.
+    """Return how far from its target, px, a group's robots stand their pitch apart all round.
 
     Raises:
-        ToolError: nowhere as near or far as they may be; it says what would be possible.
+        ToolError: there is no such distance in the allowed range; it says what would be possible.
     """
     n, pitch = group.robots, group.pitch or 0.0
     low, high = group.offsets(radius)
@@ -59,7 +60,7 @@ def pitch_offset(group: Group, site: Site, radius: float) -> float:
 
 
 def pitch_places(group: Group, curve: Curve, site: Site) -> FloatArray:
-    """Places of a group's robots on its curve the pitch apart, (k, 2): as many as have room.
+    """Return places the pitch apart on a group's curve, (k, 2), for as many robots as have room.
 
     Raises:
         ToolError: the picture cuts the ring that they would go round on.
@@ -77,7 +78,7 @@ def pitch_places(group: Group, curve: Curve, site: Site) -> FloatArray:
 
 
 def chain(line: FloatArray, n: int, pitch: float) -> FloatArray:
-    """As many of n points as fit on a polyline (m, 2) in a row in its middle, the pitch apart."""
+    """Return up to n points, as many as fit, the pitch apart in the middle of a polyline (m, 2)."""
     if not len(line):
         return line
     whole, length = LineString(line), arc_length(line)

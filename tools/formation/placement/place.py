@@ -1,4 +1,4 @@
-"""Positions that satisfy a contract, computed from it alone.
+"""Computes positions that satisfy a contract from it and the site alone.
 
 Each relation has one reference (a curve, corners, a region, a point) that the checker also
 measures against. Frame: image pixels, x right, y down.
@@ -26,42 +26,50 @@ from ..contract import CENTRE_SHARE, DIRECTIONS, OUTSIDE, Contract, Group, nomin
 from ..site import CapacityError, Site, most_that_fit
 from .caging import caged_places, escape_proof
 from .figure import figure_of, place_figure
-from .group_conflicts import CrowdedError, Stand, clear, conflict, slid, without
+from .group_conflicts import (
+    CrowdedError,
+    Stand,
+    clear_of_earlier,
+    conflict,
+    region_left_by,
+    shifted_places,
+)
 from .pitch import pitch_offset, pitch_places
 from .ring_parts import ring_of
 
 TOUCH = 1.0
-"""Robots between two targets keep this far off them, px."""
+"""Robots between two targets keep at least this far off them, px."""
 MOST_AVOIDED = 20
-"""Further places at a centre that are looked at where other robots stand on some."""
+"""Most extra places at a centre that are considered if other robots stand on some."""
 REFLEX = 1.5
-"""A robot's distance from its corner as a multiple of the clearance: 1 at a convex corner, the
-square root of 2 in a right-angled reflex one."""
+"""Greatest distance of a robot from its corner, as a multiple of its greatest distance from the
+outline; needed are 1 at a convex corner, the square root of 2 in a right-angled reflex one."""
 AT_CORNER = 0.5
-"""As near to a corner, px, a robot's centre is on it."""
+"""A robot whose centre is within this distance of a corner, px, is on it."""
 ROUNDING = 2e-6
-"""A place this much nearer than a clearance, px, is at it: corners are found to half of this."""
+"""Tolerance on a clearance, px: places off corners are found to within half of this."""
 LONG = 1.2
-"""Length over width from which a thing has two long sides."""
+"""Ratio of length to width from which an object has two long sides."""
 DRAWN_BY_NUMBER = frozenset({"between", "centre"})
-"""Where the places depend on how many there are, so that some of them are none for fewer."""
+"""Relations whose places depend on the number of robots, so some would not be used by fewer."""
 
 
 Sound = Callable[[Group, FloatArray], bool]
-"""Whether a group alone is certified at some places."""
+"""Returns whether a group alone is certified at the given places."""
 
 
 def place(contract: Contract, site: Site, sound: Sound = lambda group, points: True) -> FloatArray:
-    """Positions of all robots, groups in order, (N, 2).
+    """Place all robots, groups in order, (N, 2), image pixels.
 
     Args:
-        contract: with its defaults written out.
-        sound: asked where a group has to be placed otherwise than it would be alone.
+        contract: with its defaults filled in.
+        site: the outlines and the picture.
+        sound: accepts places of a group that cannot be placed as it would be alone.
 
     Raises:
         CapacityError: a group has more robots than fit; its `fits` says how many do.
         CageError: its robots cannot be placed escape-proof; `needed` says how many would do.
-        CrowdedError: a group would stand in the way of one before it.
+        CrowdedError: a group would stand in the way of an earlier one.
         ToolError: the contract leaves positions to the caller (a free shape).
     """
     stands: list[Stand] = []
@@ -77,21 +85,21 @@ def stand_of(
     site: Site,
     sound: Sound = lambda group, points: True,
 ) -> Stand:
-    """A group of a contract and its places beside those of groups that stand already.
+    """Place a group of a contract beside the groups that are already placed.
 
     Raises:
-        CapacityError, CageError, CrowdedError, ToolError: as `place`.
+        CapacityError, CageError, CrowdedError, ToolError: as in `place`.
     """
     stand = Stand(group, _place_group(group, site, contract.robot_radius))
     clash = conflict(stand, earlier)
     solid = _foreign(contract, group, site)
     if clash is not None or _stands_on(solid, stand.points, contract.robot_radius):
-        return _elsewhere(contract, stand, earlier, site, clash, sound)
+        return _alternative_stand(contract, stand, earlier, site, clash, sound)
     return stand
 
 
 def _foreign(contract: Contract, group: Group, site: Site) -> list[Polygon]:
-    """What a group's robots may not stand on, other than its own targets."""
+    """Return what a group's robots may not stand on, other than its own targets."""
     return [site.solid(t, contract) for t in contract.solid_targets if t not in group.targets]
 
 
@@ -100,11 +108,13 @@ def _stands_on(solid: list[Polygon], points: FloatArray, radius: float) -> bool:
 
 
 def reference_curve(group: Group, site: Site, radius: float, offset: float | None = None) -> Curve:
-    """The curve a ring, side, line, shape or between group stands on.
+    """Return the curve that a ring, side, line, shape or between group stands on.
 
     Args:
-        group: with its defaults written out.
-        offset: of robots' centres from the outline, px; None for the one the clearance aims at.
+        group: with its defaults filled in.
+        site: the outlines and the picture.
+        radius: radius of a robot, px.
+        offset: distance of robots' centres from the outline, px; None for the nominal one.
     """
     frame = site.frame(radius)
     if group.shape is not None:
@@ -131,10 +141,10 @@ def reference_curve(group: Group, site: Site, radius: float, offset: float | Non
 
 
 def side_direction(group: Group, outline: Outline, site: Site) -> tuple[float, float]:
-    """Outward vector of a group's side; of the two long (short) sides the one with more room.
+    """Return the outward vector of a group's side; for long or short, the one with more room.
 
     Raises:
-        ToolError: both long sides are meant of what is about as wide as it is long.
+        ToolError: the other side is asked for of an object about as wide as it is long.
     """
     if group.facing is not None:
         return _facing(outline, site.outlines[group.facing])
@@ -160,10 +170,10 @@ def side_direction(group: Group, outline: Outline, site: Site) -> tuple[float, f
 
 
 def _facing(outline: Outline, other: Outline) -> tuple[float, float]:
-    """Outward vector of the side that faces another target.
+    """Return the outward vector of the side that faces another target.
 
-    Towards the place of the other that is nearest; of a polygonal outline the side whose own
-    direction is nearest to that, so that a line does not run around a corner.
+    It points to the nearest place of the other target. For a polygonal outline it is the normal
+    closest to that direction, so that a line does not run around a corner.
     """
     link = shapely.get_coordinates(shapely.shortest_line(outline.filled, other.filled))
     towards = link[-1] - link[0]
@@ -179,9 +189,9 @@ def _facing(outline: Outline, other: Outline) -> tuple[float, float]:
 
 
 def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
-    """How far from each corner a robot may stand, (k,), px.
+    """Return how far from each corner a robot may stand, (k,), px.
 
-    A rounded outline falls short of its corners; a reflex one is reached along its bisector.
+    A rounded outline falls short of its corners; a reflex corner is approached along its bisector.
     """
     if group.on_corners:
         return np.full(len(corner_points(outline, group.robots)), AT_CORNER)
@@ -189,7 +199,7 @@ def corner_reach(group: Group, outline: Outline, radius: float) -> FloatArray:
     return REFLEX * group.offsets(radius)[1] + short
 
 
-def _elsewhere(
+def _alternative_stand(
     contract: Contract,
     stand: Stand,
     earlier: list[Stand],
@@ -197,16 +207,17 @@ def _elsewhere(
     clash: tuple[int, float, float] | None,
     sound: Sound,
 ) -> Stand:
-    """The group's robots at other places, off others' targets and clear of robots placed before.
+    """Find other places for a group, off foreign targets and clear of robots placed before.
 
-    Where none are found off others' targets it stays as it is, which the checker tells of.
+    If there are none and the group only stands on a foreign target, it stays as it is, which the
+    checker reports.
 
     Raises:
-        CrowdedError: none were found clear of the others, with whom it clashes.
+        CrowdedError: the group clashes with an earlier one and no other places were found.
     """
     group, radius = stand.group, contract.robot_radius
     solid = _foreign(contract, group, site)
-    for points in _otherwise(group, earlier, site, radius):
+    for points in _alternative_places(group, earlier, site, radius):
         other = Stand(group, points)
         free = len(points) == group.robots and conflict(other, earlier) is None
         if free and not _stands_on(solid, points, radius) and sound(group, points):
@@ -217,10 +228,10 @@ def _elsewhere(
     raise CrowdedError(index, len(earlier), site.length(apart), site.length(least))
 
 
-def _otherwise(
+def _alternative_places(
     group: Group, earlier: list[Stand], site: Site, radius: float
 ) -> Iterator[FloatArray]:
-    """Further places for a group that are as good in themselves, as far as there are any."""
+    """Yield alternative places for a group that are equally good in themselves, if any."""
     n, spacing = group.robots, group.min_spacing or 0.0
     if group.shape is not None or escape_proof(group) or not (group.targets or group.line):
         return
@@ -228,18 +239,18 @@ def _otherwise(
         yield _place_at_target(group, site, radius, earlier)[0]
     elif group.relation == "inside":
         least, greatest = group.offsets(radius)
-        left = without(site.visible(group.targets[0]), group, earlier, least)
+        left = region_left_by(site.visible(group.targets[0]), group, earlier, least)
         if left is not None:
             yield inside(left, n, least, greatest, spacing)
     else:
         for offset in _offsets(group, radius):
-            for points in slid(reference_curve(group, site, radius, offset), n):
+            for points in shifted_places(reference_curve(group, site, radius, offset), n):
                 if min_spacing(points) >= spacing * (1 - 1e-6):
                     yield points
 
 
 def _offsets(group: Group, radius: float) -> tuple[float | None, ...]:
-    """Distances from the outline that a curve may have, the one aimed at first, px."""
+    """Return offsets that a curve may have from the outline, px; None, the nominal one, first."""
     if group.clearance is None or group.relation not in OUTSIDE or group.radius is not None:
         return (None,)
     least, greatest = group.clearance
@@ -270,7 +281,7 @@ def _place_group(group: Group, site: Site, radius: float) -> FloatArray:
 
 
 def _as_many_as_fit(group: Group, site: Site, radius: float) -> tuple[FloatArray, str]:
-    """Places of the robots, or of those that fit, and why no more do."""
+    """Return places (k, 2) for all robots, or for those that fit, and why no more do."""
     if group.relation in ("corners", "inside", "centre"):
         return _place_at_target(group, site, radius)
     curve = reference_curve(group, site, radius)
@@ -308,12 +319,12 @@ def _place_at_target(
     crowd = sum(len(other.points) for other in earlier)
     points = near(around_point(outline.centre, n + min(crowd, n + MOST_AVOIDED), pitch))
     points = near(_drawn_in(points, site.frame(radius).box))
-    points = points[clear(points, group, earlier)][:n]
+    points = points[clear_of_earlier(points, group, earlier)][:n]
     return points, f"within {site.length(most, '.0f')} of the centre"
 
 
 def _drawn_in(points: FloatArray, box: Polygon) -> FloatArray:
-    """All points moved together into a box as far as they can be, less those still out of it."""
+    """Move all points together into a box as far as possible; drop those still outside."""
     if box.is_empty or not len(points):
         return points[:0]
     low, high = np.reshape(box.bounds, (2, 2))
@@ -325,7 +336,7 @@ def _drawn_in(points: FloatArray, box: Polygon) -> FloatArray:
 def _corner_places(
     group: Group, site: Site, radius: float, earlier: Sequence[Stand] = ()
 ) -> FloatArray:
-    """Places at the corners, drawn in from the picture's border, less those without room."""
+    """Return places at the corners, moved in from the picture's border, if they have room."""
     outline, box = site.outlines[group.targets[0]], site.frame(radius).box
     corners = points = corner_points(outline, group.robots)
     if not group.on_corners:
@@ -337,7 +348,7 @@ def _corner_places(
     near = np.linalg.norm(points - corners, axis=1) <= corner_reach(group, outline, radius)
     least = 0.0 if group.on_corners else group.offsets(radius)[0] - ROUNDING
     free = points[near & (distances(outline.filled, points) >= least)]
-    free = free[clear(free, group, earlier)]
+    free = free[clear_of_earlier(free, group, earlier)]
     if len(free) > group.robots:
         free = free[spread_subset(free, group.robots)]
     taken: list[FloatArray] = []
@@ -349,7 +360,7 @@ def _corner_places(
 
 
 def _fit(curve: Curve, n: int, spacing: float) -> FloatArray:
-    """Evenly along the curve; if n are too tight, as many as are not."""
+    """Return n places evenly along the curve, or as many as keep the spacing, (k, 2)."""
     points = along_curve(curve, n)
     count = min(n, int(curve.length / spacing) + 1) if spacing > 0 else n
     while len(points) > 1 and min_spacing(points) < spacing * (1 - 1e-6):
@@ -359,9 +370,12 @@ def _fit(curve: Curve, n: int, spacing: float) -> FloatArray:
 
 
 def curve_between(group: Group, site: Site, frame: Frame, *, whole: bool = False) -> Curve:
-    """The gap between two targets: joined along their centroids, or parted across the middle.
+    """Return the line between two targets that joins their centroids, or a divider across it.
 
-    Robots that join keep a gap off either target, but where the `whole` way is asked for.
+    A joining line is inset by a gap at either target, unless the `whole` line is asked for.
+
+    Raises:
+        ToolError: the targets touch or overlap.
     """
     first, second = (site.outlines[t] for t in group.targets)
     ends = [shapely.get_coordinates(o.filled.centroid)[0] for o in (first, second)]

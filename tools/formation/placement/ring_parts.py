@@ -1,7 +1,7 @@
-"""Rings that are not simply all of an offset curve: circles, some sides, with an opening.
+"""Rings other than a whole offset curve: circles, some sides only, or with an opening.
 
-The placer stands robots on them and the checker measures against them. Frame: image pixels, x
-right, y down; degrees are clockwise from the right.
+Placement puts robots on them and the checker measures against them. Frame: image pixels, x right,
+y down; degrees are clockwise from the right.
 """
 
 import math
@@ -19,19 +19,22 @@ from ..contract import DIRECTIONS, MAX_LENGTH, Group
 from ..site import Site
 
 WIDER, NAMED = 2.0, 1.6
-"""An opening is left at least so many times as wide as the gaps between the other robots, and one
-whose width was named."""
+"""An opening is at least WIDER times as wide as the gaps between the other robots; NAMED times if
+its width was stated."""
 STEPS, MOST_OPEN = 400, 0.9
-"""Widths of an opening that are tried, up to this share of the ring."""
+"""Number of widths tried for an opening, up to MOST_OPEN as a share of the ring."""
 ROUNDING = 1e-3
-"""What the ends of an opening are off their places, px."""
+"""Error of the ends of an opening, px."""
 
 
 def ring_of(group: Group, site: Site, radius: float, offset: float) -> Curve:
-    """The curve a ring group stands on, as far as the picture leaves it.
+    """Return the curve that a ring group stands on, as far as it lies in the picture.
 
     Args:
-        offset: of robots' centres from the outline, px; a circle is as large as it is.
+        group: the group.
+        site: the outlines and the picture.
+        radius: radius of a robot, px.
+        offset: distance of robots' centres from the outline, px; a circle has its own radius.
 
     Raises:
         ToolError: the target does not fit into the circle, or the opening into the ring.
@@ -50,7 +53,7 @@ def ring_of(group: Group, site: Site, radius: float, offset: float) -> Curve:
 
 
 def ring_line(group: Group, site: Site, radius: float, offset: float) -> FloatArray:
-    """The closed line (m, 2) an opening is left in: in the picture if that can be."""
+    """Return the closed line (m, 2) in which an opening is left: within the picture if possible."""
     seen = whole_ring(group, site, radius, offset, site.frame(radius))
     return (seen if seen.closed else whole_ring(group, site, radius, offset)).lines[0]
 
@@ -58,7 +61,7 @@ def ring_line(group: Group, site: Site, radius: float, offset: float) -> FloatAr
 def whole_ring(
     group: Group, site: Site, radius: float, offset: float, frame: Frame | None = None
 ) -> Curve:
-    """The curve of a ring group all the way round, less what lies out of a frame.
+    """Return the curve of a ring group all the way round, less what lies outside the frame.
 
     Raises:
         ToolError: the target does not fit into the circle.
@@ -87,14 +90,14 @@ def _circle_centre(group: Group, site: Site, radius: float) -> FloatArray:
 
 
 def centre_of(outline: Outline) -> FloatArray:
-    """The centroid of a thing without its holes, (2,)."""
+    """Return the centroid of an object with its holes filled, (2,)."""
     return shapely.get_coordinates(outline.filled.centroid)[0]
 
 
 def sides_of(group: Group, site: Site) -> BaseGeometry:
-    """Where robots of a group that keeps to some sides may stand.
+    """Return the region for robots of a group that keeps to some sides.
 
-    A side reaches to the diagonals of the target's box, a half to the middle of that.
+    A side extends to the diagonals of the target's bounding box, a half to the box's middle.
     """
     x0, y0, x1, y1 = site.outlines[group.targets[0]].bounds
     middle, half = np.array([x0 + x1, y0 + y1]) / 2, np.array([x1 - x0, y1 - y0]) / 2
@@ -118,7 +121,7 @@ def _far(site: Site) -> float:
 
 
 def opening_station(group: Group, site: Site, loop: FloatArray) -> float:
-    """Arc length on a ring (m, 2) of the middle of its opening, px."""
+    """Return the arc length, px, along a ring (m, 2) of the middle of its opening."""
     centre = centre_of(site.outlines[group.targets[0]])
     unit = opening_way(group, site)
     ray = LineString([centre, centre + _far(site) * unit])
@@ -128,7 +131,11 @@ def opening_station(group: Group, site: Site, loop: FloatArray) -> float:
 
 
 def opening_way(group: Group, site: Site) -> FloatArray:
-    """Unit vector (2,) from the target's centre to where the opening is to be."""
+    """Return the unit vector (2,) from the target's centre towards the opening.
+
+    Raises:
+        ToolError: it is to be towards something that lies on the target's centre.
+    """
     centre = centre_of(site.outlines[group.targets[0]])
     towards = group.opening_towards
     if isinstance(towards, str) and towards not in DIRECTIONS:
@@ -147,7 +154,11 @@ def opening_way(group: Group, site: Site) -> FloatArray:
 
 
 def _opening(group: Group, site: Site, radius: float, loop: FloatArray) -> BaseGeometry:
-    """The part of the plane before which a ring is left open: from the target's centre outwards."""
+    """Return the sector from the target's centre outwards in which a ring is left open.
+
+    Raises:
+        ToolError: an opening of that width cannot be left in the ring.
+    """
     length, station = arc_length(loop), opening_station(group, site, loop)
     wider = NAMED if group.opening else WIDER
     least = wider * length / (group.robots - 1 + wider)

@@ -1,4 +1,4 @@
-"""How robots are spread along the curve or over the corners a contract refers to."""
+"""Checks how robots are spread along the curve or over the corners a contract refers to."""
 
 import math
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from .caging import escape_proof
 from .place import corner_reach
 
 WIDEST, NARROWEST = 1.5, 0.5
-"""Even spacing: a gap between neighbours as a multiple of the mean gap."""
+"""Even spacing: the greatest and least gap between neighbours, as multiples of the mean gap."""
 NEAR_CURVE = 0.03
-"""As near to a side's curve as this share of its length, a robot stands on it."""
+"""A robot within this share of a side curve's length of that curve stands on it."""
 FACING_SLACK = math.radians(10)
-"""How much further than the side itself its robots may be turned from the direction meant."""
+"""How much further than FACING a robot's outward direction may be from that of its side."""
 SIDE_SLACK = 0.1
-"""At a corner two sides are as near; a robot may be nearer to the other one by this share."""
+"""At a corner two sides are equally near; a robot may be nearer to the other one by this share."""
 
 
 def evenness(part: Part, curve: Curve, audit: Audit) -> None:
-    """Gaps between neighbours, measured along the curve, against their mean."""
+    """Check gaps between neighbours, measured along the curve, against their mean."""
     if len(part.points) < 2:
         return
     spread = _spread(part, curve)
@@ -45,7 +45,7 @@ def evenness(part: Part, curve: Curve, audit: Audit) -> None:
 
 
 def _pieces(spread: "_Spread", mean: float, audit: Audit) -> None:
-    """What uneven spreading over open or several pieces of a curve looks like."""
+    """Check the ends of open curves, and gaps between or bare pieces, against the mean gap."""
     for apart, (i, j) in spread.jumps:
         if apart < NARROWEST * mean - TOLERANCE:
             audit.find("crowded", apart, NARROWEST * mean, robot=i, others=(j,))
@@ -58,14 +58,14 @@ def _pieces(spread: "_Spread", mean: float, audit: Audit) -> None:
 
 
 def on_curve(part: Part, curve: BaseGeometry, reach: float, name: str, audit: Audit) -> None:
-    """Every robot within `reach` px of the curve."""
+    """Check that every robot is within `reach` px of the curve."""
     distance = distances(curve, part.points)
     for i in np.flatnonzero(~(distance <= reach + TOLERANCE)):
         audit.find("off_curve", distance[i], reach, robot=part.first + i, about=name)
 
 
 def on_side(part: Part, curve: Curve, direction: tuple[float, float], audit: Audit) -> None:
-    """Every robot stands on the side's curve, or off a part of the target that faces that way."""
+    """Check that every robot is on the side's curve or faces a part of the target on that side."""
     feet = shapely.shortest_line(part.outline.envelope, shapely.points(part.points))
     outward = np.diff(shapely.get_coordinates(feet).reshape(-1, 2, 2), axis=1)[:, 0]
     unit = np.asarray(direction) / np.linalg.norm(direction)
@@ -78,7 +78,7 @@ def on_side(part: Part, curve: Curve, direction: tuple[float, float], audit: Aud
 
 
 def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
-    """Every robot's nearest edge is one of those asked for."""
+    """Check that every robot's nearest edge is one of those chosen."""
     vertices, pairs = part.outline.graph()
     off = np.stack([distances(LineString(vertices[list(p)]), part.points) for p in pairs])
     nearest, chosen = off.min(axis=0), off[list(edges)].min(axis=0)
@@ -88,9 +88,10 @@ def on_edges(part: Part, edges: tuple[int, ...], audit: Audit) -> None:
 
 
 def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
-    """A closed ring: the robots' polygon holds the target, no opening wider than allowed.
+    """Check a closed ring: the robots' polygon contains the target, no opening is too wide.
 
-    What is to be escape-proof is judged by its certificate, openings only where one is named.
+    An escape-proof cage is judged by its certificate, and its openings only if a `max_gap` is
+    stated.
     """
     order = np.argsort(stations_on(part.points, curve)[0], kind="stable")
     points = part.points[order]
@@ -113,14 +114,18 @@ def enclosure(part: Part, curve: Curve, audit: Audit) -> None:
     if not encloses and not escape_proof(part.group):
         about = part.group.targets[0]
         audit.find("not_enclosed", len(points), 3, about=about, unit="robots")
-    kind, needed = "opening" if curve.closed else "opening_at_border", enough(part, curve)
+    kind = "opening" if curve.closed else "opening_at_border"
+    needed = count_for_max_gap(part, curve)
     for k in np.flatnonzero(opening > allowed + TOLERANCE):
         robot, other = part.first + order[k], part.first + order[(k + 1) % len(order)]
         audit.find(kind, opening[k], allowed, robot=robot, others=(other,), needed=needed)
 
 
-def enough(part: Part, curve: Curve) -> int | None:
-    """How many robots make openings as narrow as a contract names, where more are what it takes."""
+def count_for_max_gap(part: Part, curve: Curve) -> int | None:
+    """Return how many robots make openings as narrow as `max_gap`, if more robots are needed.
+
+    None if more would not help, would be too close together, or the curve is not closed.
+    """
     widest = part.group.max_gap
     if not widest or not curve.closed:
         return None
@@ -130,7 +135,7 @@ def enough(part: Part, curve: Curve) -> int | None:
 
 
 def corner_matching(part: Part, audit: Audit) -> None:
-    """One robot per corner: a one-to-one matching within reach of the corners."""
+    """Check that there is a one-to-one matching of robots to corners within reach."""
     from scipy.optimize import linear_sum_assignment
 
     corners = corner_points(part.outline, part.group.robots)
@@ -150,7 +155,10 @@ def corner_matching(part: Part, audit: Audit) -> None:
 
 
 def stations_on(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Arc length of each point's foot on the curve, pieces laid end to end, and its piece."""
+    """Return each point's arc length along the curve, pieces end to end, px, and its piece.
+
+    Both are (n,).
+    """
     if len(curve.lines) == 1:
         return locate(curve.lines[0], points), np.zeros(len(points), dtype=np.intp)
     lines = [LineString(line) for line in curve.lines]
@@ -162,10 +170,11 @@ def stations_on(points: FloatArray, curve: Curve) -> tuple[FloatArray, NDArray[n
 
 @dataclass(frozen=True)
 class _Spread:
-    """Robots along a curve: gaps and who is on either side, ends past the last, bare pieces.
+    """Robots along a curve, in px: gaps, with the robots on either side, ends and bare pieces.
 
-    `jumps` are ways from the last robot of a piece to the first of the next: along both and
-    straight across the cut. Straight from robot to robot says nothing where a recess is bridged.
+    `ends` are the lengths beyond the outermost robots of a piece. `jumps` are distances from the
+    last robot of a piece to the first of the next, along both pieces and straight across the cut;
+    the straight distance between the robots would mean nothing where a recess is bridged.
     """
 
     gaps: list[float]

@@ -1,1 +1,1 @@
-"""Whether robots around a rigid body keep it from escaping, and where such robots stand."""
+"""Tests whether robots around a rigid body cage it, and finds places for robots that do."""

@@ -1,7 +1,7 @@
-"""How many steps a search for cages may take: the same on every machine, a few seconds' worth.
+"""Limits a search for cages by a count of steps, which is the same on every machine.
 
-A step is about a coarse flood of the configuration space of ten robots. What certifies in the end
-takes steps too but is never refused any.
+The budget is worth a few seconds; a step is about one coarse flood of the configuration space with
+ten robots. The final certification spends steps too but is never refused any.
 """
 
 from collections.abc import Generator
@@ -14,7 +14,7 @@ _left: ContextVar[list[int] | None] = ContextVar("left", default=None)
 
 @contextmanager
 def search_budget() -> Generator[None]:
-    """All searches within share the steps; within another budget they share that one's."""
+    """Let all searches in this context share one budget; a nested context shares the outer one."""
     if _left.get() is not None:
         yield
         return
@@ -26,13 +26,13 @@ def search_budget() -> Generator[None]:
 
 
 def spend(steps: int) -> None:
-    """Take steps from the budget, if there is one."""
+    """Spend steps of the current budget, if there is one."""
     left = _left.get()
     if left is not None:
         left[0] -= steps
 
 
 def cut_short() -> bool:
-    """Whether the budget is spent, so that a search has to end."""
+    """Return whether the budget is spent, so that a search has to end."""
     left = _left.get()
     return left is not None and left[0] <= 0

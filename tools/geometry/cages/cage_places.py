@@ -1,8 +1,8 @@
 """Places few robots so that they cage an object, and certifies the cage.
 
-Even rings are tried first. Otherwise robots slide along rings at two distances so that the widest
-way out, estimated on a coarse grid of configurations, gets narrower; the result is then tested by
-`cage`. All of it is deterministic.
+Evenly spaced rings are tried first. Failing that, robots slide along rings at two distances to
+narrow the widest way out, as estimated on a coarse grid of configurations; `cage` then tests the
+result. Everything is deterministic.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,34 +23,34 @@ from .configuration_grid import Grid, component, first_grid
 from .rigid import Body, Obstacles, body_of
 
 STATIONS = 64
-"""Places on each ring that robots may slide to."""
+"""Number of places on each ring that robots may slide to."""
 DEPTHS = (0.1, 0.4)
-"""Where in the range of clearances the rings lie: near the object, and nearer to the middle."""
+"""Where the rings lie in the range of clearances: near the object, and towards the middle."""
 PHASES = 8
-"""Starts tried for an even ring."""
+"""Number of rotations tried for an even ring."""
 SLIDES_STEPS = 10
-"""Steps of the budget that working out the stations takes."""
+"""Steps of the budget spent on evaluating the stations."""
 SLIDES = (8, -8, 4, -4, 2, -2, 1, -1)
-"""Stations a robot slides by in search of a tighter cage, long slides first."""
+"""Slides tried in search of a tighter cage, in stations, the longest first."""
 SWEEPS, STARTS = 6, 2
 BISECTIONS = 7
 MOST_SLID = 40
-"""More robots than this are placed evenly or not at all."""
+"""Beyond this many robots only even rings are tried."""
 TRIES = 6
-"""Numbers of robots tried below the even ring that the disc test certifies."""
+"""How many team sizes are tried below that of the even ring which the disc test certifies."""
 
 
 @dataclass(frozen=True)
 class Demand:
-    """What a cage is made for.
+    """The requirements on a cage.
 
     Attributes:
-        outline: the object.
+        outline: the object to cage.
         clearance: least and greatest distance from the object to a robot's edge, px.
-        radius: of a robot, px.
+        radius: radius of a robot, px.
         frame: where robots may stand.
-        spacing: least distance of two robots' centres, px.
-        walls: what else the object cannot pass.
+        spacing: least distance between two robots' centres, px.
+        walls: other obstacles the object cannot pass.
     """
 
     outline: Outline
@@ -71,11 +71,15 @@ class Demand:
 
     @cached_property
     def slides(self) -> "_Slides":
-        """What the rings' stations close off, which is worked out once."""
+        """The search over the stations of the rings, set up once."""
         return _Slides(self)
 
     def state(self, points: FloatArray, levels: int, escapes: bool = False) -> State:
-        """What is known of robots there as a cage; too near to each other they are none."""
+        """Test whether robots at `points` (n, 2) cage the object.
+
+        They count as not certified when closer together than `spacing`, or when the budget is
+        spent and a flood is asked for (`levels` > 0).
+        """
         crowded = len(points) > 1 and min_spacing(points) < self.spacing
         if crowded or (levels and cut_short()):
             return "not certified"
@@ -84,13 +88,13 @@ class Demand:
 
 
 def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
-    """The fewest robots found that certainly cage an object, and where, (n, 2), image pixels.
+    """Return places of the fewest robots found that certainly cage an object, (n, 2), image px.
 
-    No more than the fewest in an even ring that the disc test certifies; no claim that fewer
-    would not do. Several seconds at most.
+    There are never more than in the smallest even ring that the disc test certifies; fewer might
+    still do. Takes several seconds at most.
 
     Returns:
-        None where robots that keep their spacing and the frame cannot be certified to cage it.
+        None if no robots that keep their spacing and stay in the frame can be certified to cage it.
     """
     even = _even_count(demand, at_least)
     most = at_least + TRIES if even is None else min(even, at_least + TRIES)
@@ -102,9 +106,9 @@ def fewest_cage(demand: Demand, at_least: int = 3) -> FloatArray | None:
 
 
 def caging_places(demand: Demand, n: int, preferred: Sequence[Curve] = ()) -> FloatArray | None:
-    """Places of n robots, 3 or more, that certainly cage an object, (n, 2), image px, or None.
+    """Return places of n >= 3 robots that certainly cage an object, (n, 2), image px, or None.
 
-    `preferred` are curves to spread them over evenly before all else.
+    Robots spread evenly over the `preferred` curves are tried first.
     """
     rings = [points for c in (*preferred, *demand.curves) for points in _even_rings(c, n)]
     levels = (0,) if n > MOST_SLID else (0, QUICK)
@@ -118,7 +122,7 @@ def caging_places(demand: Demand, n: int, preferred: Sequence[Curve] = ()) -> Fl
 
 
 def _even_count(demand: Demand, at_least: int) -> int | None:
-    """The fewest robots whose even ring the disc test certifies."""
+    """Return the smallest number of robots whose even ring the disc test certifies, or None."""
     for curve in demand.curves:
         most = int(curve.length / demand.spacing) if demand.spacing > 0 else 1000
         last, n = at_least - 1, at_least
@@ -145,12 +149,12 @@ def _even_rings(curve: Curve, n: int) -> Iterator[FloatArray]:
 
 
 class _Slides:
-    """Sets of stations on rings, by how clear the widest way out of each is."""
+    """Searches the stations on the rings for a set whose widest way out is narrow."""
 
     def __init__(self, demand: Demand) -> None:
         spend(SLIDES_STEPS)
         self._demand = demand
-        # What the frame cuts open and no wall closes is no ring to slide on.
+        # A ring that the frame cuts open and no wall closes is of no use to slide on.
         rings = [
             c for c in demand.curves if c.closed or (demand.walls is not None and c.length > 0)
         ]
@@ -162,7 +166,7 @@ class _Slides:
         self._fields = [self._clearances(body, points) for points in self._rings]
 
     def places(self, n: int) -> FloatArray | None:
-        """The tightest set found if it is certified."""
+        """Return the places (n, 2) of the tightest set found that is certified, or None."""
         starts: list[tuple[float, int, list[int]]] = []
         for k, points in enumerate(self._rings):
             for phase in range(0, max(len(points) // n, 1), max(len(points) // n // PHASES, 1)):
@@ -176,7 +180,7 @@ class _Slides:
         return None
 
     def _certified(self, points: FloatArray) -> bool:
-        """What leaks is mostly found out on coarse grids, before the finest are tried."""
+        """Return whether the cage is proved; coarse grids, tried first, reject most that leak."""
         state = self._demand.state(points, QUICK, escapes=True)
         if state == "not certified":
             state = self._demand.state(points, THOROUGH)
@@ -188,12 +192,12 @@ class _Slides:
         return fields
 
     def _leaks(self, k: int, chosen: list[int], width: float) -> bool:
-        """Whether a way out has more clearance than `width` all along."""
+        """Return whether there is a way out with more clearance than `width` all along."""
         free = self._fields[k][chosen].min(axis=0) > width
         return bool(component(free, self._seed)[:, self._grid.border].any())
 
     def _width(self, k: int, chosen: list[int], high: float | None = None) -> float:
-        """Clearance of the widest way out, px; below 0 there is none."""
+        """Return the clearance of the widest way out, px; below 0 there is no way out."""
         reach = self._grid.side * 4
         low, high = -reach, reach if high is None else high
         for _ in range(BISECTIONS):
@@ -202,7 +206,11 @@ class _Slides:
         return high
 
     def _tightened(self, k: int, chosen: list[int], width: float) -> tuple[float, list[int]]:
-        """Robots slid one by one as long as the widest way out gets narrower."""
+        """Slide robots one by one for as long as the widest way out gets narrower.
+
+        Returns:
+            The clearance of the widest way out, px, and the stations chosen.
+        """
         step = self._grid.side / 20
         for _ in range(SWEEPS):
             before = width
@@ -210,20 +218,20 @@ class _Slides:
                 for slide in SLIDES:
                     moved = chosen.copy()
                     moved[i] = (chosen[i] + slide) % len(self._rings[k])
-                    if self._apart(k, moved, i) and not self._leaks(k, moved, width - step):
+                    if self._keeps_spacing(k, moved, i) and not self._leaks(k, moved, width - step):
                         chosen, width = moved, self._width(k, moved, width - step)
             if width == before:
                 break
         return width, chosen
 
-    def _apart(self, k: int, chosen: list[int], i: int) -> bool:
+    def _keeps_spacing(self, k: int, chosen: list[int], i: int) -> bool:
         points = self._rings[k][chosen]
         away = np.linalg.norm(np.delete(points, i, axis=0) - points[i], axis=1)
         return bool(away.min() >= max(self._demand.spacing, 1e-9))
 
 
 def _ring_stations(curve: Curve) -> FloatArray:
-    """Points evenly along the pieces of a curve, (k, 2)."""
+    """Return points evenly spaced along the pieces of a curve, (k, 2)."""
     pieces: list[FloatArray] = []
     for line in curve.lines:
         length = arc_length(line)

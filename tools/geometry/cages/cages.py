@@ -1,8 +1,8 @@
-"""Decides whether robots that stand still cage a rigid object.
+"""Decides whether stationary robots cage a rigid object.
 
-Two tests are sufficient for a cage: a disc inside the object and a flood of its configuration
-space. A third shows an escape, checked move by move. Between them the answer is "not certified".
-Comparing gaps with the object's least width is no test: it is wrong for shapes with recesses.
+Two tests can prove a cage: a disc inside the object and a flood of its configuration space. A
+third shows an escape, checked move by move. If none succeeds, the answer is "not certified".
+Comparing gaps with the object's least width would be wrong for shapes with recesses.
 """
 
 import math
@@ -26,28 +26,29 @@ from .rigid import Obstacles, body_of, overlaps
 State = Literal["caged", "not certified", "escape"]
 Test = Literal["disc", "configuration space"]
 QUICK, THOROUGH = 2, 4
-"""Levels of the flood: about 10 to 60 ms for ten robots, and up to a second."""
+"""Levels of the flood; for ten robots about 10 to 60 ms, and up to a second."""
 THOROUGH_STEPS, MANY = 6, 50
-"""Steps of the budget for a flood of all levels, and robots that make it as many again."""
+"""Steps of the budget that a flood of all levels costs; every MANY robots add as many again."""
 MOST_FLOODED = 300
-"""With more robots than this only the disc is tried: a flood costs time for every robot."""
+"""Beyond this many robots only the disc test is tried, as the flood's time grows with them."""
 MARGIN = 1e-9
-"""Relative slack of comparisons, so that rounding certifies nothing."""
+"""Relative slack in comparisons, so that no cage is certified by a rounding error."""
 
 
 @dataclass(frozen=True)
 class Cage:
-    """What is known of a cage.
+    """The result of testing a cage.
 
     Attributes:
-        state: caged is proved, escape is shown by a path, not certified is neither.
-        test: which proof, where caged.
-        inscribed_diameter: of a greatest disc in the object, px; gaps below it certify.
-        widest_gap: between robots' edges, px, in the ring about that disc whose widest gap is
-            least; None where the robots form no ring about it.
+        state: caged if proved, escape if a path shows one, otherwise not certified.
+        test: the test that proved the cage; None unless caged.
+        inscribed_diameter: diameter of a largest disc in the object, px; gaps narrower than this
+            certify a cage.
+        widest_gap: widest gap between robots' edges, px, in the ring about that disc whose widest
+            gap is least; None if the robots form no ring about it.
         widest_between: indices of the robots on either side of that gap.
         path: poses (k, 3) of a verified escape: x, y of the pivot, px, and the turn about it,
-            radians from x to y; the first is where the object is.
+            radians from x to y; the first is the object's present pose.
     """
 
     state: State
@@ -67,16 +68,16 @@ def cage(
     levels: int = THOROUGH,
     escapes: bool = True,
 ) -> Cage:
-    """Whether robots that stand still hold an object that may move and turn in the plane.
+    """Test whether stationary robots cage an object that may move and turn in the plane.
 
     Args:
-        region: the object; its holes do not matter. Image pixels.
-        robots: their centres, (n, 2), image pixels.
-        radius: of each, px; 0 is a point.
-        walls: what else the object cannot pass. Caged by the configuration space then means that
-            it cannot leave the hull of the robots and itself; the disc test leaves walls out, and
-            its gaps are given only where it is what certifies.
-        levels: of the flood, QUICK to THOROUGH; 0 for the disc alone.
+        region: the object, image pixels; its holes are ignored.
+        robots: the robots' centres, (n, 2), image pixels.
+        radius: radius of each robot, px; 0 for a point.
+        walls: other obstacles the object cannot pass. Caged by the configuration space then means
+            that it cannot leave the convex hull of the robots and itself; the disc test ignores
+            walls, and its gaps are given only where it is the test that certifies.
+        levels: levels of the flood, QUICK to THOROUGH; 0 for the disc test alone.
         escapes: whether to look for a way out, which takes longer than proving that there is none.
     """
     points = np.asarray(robots, dtype=float).reshape(-1, 2)
@@ -104,9 +105,12 @@ def cage(
     return Cage("not certified" if found.path is None else "escape", None, *known, found.path)
 
 
-@lru_cache(maxsize=16)  # one thing is put in many cages before the best of them is found
+@lru_cache(maxsize=16)  # the search for the best cage tests the same object many times
 def _inscribed_disc(region: Polygon) -> tuple[FloatArray, float]:
-    """Centre and radius of a greatest inscribed disc; the radius holds for that very centre."""
+    """Return the centre (2,) and radius of a largest inscribed disc, px.
+
+    The radius is measured from that very centre; it is 0 if the centre lies outside.
+    """
     with np.errstate(all="ignore"):  # GEOS on denormal coordinates
         middle = shapely.get_point(shapely.maximum_inscribed_circle(region), 0)
     inside = region.contains(middle)
@@ -114,22 +118,22 @@ def _inscribed_disc(region: Polygon) -> tuple[FloatArray, float]:
 
 
 def widest_link(points: FloatArray, centre: FloatArray) -> tuple[int, int] | None:
-    """The widest link of the ring of points about a centre whose widest link is least.
+    """Find the ring of points about a centre whose longest link is shortest; return that link.
 
-    Proof of the disc test: the object holds a disc of radius rho about c, so c stays out of the
+    Proof of the disc test: the object contains a disc of radius rho about c, so c stays out of the
     open discs of radius r + rho about the robots. A link shorter than 2 (r + rho) is covered by
-    those at its ends. If c lies in a closed simple polygon of such links it cannot leave it.
-    Links are sought among the edges of the Delaunay triangulation, which hold such a ring
+    the discs at its ends. If c lies in a closed simple polygon of such links, it cannot leave it.
+    Links are sought among the edges of the Delaunay triangulation, which contain such a ring
     wherever discs of that radius leave c no way out (Edelsbrunner 1995). They are added by length
-    until one closes a loop that winds about c. Seen from c it goes round one way only, or is
-    checked as a polygon.
+    until one closes a loop that winds about c. Seen from c, that loop either turns one way only or
+    is checked as a polygon.
 
     Args:
         points: (n, 2).
         centre: (2,).
 
     Returns:
-        Indices of the points at its ends; None where no ring of the points holds the centre.
+        Indices of the points at the link's ends; None if no ring of the points encloses the centre.
     """
     links = _delaunay_links(points)
     if not len(links):
@@ -148,13 +152,13 @@ def widest_link(points: FloatArray, centre: FloatArray) -> tuple[int, int] | Non
 
 
 def _winds_around_origin(loop: FloatArray) -> bool:
-    """Whether a polygon (n, 2) is simple and the origin lies in it."""
+    """Return whether a polygon (n, 2) is simple and contains the origin."""
     places = loop.tolist()
     turns = [
         math.atan2(ax * by - ay * bx, ax * bx + ay * by)
         for (ax, ay), (bx, by) in pairwise([*places, places[0]])
     ]
-    if min(turns) > MARGIN and max(turns) < math.pi - MARGIN:  # star-shaped, so it is
+    if min(turns) > MARGIN and max(turns) < math.pi - MARGIN:  # star-shaped about the origin
         return sum(turns) < 3 * math.pi  # once round, not more often
     if max(turns) < -MARGIN and min(turns) > MARGIN - math.pi:
         return sum(turns) > -3 * math.pi
@@ -163,11 +167,14 @@ def _winds_around_origin(loop: FloatArray) -> bool:
 
 
 class _Forest:
-    """Trees of points with the angle each is seen at from the first of its tree (union-find)."""
+    """Union-find trees of points, with each point's angle as seen from the centre.
+
+    The angle is relative to the root of the point's tree.
+    """
 
     def __init__(self, count: int) -> None:
         self._parent = list(range(count))
-        self._angle = [0.0] * count  # from the parent
+        self._angle = [0.0] * count  # relative to the parent
         self._size = [1] * count
 
     def _root(self, i: int) -> tuple[int, float]:
@@ -178,7 +185,10 @@ class _Forest:
         return i, angle
 
     def join(self, i: int, j: int, angle: float) -> float:
-        """Link j, seen at an angle from i; returns by how much that winds if they were linked."""
+        """Link j, seen at `angle` from i; return the winding, radians, of the loop this closes.
+
+        Returns 0 if the two were not yet connected, so that no loop is closed.
+        """
         (a, to_i), (b, to_j) = self._root(i), self._root(j)
         across = to_i + angle - to_j
         if a == b:
@@ -191,7 +201,7 @@ class _Forest:
 
 
 def _delaunay_links(points: FloatArray) -> NDArray[np.intp]:
-    """Edges of the Delaunay triangulation, shortest first, pairs of indices (m, 2)."""
+    """Return the edges of the Delaunay triangulation, shortest first, as index pairs (m, 2)."""
     edges = shapely.delaunay_triangles(shapely.multipoints(points), only_edges=True)
     ends = shapely.get_coordinates(edges)
     index = {(x, y): i for i, (x, y) in enumerate(points.tolist())}
@@ -201,7 +211,7 @@ def _delaunay_links(points: FloatArray) -> NDArray[np.intp]:
 
 
 def _fewest_links_path(near: list[list[int]], start: int, end: int) -> list[int]:
-    """A way with the fewest links from one point to another."""
+    """Return a path with the fewest links between two points, from `end` back to `start`."""
     before = {start: start}
     queue = deque([start])
     while end not in before:

@@ -1,8 +1,8 @@
 """Floods a body's configuration space (x, y, theta) to see whether it can get out between robots.
 
 A cell is blocked only if every configuration in it collides, so what the flood does not reach
-cannot be reached (after Varava et al. 2018, who cover slices of it). The converse does not hold:
-a way out counts only once its moves are checked continuously.
+cannot be reached (after Varava et al. 2018, who cover slices of the space). The converse does not
+hold: a way out counts only once its moves have been checked continuously.
 """
 
 from dataclasses import dataclass
@@ -22,43 +22,44 @@ from .leaks import leaks
 from .rigid import Body, Obstacles
 
 TABLE = 192
-"""Side of the table of signed distances."""
+"""Side of the table of signed distances, in pixels of the table."""
 DETAIL, MAX_CORNERS = 0.002, 48
-"""An outline of more corners is shrunk and simplified by this share of its reach."""
+"""An outline with more than MAX_CORNERS corners is shrunk and simplified by at least DETAIL, a
+share of its reach."""
 WALL_POINTS = 400
 RUN = 24
-"""Points of a wall, one after the other, for which cells out of reach are left out together."""
+"""Number of successive wall points for which cells out of reach are skipped together."""
 SEARCHED = (1, 2)
-"""Levels on which a way out is looked for: before them it is too coarse, after them too slow."""
+"""Levels on which a way out is sought: earlier grids are too coarse, later ones too slow."""
 FOLLOWED = 1
-"""Level from which one way is followed to the last one, which leaks for certain if that does."""
+"""Level from which one path is followed down to the last level, which leaks if the path does."""
 
 
 @dataclass(frozen=True)
 class Flood:
-    """What a flood showed: `enclosed` is proof; `path` (k, 3), poses, is a verified way out."""
+    """The result of a flood: `enclosed` is proved; `path`, poses (k, 3), is a verified way out."""
 
     enclosed: bool
     path: FloatArray | None = None
 
 
 def flood(body: Body, obstacles: Obstacles, levels: int, *, escapes: bool = True) -> Flood:
-    """Flood the configurations from where the body is, on ever finer grids.
+    """Flood the configurations from the body's present one, on ever finer grids.
 
-    The domain is where the pivot lies within the hull of the robots and the body, a little
-    widened; the body is enclosed if the flood does not come to the border of that. Let a cell
-    have the centre (t0, theta0), the side h and the angle w. In a configuration (t, theta) of it
+    In the domain the pivot lies within the convex hull of the robots and the body, slightly
+    widened; the body is enclosed if the flood does not reach its border. Let a cell have the
+    centre (t0, theta0), the side h and the angle w. In a configuration (t, theta) of the cell
     the body sees a robot p at q = R(-theta)(p - t), with
     |q - q0| <= |t - t0| + 2 |p - t0| sin(|theta - theta0| / 2) <= h / sqrt(2) + |p - t0| w / 2.
-    The signed distance sd to the body is 1-Lipschitz, and its table gives it at q0 from above
-    (the pixel's centre plus half the pixel's diagonal), for a part of the body rather than more
-    than it. So with sd(q0) + h / sqrt(2) + |p - t0| w / 2 < radius every configuration of the
-    cell collides, and the cell is blocked. A path goes from cell to cell over a common point,
-    that is, between 26-neighbours, theta closed to a circle. Walls are some of their points.
+    The signed distance sd to the body is 1-Lipschitz, and the table bounds it from above at q0
+    (the value at the pixel's centre plus half the pixel's diagonal), for the body or a part of
+    it, never for more. So if sd(q0) + h / sqrt(2) + |p - t0| w / 2 < radius, every configuration
+    of the cell collides, and the cell is blocked. A path passes between cells with a common point,
+    that is, 26-neighbours, with theta closed to a circle. Walls are represented by sample points.
 
     Args:
-        body, obstacles: of which none overlap.
-        levels: how often at most the cells reached are halved, the first grid included.
+        body, obstacles: must not overlap.
+        levels: greatest number of grids, each with half the cell size of the one before.
         escapes: whether to look for a way out.
     """
     table = _distance_table(body, obstacles.radius)
@@ -90,18 +91,18 @@ def flood(body: Body, obstacles: Obstacles, levels: int, *, escapes: bool = True
 
 
 def _cell_motion(table: "_Table", grid: Grid) -> float:
-    """How far at most a robot near the body moves, as the body sees it, within a cell, px."""
+    """Return a bound on how far a robot moves in the body's frame within a cell, px."""
     return grid.side / np.sqrt(2) + grid.angle / 2 * table.reach
 
 
 @dataclass(frozen=True)
 class _Table:
-    """Signed distances to a body (negative inside) from above, px.
+    """Upper bounds on the signed distance to a body (negative inside), px.
 
     Attributes:
-        values: one a pixel of the square of half-side `half` about the pivot.
-        reach: asked for within this distance of the pivot.
-        slack: by how much a value may lie above the distance in the middle of its pixel.
+        values: one for each pixel of the square of half-side `half`, px, about the pivot.
+        reach: the table is valid within this distance of the pivot, px.
+        slack: how far a value lies above the distance at its pixel's centre, px.
     """
 
     values: FloatArray
@@ -140,7 +141,7 @@ def _distance_table(body: Body, radius: float) -> _Table:
 
 
 def _simplified(body: Body) -> Polygon:
-    """A part of the body with few corners: if that cannot get out, neither can the whole."""
+    """Return a part of the body with few corners; if that cannot get out, the body cannot."""
     share = DETAIL
     while len(body.polygon.exterior.coords) > MAX_CORNERS + 1 and share < 0.05:
         step = share * body.reach
@@ -157,9 +158,9 @@ def _simplified(body: Body) -> Polygon:
 def _cell_clearances(
     table: _Table, obstacles: Obstacles, grid: Grid, cells: tuple[IndexArray, ...]
 ) -> FloatArray:
-    """Clearance in the middle of each cell as far as the table knows it, (k,), px.
+    """Return the clearance at the centre of each cell, estimated from the table, (k,), px.
 
-    Infinite where no robot is near, -infinite where the whole cell is blocked.
+    It is infinite where no robot is near, -infinite where the whole cell is blocked.
     """
     x, y, theta = grid.centres(cells).T
     cos, sin = np.cos(theta), np.sin(theta)
@@ -183,9 +184,10 @@ def _cell_clearances(
 
 
 def clearances(body: Body, robots: FloatArray, radius: float, grid: Grid) -> NDArray[np.float32]:
-    """Roughly the clearance from each robot (k, 2) alone in every cell, (k, turns, rows, columns).
+    """Return the rough clearance in every cell from each robot (k, 2) alone, px.
 
-    Infinite where a robot is out of the body's reach.
+    Returns:
+        (k, turns, rows, columns), infinite where a robot is out of the body's reach.
     """
     table = _distance_table(body, radius)
     cells = tuple(index.ravel() for index in np.indices((grid.turns, *grid.domain.shape)))
@@ -203,7 +205,10 @@ def clearances(body: Body, robots: FloatArray, radius: float, grid: Grid) -> NDA
 def _obstacle_points(
     table: _Table, obstacles: Obstacles, grid: Grid
 ) -> list[tuple[FloatArray, float]]:
-    """Robots and their radius; runs of points of the walls within reach and radius 0."""
+    """Return groups of obstacle points, each with a radius.
+
+    First the robots with theirs, then runs of points on the walls within reach, with radius 0.
+    """
     points = [(obstacles.robots, obstacles.radius)]
     if obstacles.walls is not None:
         walls = _wall_points(obstacles.walls, table.half, grid)
@@ -212,7 +217,7 @@ def _obstacle_points(
 
 
 def _wall_points(walls: BaseGeometry, reach: float, grid: Grid) -> FloatArray:
-    """Points on the walls within a distance of the grid, (k, 2)."""
+    """Return points on the walls within `reach` px of the grid, (k, 2)."""
     x0, y0 = grid.origin - reach
     x1, y1 = grid.origin + grid.side * np.array(grid.domain.shape[::-1]) + reach
     lines = walls.boundary if shapely.get_dimensions(walls) == 2 else walls

@@ -1,6 +1,6 @@
 """Cells of a configuration space (x, y, theta): grids, connected components and paths.
 
-Arrays are (turns, rows, columns); theta is a circle, its first cell begins at 0. Frame: image
+Arrays are (turns, rows, columns); theta wraps around and its first cell begins at 0. Frame: image
 pixels, x right, y down.
 """
 
@@ -19,16 +19,19 @@ BoolArray = NDArray[np.bool_]
 IndexArray = NDArray[np.intp]
 
 COARSE = 20
-"""Cells along the longer side of the domain at the first level; every level doubles them."""
+"""Cells along the longer side of the domain at the first level; each level doubles the number."""
 MIN_TURNS, MAX_TURNS = 16, 64
 """Fewest and most cells of theta at the first level."""
 NEIGHBOURHOOD = np.stack(np.meshgrid(*[(-1, 0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-"""Steps to a cell itself and its 26 neighbours, (27, 3)."""
+"""Index offsets to a cell itself and its 26 neighbours, (27, 3)."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Cells of side `side`, px, from a corner `origin`; `domain` (rows, columns) is in question."""
+    """A grid of cells of side `side`, px, from the corner `origin`, image pixels.
+
+    `turns` is the number of cells of theta; `domain` (rows, columns) marks the cells considered.
+    """
 
     origin: FloatArray
     side: float
@@ -37,7 +40,7 @@ class Grid:
 
     @property
     def angle(self) -> float:
-        """Of a cell, radians."""
+        """The angle of a cell, radians."""
         return 2 * np.pi / self.turns
 
     @cached_property
@@ -48,24 +51,24 @@ class Grid:
         return self.domain & ~ndimage.binary_erosion(self.domain, np.ones((3, 3), dtype=np.intp))
 
     def seed(self, point: FloatArray) -> tuple[int, int, int]:
-        """The cell of the start pose; theta 0 is where the first cell begins."""
+        """Return the cell (turn, row, column) of the start pose, whose theta is 0."""
         x, y = np.floor((point - self.origin) / self.side).astype(int)
         return 0, int(y), int(x)
 
     def centres(self, cells: tuple[IndexArray, ...]) -> FloatArray:
-        """Poses in the middle of cells, (k, 3)."""
+        """Return the poses at the centres of cells, (k, 3)."""
         k, j, i = (index.astype(float) + 0.5 for index in cells)
         x, y = self.origin[0] + i * self.side, self.origin[1] + j * self.side
         return np.stack([x, y, k * self.angle], axis=1)
 
     def halved(self) -> "Grid":
-        """The same domain in cells of half the side and angle."""
+        """Return a grid of the same domain with cells of half the side and angle."""
         domain = self.domain.repeat(2, axis=0).repeat(2, axis=1)
         return Grid(self.origin, self.side / 2, self.turns * 2, domain)
 
 
 def first_grid(body: Body, obstacles: Obstacles) -> Grid:
-    """The coarsest grid: its domain is the hull of the robots and the body, a little widened."""
+    """Return the coarsest grid, on the slightly widened convex hull of the robots and the body."""
     corners = shapely.get_coordinates(body.polygon) + body.pivot
     hull = MultiPoint(np.concatenate([obstacles.robots, corners])).convex_hull
     x0, y0, x1, y1 = hull.bounds
@@ -76,13 +79,14 @@ def first_grid(body: Body, obstacles: Obstacles) -> Grid:
     x, y = np.meshgrid(np.arange(nx) + 0.5, np.arange(ny) + 0.5)
     centres = origin + np.stack([x.ravel(), y.ravel()], axis=1) * side
     domain = np.asarray(shapely.contains_xy(region, centres), dtype=np.bool_).reshape(x.shape)
-    even = np.pi * np.sqrt(2) * body.reach / side  # a turn then counts as much as a step
+    # With this many turns, a cell of theta moves the body about as far as a cell of x or y.
+    even = np.pi * np.sqrt(2) * body.reach / side
     turns = int(np.clip(np.ceil(even), MIN_TURNS, MAX_TURNS))
     return Grid(origin, side, turns, domain)
 
 
 def component(free: BoolArray, seed: tuple[int, int, int]) -> BoolArray:
-    """The cells that 26-neighbours connect with a cell; the first axis is a circle."""
+    """Return the cells 26-connected to the cell `seed`; the first axis wraps around."""
     from scipy import ndimage
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -99,12 +103,15 @@ def component(free: BoolArray, seed: tuple[int, int, int]) -> BoolArray:
 
 
 def halved(cells: BoolArray) -> BoolArray:
-    """The same cells in a grid halved."""
+    """Return the same region as cells of the halved grid."""
     return cells.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2)
 
 
 def neighbours(cells: IndexArray, shape: tuple[int, ...]) -> IndexArray:
-    """Pairs of cells side by side, (m, 2) indices into cells (k, 3); the first axis is a circle."""
+    """Return the pairs of cells that share a face, (m, 2) indices into cells (k, 3).
+
+    The first axis wraps around.
+    """
     keys: IndexArray = np.asarray(np.ravel_multi_index(tuple(cells.T), shape), dtype=np.intp)
     order = np.argsort(keys)
     ordered = keys[order]
@@ -123,12 +130,12 @@ def neighbours(cells: IndexArray, shape: tuple[int, ...]) -> IndexArray:
 
 
 def shortest_path(links: IndexArray, source: int, ends: BoolArray) -> IndexArray | None:
-    """A path with the fewest links from a node to the nearest end, or None.
+    """Return a path with the fewest links from a node to the nearest end, or None.
 
     Args:
         links: (m, 2) pairs of nodes.
-        source: where it starts.
-        ends: (n,) which nodes it may end at.
+        source: the node it starts from.
+        ends: (n,) mask of the nodes it may end at.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order

@@ -1,7 +1,7 @@
 """Finds a way out between robots: planned on a grid of configurations, then proved move by move.
 
-Moves are checked only when a path uses them (lazy planning, Bohlin and Kavraki 2000). A returned
-path is clear throughout and ends where a line separates the body from every robot.
+Moves are checked only when a path uses them (lazy planning, Bohlin and Kavraki 2000). A path that
+is returned is clear throughout and ends where a line separates the body from every robot.
 """
 
 import numpy as np
@@ -18,18 +18,19 @@ from .configuration_grid import (
 from .rigid import Body, Obstacles, clear_moves, shortened, ways_out
 
 RETRIES = 6
-"""How often a way is planned anew without the moves that turned out not to be clear."""
+"""How many paths are planned, each without the moves found not to be clear."""
 EXITS = 24
-"""So many cells of the border, spread by their distance from the start, may end a way."""
+"""Most border cells at which a path may end, evenly spread over those that are reached."""
 
 
 def way_out(body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray) -> FloatArray | None:
-    """A verified way out of the domain and away, poses (k, 3) from the start, or None.
+    """Return a verified way out of the domain and away, poses (k, 3) from the start, or None.
 
     Args:
-        body, obstacles: what gets out of what.
-        grid: of the configurations.
-        room: (turns, rows, columns), clearance in the middle of each cell, px; a guide only.
+        body: what is to get out.
+        obstacles: what it is to get out of.
+        grid: the grid of configurations.
+        room: (turns, rows, columns), clearance at the centre of each cell, px; only a guide.
     """
     start = _entry(body, obstacles, grid, room)
     if start is None:
@@ -62,11 +63,14 @@ def way_out(body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray) -> F
 def _entry(
     body: Body, obstacles: Obstacles, grid: Grid, room: FloatArray
 ) -> tuple[int, int, int] | None:
-    """The roomiest cell beside the start whose middle the body gets to straight."""
+    """Return the roomiest cell at or beside the start with a clear straight move to its centre.
+
+    None if there is none with positive clearance.
+    """
     cells = NEIGHBOURHOOD + grid.seed(body.pivot)
     inside = ((cells[:, 1:] >= 0) & (cells[:, 1:] < room.shape[1:])).all(axis=1)
     cells = cells[inside]
-    poses = grid.centres(tuple(cells.T))  # before theta wraps: the turn there is a small one
+    poses = grid.centres(tuple(cells.T))  # before theta wraps, so that the turn stays small
     clear = clear_moves(body, obstacles, np.repeat(body.start[None], len(poses), 0), poses)
     cells[:, 0] %= room.shape[0]
     best = max(cells[clear], key=lambda c: room[tuple(c)], default=None)
@@ -78,7 +82,7 @@ def _entry(
 def _exits(
     body: Body, obstacles: Obstacles, grid: Grid, reached: BoolArray
 ) -> dict[int, FloatArray]:
-    """Cells of the border from which the body gets away straight, and the pose it gets to."""
+    """Return the border cells from which a straight move gets the body away, with its end pose."""
     found = np.flatnonzero(reached & grid.border)
     if not len(found):
         return {}

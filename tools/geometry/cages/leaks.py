@@ -1,7 +1,7 @@
 """Checks along one path whether a flood of the finest grid would reach the border.
 
 If it would, the finest grid certifies nothing and the work on its other cells is saved. The cells
-checked are a subset of those that the whole flood reaches, so that no verdict depends on it.
+checked are a subset of those that the full flood reaches, so no verdict changes.
 """
 
 from collections.abc import Callable
@@ -20,20 +20,20 @@ from .configuration_grid import (
 
 Cells = tuple[IndexArray, ...]
 Gaps = Callable[[Grid, Cells], FloatArray]
-"""Clearance in the middle of cells of a grid, px; -infinite where a cell is blocked."""
+"""Returns the clearance at the centres of cells of a grid, px; -infinite for a blocked cell."""
 
 BISECTIONS = 5
-"""Steps in search of the way whose least clearance is greatest."""
+"""Steps of the search for the path whose least clearance is greatest."""
 
 
 def leaks(gaps: Gaps, grid: Grid, room: FloatArray, start: FloatArray, levels: int) -> bool:
-    """Whether cells about one way to the border connect it with the start on the finest grid.
+    """Return whether the cells around one path to the border still leak on the finest grid.
 
     Args:
-        gaps: of cells.
-        grid: whose flood is known.
-        room: its cells' clearance, (turns, rows, columns), -infinite where it does not reach.
-        start: of the pivot, (2,), image pixels.
+        gaps: returns the clearance of cells.
+        grid: the grid that has been flooded.
+        room: its cells' clearance, (turns, rows, columns), -infinite where the flood did not reach.
+        start: position of the pivot at the start, (2,), image pixels.
         levels: how often the grid is halved.
     """
     cells = np.stack(np.nonzero(room > -np.inf), axis=1)
@@ -53,9 +53,9 @@ def leaks(gaps: Gaps, grid: Grid, room: FloatArray, start: FloatArray, levels: i
 def _widest_way(
     cells: IndexArray, gap: FloatArray, grid: Grid, start: FloatArray
 ) -> IndexArray | None:
-    """Indices of cells (k, 3) on a way from the start to the border, side by side.
+    """Return indices into cells (k, 3) of a path of adjacent cells from start to border, or None.
 
-    It has the fewest steps of those whose least clearance is about the greatest.
+    Of the paths whose least clearance is about the greatest it has the fewest steps.
     """
     source = np.flatnonzero((cells == grid.seed(start)).all(axis=1))
     if not len(source):
@@ -73,7 +73,7 @@ def _widest_way(
 
 
 def _touching(cells: IndexArray, way: IndexArray, grid: Grid) -> BoolArray:
-    """Which cells are on a way or have a neighbour there, (k,)."""
+    """Return a mask (k,) of the cells on a path or next to one of its cells."""
     marked = np.zeros((grid.turns, *grid.domain.shape), dtype=bool)
     near = (way[:, None] + NEIGHBOURHOOD).reshape(-1, 3)
     near[:, 0] %= grid.turns
@@ -83,6 +83,6 @@ def _touching(cells: IndexArray, way: IndexArray, grid: Grid) -> BoolArray:
 
 
 def _halved(cells: IndexArray) -> IndexArray:
-    """The cells of the grid halved that make up some cells, (8 k, 3)."""
+    """Return the cells of the halved grid that make up the given cells, (8 k, 3)."""
     halves = np.stack(np.meshgrid(*[(0, 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     return (2 * cells[:, None] + halves).reshape(-1, 3)

@@ -1,8 +1,8 @@
 """Rigid motion of a flat body among robots, checked continuously.
 
-A pose is (x, y, theta): where the body's pivot is, image pixels (x right, y down), and by how
-much it is turned about it, radians from x to y. Moves go straight in all three. They are checked
-by conservative advancement (Mirtich 1996): never further at once than the clearance allows.
+A pose is (x, y, theta): the position of the body's pivot, image pixels (x right, y down), and its
+rotation about the pivot, radians from x to y. Moves are straight in all three, and checked by
+conservative advancement (Mirtich 1996), in steps no longer than the clearance allows.
 """
 
 from dataclasses import dataclass
@@ -18,19 +18,19 @@ from ..outline import FloatArray, distances
 CONTACT = 1e-5
 """Clearance below this share of the body's reach counts as contact."""
 ADVANCE = 0.9
-"""Of a clearance so much is used up by one step; the rest keeps a verified move off contact."""
+"""Share of the clearance that one step uses up; the rest keeps a verified move off contact."""
 MAX_STEPS = 200
 WAYS = 16
-"""Directions in which a body that got between the robots may draw back."""
+"""Number of directions in which a body that has got out may move away from the robots."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid region, its holes filled.
+    """A rigid region with its holes filled.
 
     Attributes:
-        polygon: its region with the pivot at (0, 0).
-        pivot: where the pivot is at the start, (2,), image pixels: the centre of the smallest
+        polygon: the region in coordinates with the pivot at (0, 0), px.
+        pivot: position of the pivot at the start, (2,), image pixels: the centre of the smallest
             enclosing circle, which keeps `reach` small.
         reach: greatest distance of a point of the body from the pivot, px.
     """
@@ -41,22 +41,22 @@ class Body:
 
     @property
     def start(self) -> FloatArray:
-        """The pose the body is in, (3,)."""
+        """The body's initial pose, (3,)."""
         return np.array([*self.pivot, 0.0])
 
     def at(self, pose: FloatArray) -> Polygon:
-        """The region in a pose, image pixels."""
+        """Return the region in a pose, image pixels."""
         ring = shapely.get_coordinates(self.polygon)
         return Polygon(_turned(ring, pose[2]) + pose[:2])
 
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What a body may not enter: robots, discs that are points where the radius is 0, and walls.
+    """What a body may not enter: robots and walls.
 
     Attributes:
-        robots: their centres, (n, 2), image pixels.
-        radius: of each, px.
+        robots: the robots' centres, (n, 2), image pixels.
+        radius: radius of each robot, px; 0 for points.
         walls: any geometry, or None.
     """
 
@@ -66,7 +66,7 @@ class Obstacles:
 
 
 def body_of(region: Polygon) -> Body:
-    """The region as a body where it is now."""
+    """Return the region as a body at its present position."""
     ring = shapely.get_coordinates(region.exterior)
     hull = shapely.convex_hull(region)
     pivot = shapely.get_coordinates(shapely.minimum_bounding_circle(hull).centroid)[0]
@@ -75,14 +75,14 @@ def body_of(region: Polygon) -> Body:
 
 
 def seen_from(points: FloatArray, poses: FloatArray) -> FloatArray:
-    """Points as the body sees them: (k, 2) image pixels and (k, 3) poses to (k, 2)."""
+    """Transform points (k, 2), image pixels, into the body's frame in poses (k, 3); (k, 2), px."""
     way = points - poses[:, :2]
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     return np.stack([cos * way[:, 0] + sin * way[:, 1], cos * way[:, 1] - sin * way[:, 0]], axis=1)
 
 
 def overlaps(body: Body, obstacles: Obstacles) -> bool:
-    """Whether the body touches an obstacle where it is now."""
+    """Return whether the body touches an obstacle in its initial pose."""
     here = body.at(body.start)
     if obstacles.walls is not None and here.intersects(obstacles.walls):
         return True
@@ -92,11 +92,11 @@ def overlaps(body: Body, obstacles: Obstacles) -> bool:
 def clear_moves(
     body: Body, obstacles: Obstacles, before: FloatArray, after: FloatArray
 ) -> NDArray[np.bool_]:
-    """Which straight moves between poses, (m, 3) each, touch nothing anywhere on the way, (m,).
+    """Return a mask (m,) of the straight moves between poses (m, 3) that touch nothing on the way.
 
-    As the body sees it, a robot moves no faster than the translation plus its distance from the
-    pivot times the turn; that distance is greatest at an end, so a clearance d leaves
-    d / (that bound) of the move free.
+    In the body's frame, a robot moves no faster than the translation plus its distance from the
+    pivot times the turn. That distance is greatest at one end of the move, so with a clearance d
+    at least the share d / (that bound) of the move is free.
     """
     robots, move = obstacles.robots, after - before
     touch = CONTACT * body.reach
@@ -138,7 +138,7 @@ def _clear_of(walls: BaseGeometry, body: Body, before: FloatArray, move: FloatAr
 
 
 def ways_out(body: Body, obstacles: Obstacles, pose: FloatArray) -> FloatArray:
-    """Poses straight away from one in which a line parts the body from all robots, (16, 3)."""
+    """Return poses a straight move away, in each of which a line parts body and robots, (16, 3)."""
     ring = _turned(shapely.get_coordinates(body.polygon), pose[2]) + pose[:2]
     angles = 2 * np.pi * np.arange(WAYS) / WAYS
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -148,7 +148,7 @@ def ways_out(body: Body, obstacles: Obstacles, pose: FloatArray) -> FloatArray:
 
 
 def shortened(body: Body, obstacles: Obstacles, path: FloatArray) -> FloatArray:
-    """A path of clear moves, (k, 3), with all stops left out that straight moves can do without."""
+    """Return a path of clear moves, (k, 3), less the stops that clear straight moves can skip."""
     kept = [0]
     while kept[-1] < len(path) - 1:
         i = kept[-1]

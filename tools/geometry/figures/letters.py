@@ -1,8 +1,8 @@
 """Letters and digits as pen strokes, for robots that stand on lines instead of outlines.
 
-In `letters.json` every glyph is 6 high, y down, its left edge at x = 0. Strokes are separated by
-semicolons; each is points "x y" and arcs "@ cx cy rx ry from to" (degrees, clockwise as seen, 0 to
-the right).
+In `letters.json` every glyph is 6 high, y down, with its left edge at x = 0. Semicolons separate
+strokes; each has points "x y" and arcs "@ cx cy rx ry from to", separated by commas (degrees,
+clockwise as seen, 0 to the right).
 """
 
 import json
@@ -19,23 +19,23 @@ from ..outline import FloatArray
 
 HEIGHT = 6.0
 GAP, SPACE = 1.8, 2.4
-"""Between two letters and for a blank, as parts of a height of 6."""
+"""Gap between two letters, and width of a blank, for a height of 6."""
 ARC_STEP = 6.0
-"""Degrees between the points of an arc."""
+"""Largest angle between successive points of an arc, degrees."""
 
 
 class Glyph(NamedTuple):
-    """A character: the distance to where the next one begins, and its lines, (k, 2) each."""
+    """A character: its advance width (to the start of the next one) and its lines, (k, 2) each."""
 
     advance: float
     lines: tuple[FloatArray, ...]
 
 
 def letter_strokes(text: str) -> tuple[FloatArray, ...]:
-    """The strokes of a line of text, each (k, 2), x right, y down, 6 high.
+    """Return the strokes of a line of text, (k, 2) each, x right, y down, 6 high.
 
     Raises:
-        InputError: nothing to write, or a character that has no strokes.
+        InputError: the text is blank, or a character has no strokes.
     """
     refusal = "Letters are A to Z, 0 to 9 and blanks; {} cannot be written."
     return in_a_row(text.upper(), stroke_glyphs(), SPACE, refusal)
@@ -44,10 +44,10 @@ def letter_strokes(text: str) -> tuple[FloatArray, ...]:
 def in_a_row(
     text: str, glyphs: Mapping[str, Glyph], space: float, refusal: str
 ) -> tuple[FloatArray, ...]:
-    """The lines of a text's glyphs side by side, a blank being `space` wide.
+    """Return the lines of a text's glyphs side by side, with blanks `space` wide.
 
     Raises:
-        InputError: nothing to write, or a character without a glyph; `refusal` has a {} for those.
+        InputError: the text is blank, or a character has no glyph; `refusal` has a {} for those.
     """
     lacking = sorted({c for c in text if c not in glyphs and c != " "})
     if lacking or not text.strip():
@@ -66,7 +66,7 @@ def in_a_row(
 
 @cache
 def stroke_glyphs() -> dict[str, Glyph]:
-    """The letters and digits that have strokes."""
+    """Load the glyphs of the letters and digits that have strokes."""
     written = json.loads((files(__package__ or "") / "letters.json").read_text("utf-8"))
     strokes = {letter: tuple(map(_stroke, text.split(";"))) for letter, text in written.items()}
     return {
@@ -96,9 +96,9 @@ def arc(
     end: float,
     step: float = ARC_STEP,
 ) -> FloatArray:
-    """Points of an elliptical arc, (k, 2), from one angle to another, a step or less apart.
+    """Return points of an elliptical arc, (k, 2), from one angle to another, at most `step` apart.
 
-    Angles are degrees, clockwise as seen in the picture (y down), 0 to the right.
+    Angles are in degrees, clockwise as seen in the picture (y down), with 0 to the right.
     """
     count = max(math.ceil(abs(end - begin) / step), 2) + 1
     turn = np.radians(np.linspace(begin, end, count))

@@ -1,7 +1,7 @@
 """Shapes that robots draw: lines, arcs, polygons, stars, letters and grids, at any size.
 
-A sketch is a set of polylines (or of places) of its natural proportions; `fitted` gives it a place.
-Frame: x right, y down; angles are degrees, clockwise as seen, 0 to the right.
+A sketch is a set of polylines (or places) in its natural proportions; `fitted` puts it in a box.
+Frame: x right, y down; angles are in degrees, clockwise as seen, 0 to the right.
 """
 
 import math
@@ -30,20 +30,21 @@ Kind = Literal[
 Opens = Literal["left", "right", "up", "down"]
 Box = tuple[float, float, float, float]
 WAIST = 0.5
-"""Inner radius of a star by its outer: one of 5 points is a little fuller than a pentagram."""
+"""Ratio of a star's inner to its outer radius; with 5 points a little fuller than a pentagram."""
 V_HALF_WIDTH, U_LEG = 0.75, 1.2
-"""Half the width of a V by its height; the legs of a U by its half width, above its half circle."""
+"""Ratio of a V's half width to its height; ratio of a U's legs, above its half circle, to its half
+width."""
 CIRCLE_STEP = 3.0
-"""Degrees between the points of a circle."""
+"""Largest angle between successive points of a circle, degrees."""
 
 
 @dataclass(frozen=True)
 class Sketch:
-    """A shape without a place.
+    """A shape that has not been placed yet.
 
     Attributes:
-        lines: polylines, each (k, 2); a loop repeats its first point. For a grid its rows.
-        places: (n, 2) where the robots stand, for a grid; None where they spread over the lines.
+        lines: polylines, (k, 2) each; a loop repeats its first point. For a grid, its rows.
+        places: (n, 2) the robots' places in a grid; None if robots are spread over the lines.
         frame: the part of the plane that is fitted into a box, (x0, y0, x1, y1).
         fills: whether it may be stretched to fill a box.
     """
@@ -55,17 +56,17 @@ class Sketch:
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width and height."""
+        """Width and height of the frame."""
         x0, y0, x1, y1 = self.frame
         return x1 - x0, y1 - y0
 
     @property
     def points(self) -> FloatArray:
-        """Every point of it, of the lines and of the places, (m, 2)."""
+        """All points of the lines and places, (m, 2)."""
         return np.concatenate([*self.lines, *([] if self.places is None else [self.places])])
 
     def at(self, centre: tuple[float, float], scale: float, stretch: float = 1.0) -> "Sketch":
-        """The sketch enlarged about its middle, y by `stretch` more, and moved to a centre."""
+        """Return the sketch scaled about its middle, y also by `stretch`, and moved to `centre`."""
         x0, y0, x1, y1 = self.frame
         middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
         factor = np.array([scale, scale * stretch])
@@ -80,10 +81,10 @@ class Sketch:
 
 
 def fitted(sketch: Sketch, box: Box) -> Sketch:
-    """The sketch as large as a box (x0, y0, x1, y1) allows and in its middle.
+    """Return the sketch as large as fits into a box (x0, y0, x1, y1), in the box's middle.
 
     Raises:
-        InputError: the box is no place for it: without extent where the sketch has some.
+        InputError: the box has no extent in a direction in which the sketch has some.
     """
     x0, y0, x1, y1 = box
     width, height = sketch.size
@@ -101,16 +102,16 @@ def fitted(sketch: Sketch, box: Box) -> Sketch:
 
 
 def line_sketch(upright: bool) -> Sketch:
-    """A straight line from left to right, or from top to bottom."""
+    """Return a straight line from left to right, or from top to bottom if upright."""
     end = (0.0, 1.0) if upright else (1.0, 0.0)
     return Sketch((np.array([(0.0, 0.0), end]),), (0.0, 0.0, *end))
 
 
 def arc_sketch(begin: float = 0.0, end: float = 360.0) -> Sketch:
-    """Part of a circle; what is fitted into a box is the whole circle.
+    """Return an arc of a circle; its frame, which is fitted into a box, is the whole circle's.
 
     Args:
-        begin, end: degrees clockwise from the right; 360 or more apart is the whole circle.
+        begin, end: degrees clockwise from the right; 360 or more apart give the whole circle.
     """
     round_about = abs(end - begin) >= 360
     if round_about:
@@ -122,7 +123,7 @@ def arc_sketch(begin: float = 0.0, end: float = 360.0) -> Sketch:
 
 
 def cup_sketch(kind: Literal["v", "u", "arc"], opens: Opens) -> Sketch:
-    """A V, a U or a half circle whose mouth is on a side."""
+    """Return a V, a U or a half circle that opens towards a side."""
     bow = arc((0.0, 0.0), (1.0, 1.0), 0.0, 180.0, CIRCLE_STEP)
     upright = {
         "v": np.array([(V_HALF_WIDTH, 0.0), (0.0, 1.0), (-V_HALF_WIDTH, 0.0)]),
@@ -135,7 +136,7 @@ def cup_sketch(kind: Literal["v", "u", "arc"], opens: Opens) -> Sketch:
 
 
 def polygon_sketch(corners: int) -> Sketch:
-    """A regular polygon that stands on a side.
+    """Return a regular polygon that stands on one of its sides.
 
     Raises:
         InputError: fewer than 3 corners.
@@ -144,7 +145,7 @@ def polygon_sketch(corners: int) -> Sketch:
 
 
 def star_sketch(points: int) -> Sketch:
-    """A star with one point up.
+    """Return a star with one point up.
 
     Raises:
         InputError: fewer than 3 points.
@@ -153,17 +154,17 @@ def star_sketch(points: int) -> Sketch:
 
 
 def polyline_sketch(*lines: FloatArray) -> Sketch:
-    """Lines as they are, each (k, 2)."""
+    """Return a sketch of the given lines, (k, 2) each; its frame is their bounding box."""
     points = np.concatenate(lines)
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
     return Sketch(lines, (float(x0), float(y0), float(x1), float(y1)))
 
 
 def grid_sketch(n: int, rows: int) -> Sketch:
-    """N places in rows and columns a unit apart; the last row may be shorter.
+    """Return n places in rows and columns one unit apart; the last row may be shorter.
 
     Raises:
-        InputError: no row, or more rows than places.
+        InputError: there are fewer than 1 or more than n rows.
     """
     if not 1 <= rows <= n:
         raise InputError(f"A grid of {n} places has 1 to {n} rows, not {rows}.")

@@ -1,6 +1,6 @@
 """Spreads robots over drawn lines: at ends, corners and crossings first, then evenly between.
 
-A drawing is any set of polylines, each (k, 2); where they meet they are one. Frame: image pixels,
+A drawing is any set of polylines, (k, 2) each; lines that meet are connected. Frame: image pixels,
 y down.
 """
 
@@ -18,17 +18,18 @@ from ..outline import CORNER_TURN, FloatArray
 from ..sampling import spread_subset
 
 RESOLUTION = 20_000
-"""Lines meet on a grid of so many steps over the drawing, whose outermost points lie on it."""
+"""Lines are snapped to a grid with this many steps over the drawing's extent, to find where they
+meet; the drawing's outermost points lie on the grid."""
 EVEN = 0.5
-"""Corners are taken where no gap is less than this share of the widest."""
+"""Corners are occupied if the narrowest gap is then at least this share of the widest."""
 
 
 class Stretch(NamedTuple):
     """A part of a drawing that no robot stands on.
 
     Attributes:
-        length: along the line, px.
-        robot: index of a robot at one of its ends; None where there is none.
+        length: length along the line, px.
+        robot: index of a robot at one of its ends; None if there is none.
     """
 
     length: float
@@ -36,10 +37,10 @@ class Stretch(NamedTuple):
 
 
 def split_at_crossings(lines: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
-    """The drawing parted at its crossings and joined where only two lines meet.
+    """Split a drawing at its crossings and join lines where only two meet.
 
     Returns:
-        Polylines from crossing or end to crossing or end; a loop repeats its first point.
+        Polylines, each between two crossings or ends; a loop repeats its first point.
     """
     points = np.concatenate(lines)
     low = points.min(axis=0)
@@ -52,10 +53,10 @@ def split_at_crossings(lines: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
 
 
 def spread(lines: tuple[FloatArray, ...], n: int) -> FloatArray:
-    """N points over a drawing, (n, 2): its ends and crossings, its corners, evenly between.
+    """Return n points over a drawing, (n, 2): at ends, crossings and corners, and evenly between.
 
-    Corners are left out where that is more even; with fewer robots than ends and crossings they
-    take some far apart.
+    Corners are not favoured if that gives more even gaps. If there are fewer robots than ends and
+    crossings, they take a subset of these that is far apart.
     """
     whole = split_at_crossings(lines)
     parted = [piece for walk in whole for piece in _at_corners(walk)]
@@ -69,12 +70,12 @@ def spread(lines: tuple[FloatArray, ...], n: int) -> FloatArray:
 
 
 def stretches(lines: tuple[FloatArray, ...], points: FloatArray, reach: float) -> list[Stretch]:
-    """The parts of a drawing between successive robots, or between a robot and an end.
+    """Return the parts of a drawing between successive robots, or between a robot and an end.
 
     Args:
-        lines: each (k, 2), image pixels.
-        points: (n, 2) robots.
-        reach: a robot this near to a line stands on it, px.
+        lines: polylines, (k, 2) each, image pixels.
+        points: (n, 2) robots, image pixels.
+        reach: a robot within this distance of a line stands on it, px.
     """
     found: list[Stretch] = []
     places = np.asarray(shapely.points(points), dtype=object)
@@ -103,7 +104,7 @@ def _closed(line: FloatArray) -> bool:
 
 
 def _at_corners(walk: FloatArray) -> list[FloatArray]:
-    """The pieces of a polyline between its corners; a loop begins at one, if it has any."""
+    """Split a polyline at its corners; a loop then begins at one, if it has any."""
     steps = np.diff(walk, axis=0)
     heading = np.arctan2(steps[:, 1], steps[:, 0])
     turns = np.diff(heading, prepend=heading[-1] if _closed(walk) else heading[:1])
@@ -118,7 +119,7 @@ def _at_corners(walk: FloatArray) -> list[FloatArray]:
 
 
 def _piece_ends(pieces: list[FloatArray]) -> FloatArray:
-    """Where pieces end, each place once; a loop that nothing touches has none."""
+    """Return the end points of pieces, (k, 2), each once; a loop that nothing touches has none."""
     ends = [p[[0, -1]] for p in pieces if not _closed(p) or _touched(p, pieces)]
     return np.unique(np.concatenate(ends), axis=0) if ends else np.empty((0, 2))
 
@@ -128,10 +129,10 @@ def _touched(loop: FloatArray, pieces: list[FloatArray]) -> bool:
 
 
 def _distributed(pieces: list[FloatArray], n: int) -> tuple[FloatArray, float] | None:
-    """Robots at all ends and n less these between, and the narrowest gap by the widest.
+    """Place n robots, first at all ends; return them and the ratio of narrowest to widest gap.
 
-    None where there are fewer robots than ends. The next robot always goes to the piece with the
-    widest gaps, which makes the widest gap of all as narrow as can be.
+    None if there are fewer robots than ends. Each further robot goes to the piece with the widest
+    gaps, which makes the widest gap of all as narrow as possible.
     """
     keys = _piece_ends(pieces)
     if n < len(keys):

@@ -1,8 +1,8 @@
 """The outlines of a font, for letters that robots draw around instead of along.
 
-The font in `typeface.json` is Aileron Regular 1.102 by Sora Sagano, in the public domain (CC0),
-which Pillow carries too: the printing characters of ASCII. A glyph is its advance width and SVG
-path data (absolute M, L, H, V, Q, Z), in units of which 1000 make the font's size, y up.
+The font in `typeface.json`, the printable ASCII characters of Aileron Regular 1.102 by Sora Sagano,
+is in the public domain (CC0) and comes with Pillow too. A glyph is its advance width and SVG path
+data (absolute M, L, H, V, Q, Z), y up, at 1000 units to the em.
 """
 
 import json
@@ -19,16 +19,16 @@ from .letters import ARC_STEP, Glyph, in_a_row
 Point = tuple[float, float]
 
 SPACE = 216
-"""Advance width of a blank."""
+"""Advance width of a blank, font units."""
 
 
 def letter_outlines(text: str) -> tuple[FloatArray, ...]:
-    """The outlines of a line of text, as rings (k, 2) that repeat their first point.
+    """Return the outlines of a line of text as rings (k, 2) that repeat their first point.
 
-    Frame: font units, x right, y down, the line that letters stand on at y = 0.
+    Frame: font units, x right, y down, with the baseline at y = 0.
 
     Raises:
-        InputError: nothing to write, or a character that the font lacks.
+        InputError: the text is blank, or the font lacks a character.
     """
     refusal = "Outlined letters are printing ASCII and blanks; {} cannot be drawn."
     return in_a_row(text, _glyphs(), SPACE, refusal)
@@ -45,7 +45,7 @@ def _glyph(width: float, path: str) -> Glyph:
 
 
 def _contour_polyline(contour: str) -> FloatArray:
-    """A closed contour of path data as a polyline, y down."""
+    """Convert a closed contour of path data into a polyline (k, 2), y down."""
     points: list[tuple[float, float]] = []
     for command, written in re.findall(r"([MLHVQ])([^MLHVQ]*)", contour):
         numbers = [float(word) for word in written.split()]
@@ -62,7 +62,7 @@ def _contour_polyline(contour: str) -> FloatArray:
 
 
 def _bend(begin: Point, control: Point, end: Point) -> list[Point]:
-    """A quadratic Bézier curve after its first point, each step turning by ARC_STEP or less."""
+    """Return a quadratic Bézier curve without its first point, turning ARC_STEP or less a step."""
     a, b, c = np.array([begin, control, end])
     first, last = np.arctan2(*(b - a)), np.arctan2(*(c - b))
     turn = abs(math.remainder(last - first, 2 * math.pi))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from formup.tools.errors import ToolError
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.placement.group_conflicts import CrowdedError, conflict, slid
+from formup.tools.formation.placement.group_conflicts import CrowdedError, conflict, shifted_places
 from formup.tools.formation.placement.place import Site
 from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.geometry.curves import Frame, ring
@@ -127,7 +127,7 @@ def test_groups_are_placed_apart_or_refused(wanted: list[dict[str, object]], rad
 @MANY
 def test_places_slid_along_a_curve_stay_even(n: int, frame: Frame) -> None:
     curve = ring(BRICK, 20, 30, frame)
-    found = list(slid(curve, n))
+    found = list(shifted_places(curve, n))
     assert found
     for points in found:
         assert len(points) == n
