@@ -1,4 +1,4 @@
-"""Fits the homography of a floor to points that are known on it; refuses what does not fit."""
+"""Fits the homography of a floor to known points on it, and refuses points that do not fit."""
 
 import math
 from collections.abc import Sequence
@@ -15,24 +15,26 @@ from .calibration import Calibration, Lens, Residuals, through
 from .known import Known, read_lens
 
 LARGE = 0.005
-"""Share of the picture's diagonal by which a known point may be off."""
+"""Greatest error of a known point, as a share of the picture's diagonal."""
 UNSURE = 0.01
-"""Share of the floor's diagonal by which its corners may be off, with pixels off by"""
+"""Greatest expected error of the floor's corners, as a share of its diagonal."""
 CLICK = 0.1
-"""so many px at least."""
+"""Least error of pixels assumed in estimating that of the corners, px."""
 FLAT = 0.02
-"""Points whose spread across a line is a smaller share of that along it are on the line."""
+"""Points lie on a line if their spread across it is at most this share of that along it."""
 
 
 def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibration:
-    """The calibration of the camera that took a picture, (H, W, 3) RGB.
+    """Calibrate the camera that took a picture.
 
     Args:
-        path: of the file that says what is known, for messages.
+        known: what is known of the floor and the camera.
+        pixels: the picture, (H, W, 3) RGB.
+        path: the file that states what is known, for messages.
 
     Raises:
-        InputError: too few points, points on a line or off what the others say, or a floor that is
-            not all in the picture; names the points.
+        InputError: too few points, points on a line or inconsistent with the others, or a floor
+            that is not entirely in the picture; names the points.
     """
     size = pixels.shape[1], pixels.shape[0]
     names, at, floor = known.found(pixels)
@@ -69,10 +71,15 @@ def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibrati
 
 
 def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, noise: float) -> float:
-    """By how much places, (4, 2) m, are off where pixels are, mm.
+    """Estimate the error of the floor's worst corner, mm, from pixel noise, by simulation.
+
+    Args:
+        pixels, floor: the known points, (n, 2) px and (n, 2) m.
+        corners: (4, 2), m.
+        noise: standard deviation of the pixel noise, px.
 
     Raises:
-        InputError: by too much.
+        InputError: the error is too large.
     """
     rng, size = np.random.default_rng(0), float(np.linalg.norm(corners[2] - corners[0]))
     at = through(np.linalg.inv(_fitted(pixels, floor)), corners)
@@ -88,7 +95,11 @@ def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, nois
 
 
 def _fitted(pixels: FloatArray, floor: FloatArray) -> FloatArray:
-    """(3, 3) from px to m, with which what is known is in front of the camera."""
+    """Fit a homography (3, 3) from px to m, with the known points in front of the camera.
+
+    Raises:
+        InputError: no homography maps these points to these places.
+    """
     found, _ = cv2.findHomography(pixels, floor, 0)
     if np.shape(found) != (3, 3):
         raise InputError("No view of a floor takes these points to these places; check them.")
@@ -101,7 +112,7 @@ def _depths(matrix: FloatArray, pixels: FloatArray) -> FloatArray:
 
 
 def _residuals(matrix: FloatArray, pixels: FloatArray, floor: FloatArray) -> FloatArray:
-    """(n,) px by which points are off."""
+    """Return the errors of points in the picture, (n,), px."""
     return np.linalg.norm(through(np.linalg.inv(matrix), floor) - pixels, axis=1)
 
 
@@ -133,7 +144,7 @@ def _check_points(
 def _check_fit(
     names: Sequence[str], pixels: FloatArray, floor: FloatArray, off: FloatArray, limit: float
 ) -> None:
-    """Refuse points that are off; where one of six or more is to blame, that one is named."""
+    """Refuse points that do not fit; if leaving out one of six or more mends it, name that one."""
     if off.max() <= limit:
         return
     worst = [i for i in np.argsort(-off) if off[i] > limit]
@@ -152,7 +163,7 @@ def _check_fit(
 
 
 def _camera(matrix: FloatArray, lens: Lens) -> tuple[float, float, float]:
-    """Where the camera is above the floor, m."""
+    """Return the camera's x and y on the floor and its height above it, m."""
     axes = np.linalg.inv(matrix @ np.array(lens.camera_matrix))
     axes *= np.sign(axes[2, 2]) * 2 / (np.linalg.norm(axes[:, 0]) + np.linalg.norm(axes[:, 1]))
     turn = np.column_stack([axes[:, :2], np.cross(axes[:, 0], axes[:, 1])])
@@ -162,7 +173,7 @@ def _camera(matrix: FloatArray, lens: Lens) -> tuple[float, float, float]:
 
 
 def _metres_per_pixel(matrix: FloatArray, middle: FloatArray) -> float:
-    """Metres to a pixel at a place of the floor, (2,) m, to two digits."""
+    """Return the metres per pixel at a place (2,) on the floor, m, to two digits."""
     at = through(np.linalg.inv(matrix), middle[None])
     area = abs(np.linalg.det(matrix)) / abs(_depths(matrix, at)[0]) ** 3
     return float(f"{math.sqrt(area):.2g}")
