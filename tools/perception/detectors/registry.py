@@ -1,4 +1,4 @@
-"""The detectors by name: built-in ones, and those that packages offer under `formup.detectors`."""
+"""The detectors by name: built-in ones, and those of packages, under `formup.detectors`."""
 
 from collections.abc import Callable
 from functools import cache

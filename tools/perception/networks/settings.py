@@ -1,4 +1,4 @@
-"""Settings of networks that are a machine's rather than an instruction's: from the environment."""
+"""Settings of networks that belong to a machine, not to an instruction: environment variables."""
 
 import os
 
@@ -9,12 +9,12 @@ DTYPES = ("float32", "float16", "bfloat16")
 
 
 def device_name(usual: str) -> str:
-    """The device that networks run on, as torch calls it."""
+    """Return torch's name of the device to run networks on: the one set, or the usual one."""
     return os.environ.get(DEVICE) or usual
 
 
 def dtype_name() -> str:
-    """How exactly networks compute.
+    """Return the name of the data type that networks compute in.
 
     Raises:
         InputError: FORMUP_DTYPE is none of DTYPES.
@@ -26,7 +26,7 @@ def dtype_name() -> str:
 
 
 def detection_threshold(usual: float) -> float:
-    """The least score of what is found by words.
+    """Return the least score of things found by words: the one set, or the usual one.
 
     Raises:
         InputError: FORMUP_DETECTION_THRESHOLD is no score.
