@@ -149,7 +149,7 @@ class Canvas:
         self._cover(mask, colour)
 
     def cased(self, lines: Sequence[FloatArray], colour: Colour, width: float) -> None:
-        """Draw polylines with a dark seam on both sides, legible on any ground."""
+        """Draw polylines with a dark seam on both sides, legible on any background."""
         self.strokes(lines, INK, width + 2.4, 0.75)
         self.strokes(lines, colour, width)
 

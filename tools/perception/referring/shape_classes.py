@@ -115,7 +115,7 @@ def _polygons() -> Iterator[tuple[ShapeName, BaseGeometry]]:
 
 def _concave_ones() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     for points in (4, 5, 6, 8):
-        for inner in (0.38, 0.5) if points == 4 else (0.38, 0.5, 0.62):  # a third makes a square
+        for inner in (0.38, 0.5) if points == 4 else (0.38, 0.5, 0.62):  # 0.62 looks square
             yield "star", Polygon(_star(points, inner))
     for arm in (0.25, 0.33, 0.42):
         yield "cross", shapely.box(-arm, -1, arm, 1).union(shapely.box(-1, -arm, 1, arm))

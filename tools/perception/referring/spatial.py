@@ -42,9 +42,9 @@ AXIS: dict[RelationKind, tuple[int, float, str]] = {
 
 
 def relation_filter(things: Things, kind: RelationKind, others: tuple[int, ...]) -> Filter:
-    """Judge which things are in a relation to others (indices), which never are themselves.
+    """Judge which things are in a relation to the others (indices).
 
-    For nearest, which is a ranking, it only excludes the other.
+    The others themselves never are. For nearest, which is a ranking, only they are excluded.
     """
     names = " and ".join(things.candidates[i].id for i in others)
     if kind in AXIS:

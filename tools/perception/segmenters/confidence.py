@@ -15,7 +15,7 @@ Way = Literal["point", "box", "outline"]
 RIGHT = 0.8
 """Least overlap (intersection over union) with the thing for a mask to be right."""
 EDGES = "edge_support"
-"""Cue with a fixed effect: photographs hold too few masks that end without an edge to fit it."""
+"""Cue with a fixed effect: too few masks on photographs end where there is no edge to fit one."""
 EDGE_POWER = 2
 
 

@@ -65,7 +65,7 @@ class ContourFit:
         ]
         tangent = ends[1] - ends[0]
         self.points: Points = shapely.get_coordinates(ring.interpolate(along))
-        normals = np.column_stack([tangent[:, 1], -tangent[:, 0]])  # outward, as it runs so
+        normals = np.column_stack([tangent[:, 1], -tangent[:, 0]])  # outward, given the ring's sense
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         arms = self.points - view.centre
         across = self._normals[:, 1] * arms[:, 0] - self._normals[:, 0] * arms[:, 1]
@@ -106,7 +106,7 @@ class ContourFit:
         return Step(by, max(share, 0.0))
 
     def _edges(self, says: Floats) -> tuple[FloatArray, Mask]:
-        """Return how far out along its normal each point's edge is, (n,), px, and which have any."""
+        """Return how far out along the normals the edges are, (n,), px, and a mask (n,) of them."""
         offsets = np.arange(-REACH, REACH + 1)
         at = (self.points[:, None] + offsets[:, None] * self._normals[:, None]).astype(np.float32)
         soft = cv2.GaussianBlur(says, (5, 5), 0)  # otherwise edges lie at pixels' borders

@@ -41,7 +41,7 @@ class Tracked:
 
     @property
     def lost(self) -> bool:
-        """Whether the thing is not seen; the motion is then the last one that was."""
+        """Whether the thing is not seen; its motion is then where it was last seen."""
         return self.confidence < LOST
 
 
