@@ -65,7 +65,7 @@ class ContourFit:
         ]
         tangent = ends[1] - ends[0]
         self.points: Points = shapely.get_coordinates(ring.interpolate(along))
-        normals = np.column_stack([tangent[:, 1], -tangent[:, 0]])  # outward, given the ring's sense
+        normals = np.column_stack([tangent[:, 1], -tangent[:, 0]])  # outward for this ring
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         arms = self.points - view.centre
         across = self._normals[:, 1] * arms[:, 0] - self._normals[:, 0] * arms[:, 1]
