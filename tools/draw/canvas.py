@@ -189,14 +189,14 @@ class Canvas:
 
     def text_size(self, text: str, size: float) -> tuple[float, float]:
         """Return the width and height of a line of text, page px."""
-        points = self.points(size)
+        points = self.font_px(size)
         return font(points * FINE).getlength(text) / FINE, float(points)
 
     def shortened(self, text: str, size: float, room: float) -> str:
         """Return as much of a drawable text as fits a width of `room` page px."""
-        return shortened(text, room * FINE, font(self.points(size) * FINE))
+        return shortened(text, room * FINE, font(self.font_px(size) * FINE))
 
-    def points(self, size: float) -> int:
+    def font_px(self, size: float) -> int:
         """Convert a text size to page px."""
         return max(round(size * self.unit), 6)
 
@@ -204,7 +204,7 @@ class Canvas:
         self, where: FloatArray, text: str, size: float, colour: Colour, seam: Colour | None = None
     ) -> None:
         """Draw text centred on a point of the page, page px, outlined in `seam` if given."""
-        face = font(self.points(size) * FINE)
+        face = font(self.font_px(size) * FINE)
         # Centre on capitals and digits: descenders must not push a line up.
         x0, top, x1, bottom = face.getbbox("0", anchor="ls")
         x0, _, x1, _ = face.getbbox(text, anchor="ls")

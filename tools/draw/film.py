@@ -113,13 +113,13 @@ def _draw_goals(canvas: Canvas, plan: Plan, radius: float) -> None:
     goals = plan.formation.points
     for goal in goals:
         canvas.circle(goal, radius, WHITE, max(0.15 * radius, 0.7))
-    if not _numbered(len(goals), radius):
+    if not _shows_numbers(len(goals), radius):
         return
     for robot, goal in zip(plan.formation.robot_of_place, canvas.at(goals), strict=True):
         canvas.text(goal, robot, 1.2 * radius, WHITE)
 
 
-def _numbered(count: int, radius: float) -> bool:
+def _shows_numbers(count: int, radius: float) -> bool:
     return count <= NUMBERED and radius >= NUMBER_RADIUS
 
 
@@ -138,7 +138,7 @@ def _frame(
         canvas.trails(np.stack(recent), ALLOWED, 0.5 * radius)
     robots = plan.formation.robot_of_place
     draw_robots(canvas, dict(zip(robots, now, strict=True)), radius)
-    if _numbered(len(now), radius):
+    if _shows_numbers(len(now), radius):
         for robot, centre in zip(robots, canvas.at(now), strict=True):
             canvas.text(centre, robot, 1.25 * radius, WHITE, ROBOT)
     if last:

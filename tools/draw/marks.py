@@ -35,7 +35,7 @@ from .canvas import (
 
 OUTLINE_DETAIL = 0.3
 """Greatest distance of a drawn outline from the measured one, units of the page."""
-NOSE = 2.2
+HEADING_TICK = 2.2
 """Length of a heading tick from the robot's centre, as a multiple of its disc's radius."""
 LABEL = 17.0
 NUMBERED = 60
@@ -189,7 +189,7 @@ def draw_headings(
 
     Headings are in degrees, from x towards y; `radius` is that of the discs, units of the page.
     """
-    reach = NOSE * radius / canvas.page_length(1.0)
+    reach = HEADING_TICK * radius / canvas.page_length(1.0)
     for point, angle in zip(points, headings, strict=False):
         if angle is not None:
             turn = np.radians(angle)
@@ -236,7 +236,7 @@ def draw_idle_robots(canvas: Canvas, points: Mapping[str, FloatArray], radius: f
         canvas.disc(point, radius, IDLE, float(np.clip(0.17 * radius, 0.6, 1.9)))
 
 
-def directions(contract: Contract, site: Site, points: FloatArray) -> list[FloatArray]:
+def outward_vectors(contract: Contract, site: Site, points: FloatArray) -> list[FloatArray]:
     """Return for each place the vector (2,) from its target's centre, px.
 
     It is zero for places that are not outside a target.

@@ -23,7 +23,6 @@ from .captions import draw_bars, draw_footer, make_page
 from .change import draw_moves, moves_between
 from .escape_path import draw_escape
 from .marks import (
-    directions,
     draw_areas,
     draw_guides,
     draw_headings,
@@ -33,6 +32,7 @@ from .marks import (
     draw_robots,
     label_openings,
     number_robots,
+    outward_vectors,
     robot_size,
     target_room,
 )
@@ -187,7 +187,7 @@ def _draw_robots(
         draw_moves(canvas, moves_between(before, plan), radius)
         draw_headings(canvas, points, plan.formation.place_headings, radius)
     draw_robots(canvas, shown, radius, flagged)
-    away = dict(zip(names, directions(contract, site, points), strict=True))
+    away = dict(zip(names, outward_vectors(contract, site, points), strict=True))
     number_robots(canvas, shown, radius, labels, away, flagged)
 
 

@@ -78,9 +78,9 @@ def save_film(
     if kind == ".mp4":
         save_mp4(drawn(side=MP4_SIDE), path)
     elif kind == ".gif":
-        save_gif(drawn(moments=_evenly(len(frames), GIF_FRAMES)), path)
+        save_gif(drawn(moments=_even_indices(len(frames), GIF_FRAMES)), path)
     elif kind == ".png":
-        save_strip(drawn(moments=_evenly(len(frames), STRIP)), path)
+        save_strip(drawn(moments=_even_indices(len(frames), STRIP)), path)
     else:
         raise InputError(f"{path} is no film's name; let it end in {', '.join(FILMS)}.")
 
@@ -96,7 +96,7 @@ def save_gif(frames: Sequence[Image.Image], path: Path) -> None:
         InputError: there are no frames, or the file cannot be written.
     """
     _check_frames(frames)
-    kept = [frames[i].convert("RGB") for i in _evenly(len(frames), GIF_FRAMES)]
+    kept = [frames[i].convert("RGB") for i in _even_indices(len(frames), GIF_FRAMES)]
     data = b""
     for side in GIF_SIDES:
         data = _gif_bytes(kept, side)
@@ -150,7 +150,7 @@ def _check_frames(frames: Sequence[Image.Image]) -> None:
         raise InputError("There are no frames to save; draw at least one.")
 
 
-def _evenly(count: int, most: int) -> list[int]:
+def _even_indices(count: int, most: int) -> list[int]:
     """Return at most `most` evenly spaced indices of `count`, including the first and the last."""
     return [round(float(i)) for i in np.linspace(0, count - 1, min(count, most))]
 

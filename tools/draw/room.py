@@ -142,9 +142,9 @@ class Room:
             self._prism(canvas, discs[tag], self.tag_height, BODY)
             sheet = tag_sheet(self.dictionary, tag, robots[tag], self.tag_size)
             self._lay(canvas, sheet, self.tag_height)
-        return self._taken(canvas, seed)
+        return self._camera_picture(canvas, seed)
 
-    def _taken(self, canvas: Pixels, seed: int) -> Pixels:
+    def _camera_picture(self, canvas: Pixels, seed: int) -> Pixels:
         """Apply lens, blur and sensor noise to the canvas."""
         if self.distortion:
             canvas = np.asarray(cv2.remap(canvas, *self._lens, cv2.INTER_LINEAR), np.uint8)

@@ -19,7 +19,7 @@ def round_metres(longest: float) -> float:
     return max(lead * power for lead in (1, 2, 5) if lead * power <= longest * (1 + 1e-9))
 
 
-def length_words(metres: float) -> str:
+def length_label(metres: float) -> str:
     """Format a round length with the unit that keeps its number short."""
     for name, size in (("km", 1e3), ("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)):
         if metres >= size * (1 - 1e-9):
@@ -36,7 +36,7 @@ def draw_scale_bar(canvas: Canvas, metres_per_pixel: float) -> float:
     unit, scale = canvas.unit, float(canvas.scale[0])
     widest = LONGEST * (canvas.photo[2] - canvas.photo[0])
     metres = round_metres(widest / scale * metres_per_pixel)
-    long, words = metres / metres_per_pixel * scale, length_words(metres)
+    long, words = metres / metres_per_pixel * scale, length_label(metres)
     y, end = footer_middle(canvas), canvas.size[0] - PAD * unit
     start, half = end - long, unit / 2
     canvas.box((start, y - HEIGHT * half, end, y + HEIGHT * half), PAPER)

@@ -54,7 +54,7 @@ def scene_data(world: World, plan_id: str | None = None) -> dict[str, Any]:
         "robots": [pose_data(pose) for pose in world.robots],
         "current": world.current,
         "plan": None if node is None else _plan_data(world, node),
-        "plans": [_brief(world, n) for n in list(world.plans.values())[-MOST_PLANS:]],
+        "plans": [_thumbnail_data(world, n) for n in list(world.plans.values())[-MOST_PLANS:]],
     }
 
 
@@ -125,7 +125,7 @@ def _places_of_robots(plan: Plan) -> Mapping[str, tuple[float, float]]:
     }
 
 
-def _brief(world: World, node: PlanNode) -> dict[str, Any]:
+def _thumbnail_data(world: World, node: PlanNode) -> dict[str, Any]:
     """Return what a thumbnail shows of a plan."""
     plan = node.plan
     return {
@@ -159,7 +159,7 @@ def _plan_data(world: World, node: PlanNode) -> dict[str, Any]:
             for name, value in plan.verdict.measures.items()
             if name in TELLING and isinstance(value, int | float)
         ],
-        "worst": _worst(plan, world),
+        "worst": _nearest_robot_data(plan, world),
         "motion": node.motion and node.motion.model_dump(mode="json"),
         "arrival": arrival and arrival.model_dump(mode="json"),
     }
@@ -195,7 +195,7 @@ def _groups(plan: Plan, world: World) -> list[dict[str, Any]]:
     return rows
 
 
-def _worst(plan: Plan, world: World) -> dict[str, Any] | None:
+def _nearest_robot_data(plan: Plan, world: World) -> dict[str, Any] | None:
     """Return the robot nearest to the target it stands around, and its edge's distance as text.
 
     None if no robot stands outside a target.

@@ -87,7 +87,7 @@ def _substitute(char: str) -> str:
         return " "
     if category[0] in "CM":
         return ""
-    if _has(char):
+    if _has_glyph(char):
         return char
     digit = unicodedata.decimal(char, None)
     if digit is not None:
@@ -103,7 +103,7 @@ def _script_name(name: str) -> str:
     return "Han" if word == "CJK" else word.capitalize()
 
 
-def _has(char: str) -> bool:
+def _has_glyph(char: str) -> bool:
     """Return whether the font has a glyph of its own for a character."""
     return _glyph_bitmap(char) != _glyph_bitmap(_MISSING)
 

@@ -91,14 +91,14 @@ def _range(values: NDArray[np.floating], step: float) -> tuple[float, float]:
     ranked = np.sort(rows[np.isfinite(rows)])
     bounds = [np.inf, np.inf]  # upper bounds of the values, and of the negated values
     for turn in (0, 1, 0, 1):
-        last = _last(ranked, noise)
+        last = _last_inlier(ranked, noise)
         if last < len(ranked) - 1:
             bounds[turn] = float(ranked[last])
         ranked = -ranked[last::-1]
     return -bounds[1], bounds[0]
 
 
-def _last(ranked: NDArray[np.floating], noise: float) -> int:
+def _last_inlier(ranked: NDArray[np.floating], noise: float) -> int:
     """Return the index of the last of sorted values (n,) before any outliers.
 
     Outliers are few, or all equal, in the upper half, and the gap up to them is wider than the

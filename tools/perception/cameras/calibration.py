@@ -36,13 +36,13 @@ BORDER = 40
 """Number of points on each side of the floor that are checked to be in the picture."""
 
 
-class Part(BaseModel):
+class CameraFileModel(BaseModel):
     """Base of the models that files about cameras hold; unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class Residuals(Part):
+class Residuals(CameraFileModel):
     """Errors of the known points, in the picture and on the floor.
 
     Attributes:
@@ -57,7 +57,7 @@ class Residuals(Part):
     corners_mm: float
 
 
-class Lens(Part):
+class Lens(CameraFileModel):
     """The distortion of a camera's lens, as OpenCV models it.
 
     Attributes:
@@ -68,15 +68,17 @@ class Lens(Part):
     camera_matrix: Matrix
     distortion: tuple[Number, ...] = Field(default=(), max_length=14)
 
-    def straightened(self, pixels: FloatArray) -> FloatArray:
+    def undistorted(self, pixels: FloatArray) -> FloatArray:
         """Return where pixels (n, 2) would be without the distortion."""
         if not self.distortion or not len(pixels):
             return pixels
-        matrix, bent = np.array(self.camera_matrix), np.array(self.distortion)
-        found = cv2.undistortImagePoints(pixels.reshape(-1, 1, 2), matrix, bent, arg1=PRECISE)
+        matrix, coefficients = np.array(self.camera_matrix), np.array(self.distortion)
+        found = cv2.undistortImagePoints(
+            pixels.reshape(-1, 1, 2), matrix, coefficients, arg1=PRECISE
+        )
         return np.asarray(found, dtype=float).reshape(-1, 2)
 
-    def bent(self, pixels: FloatArray) -> FloatArray:
+    def distorted(self, pixels: FloatArray) -> FloatArray:
         """Return where undistorted pixels (n, 2) are in the picture."""
         if not self.distortion or not len(pixels):
             return pixels
@@ -86,7 +88,7 @@ class Lens(Part):
         return np.asarray(found, dtype=float).reshape(-1, 2)
 
 
-class Calibration(Part):
+class Calibration(CameraFileModel):
     """A calibrated camera above a floor.
 
     Attributes:
@@ -117,7 +119,7 @@ class Calibration(Part):
             raise ValueError(f"the floor would be shown in {width} x {height} pixels")
         if abs(np.linalg.det(np.array(self.homography))) < 1e-15:
             raise ValueError("homography takes the picture to a line, not to a floor")
-        if not self.sees(_around(self.floor)).all():
+        if not self.sees(_border_points(self.floor)).all():
             raise ValueError(
                 f"the floor {x0:g}, {y0:g} to {x1:g}, {y1:g} m is not all in the picture: give one "
                 "that is, as `floor: [x0, y0, x1, y1]`"
@@ -153,7 +155,7 @@ class Calibration(Part):
         Raises:
             InputError: the height is not 0, and the camera's position is not known.
         """
-        straight = pixels if self.lens is None else self.lens.straightened(pixels)
+        straight = pixels if self.lens is None else self.lens.undistorted(pixels)
         found = through(np.array(self.homography), straight)
         if not height:
             return found
@@ -168,7 +170,7 @@ class Calibration(Part):
     def in_picture(self, places: FloatArray) -> FloatArray:
         """Return the pixels (n, 2) at which places (n, 2) on the floor, m, are seen."""
         straight = through(np.linalg.inv(np.array(self.homography)), places)
-        return straight if self.lens is None else self.lens.bent(straight)
+        return straight if self.lens is None else self.lens.distorted(straight)
 
     def sees(self, places: FloatArray) -> NDArray[np.bool_]:
         """Return a mask (n,) of the places (n, 2) on the floor, m, that the camera sees."""
@@ -249,7 +251,7 @@ def through(matrix: Floats, points: FloatArray) -> FloatArray:
     return found[:, :2] / found[:, 2:]
 
 
-def _around(floor: tuple[float, float, float, float]) -> FloatArray:
+def _border_points(floor: tuple[float, float, float, float]) -> FloatArray:
     """Return points (n, 2), m, along the border of a floor."""
     x0, y0, x1, y1 = floor
     x, y = np.linspace(x0, x1, BORDER), np.linspace(y0, y1, BORDER)

@@ -40,8 +40,8 @@ def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibrati
     names, at, floor = known.found(pixels)
     lens = None if known.lens is None else read_lens(known.lens, size)
     _check_points(names, at, floor, size)
-    straight = at if lens is None else lens.straightened(at)
-    matrix = _fitted(straight, floor)
+    straight = at if lens is None else lens.undistorted(at)
+    matrix = _fit_homography(straight, floor)
     off = _residuals(matrix, straight, floor)
     _check_fit(names, straight, floor, off, LARGE * math.hypot(*size))
     if not (_depths(matrix, straight) > 0).all():
@@ -64,13 +64,15 @@ def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibrati
             worst_px=off.max(),
             mean_mm=mm.mean(),
             worst_mm=mm.max(),
-            corners_mm=_at_corners(straight, floor, corners, max(float(off.mean()), CLICK)),
+            corners_mm=_corner_error_mm(straight, floor, corners, max(float(off.mean()), CLICK)),
         ),
     }
     return validated(path, "a floor that can be used", Calibration, values)
 
 
-def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, noise: float) -> float:
+def _corner_error_mm(
+    pixels: FloatArray, floor: FloatArray, corners: FloatArray, noise: float
+) -> float:
     """Estimate the error of the floor's worst corner, mm, from pixel noise, by simulation.
 
     Args:
@@ -82,8 +84,8 @@ def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, nois
         InputError: the error is too large.
     """
     rng, size = np.random.default_rng(0), float(np.linalg.norm(corners[2] - corners[0]))
-    at = through(np.linalg.inv(_fitted(pixels, floor)), corners)
-    tries = [_fitted(pixels + rng.normal(0, noise, pixels.shape), floor) for _ in range(30)]
+    at = through(np.linalg.inv(_fit_homography(pixels, floor)), corners)
+    tries = [_fit_homography(pixels + rng.normal(0, noise, pixels.shape), floor) for _ in range(30)]
     off = np.linalg.norm([through(matrix, at) - corners for matrix in tries], axis=2)
     worst = float(off.mean(axis=0).max())
     if worst > UNSURE * size:
@@ -94,7 +96,7 @@ def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, nois
     return 1000 * worst
 
 
-def _fitted(pixels: FloatArray, floor: FloatArray) -> FloatArray:
+def _fit_homography(pixels: FloatArray, floor: FloatArray) -> FloatArray:
     """Fit a homography (3, 3) from px to m, with the known points in front of the camera.
 
     Raises:
@@ -151,13 +153,13 @@ def _check_fit(
     if len(names) >= 6:
         for i in range(len(names)):
             rest = np.delete(pixels, i, axis=0), np.delete(floor, i, axis=0)
-            matrix = _fitted(*rest)
+            matrix = _fit_homography(*rest)
             if _residuals(matrix, *rest).max() <= limit:
                 worst, off = [i], _residuals(matrix, pixels, floor)
                 break
-    told = ", ".join(f"{names[i]} by {off[i]:.1f} px" for i in worst[:10])
+    shown = ", ".join(f"{names[i]} by {off[i]:.1f} px" for i in worst[:10])
     raise InputError(
-        f"Points do not fit one flat floor: {told}, and {limit:.1f} px are allowed; measure these "
+        f"Points do not fit one flat floor: {shown}, and {limit:.1f} px are allowed; measure these "
         "anew, or give a lens file if straight lines are bent in the picture."
     )
 

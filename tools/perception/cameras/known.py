@@ -15,16 +15,16 @@ from pydantic import Field, model_validator
 from ...errors import InputError
 from ...geometry.outline import FloatArray
 from ...yaml_files import content_of, validated
-from .calibration import Lens, Metres, Number, Part, Place
+from .calibration import CameraFileModel, Lens, Metres, Number, Place
 from .tags import Dictionary, centre, tags_in
 
 Squares = Annotated[int, Field(ge=3, le=100)]
 Above0 = Annotated[float, Field(gt=0, le=100)]
-Found = tuple[list[str], FloatArray, FloatArray]
+PointMatches = tuple[list[str], FloatArray, FloatArray]
 """Names of points, where they are seen, (n, 2) px, and where they are on the floor, (n, 2) m."""
 
 
-class KnownPoint(Part):
+class KnownPoint(CameraFileModel):
     """A known point: where it is seen, px, and where it is on the floor, m."""
 
     name: str = Field(default="", max_length=100)
@@ -32,7 +32,7 @@ class KnownPoint(Part):
     floor: Place
 
 
-class Board(Part):
+class Board(CameraFileModel):
     """A board that lies on the floor, aligned with its axes.
 
     Attributes:
@@ -51,7 +51,7 @@ class Board(Part):
     dictionary: Dictionary = "DICT_4X4_50"
 
 
-class Known(Part):
+class Known(CameraFileModel):
     """What is known of a floor and its camera: the content of a file for `formup calibrate`.
 
     Attributes:
@@ -81,7 +81,7 @@ class Known(Part):
             raise ValueError("a board does not say how far the floor reaches: give floor too")
         return self
 
-    def found(self, pixels: NDArray[np.uint8]) -> Found:
+    def found(self, pixels: NDArray[np.uint8]) -> PointMatches:
         """Find the known points in a picture.
 
         Args:
@@ -133,10 +133,12 @@ def read_lens(path: Path, size: tuple[int, int]) -> Lens:
         path.read_bytes()
         file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         names = "camera_matrix", "distortion_coefficients", "image_width", "image_height"
-        matrix, bent, width, height = map(file.getNode, names)
+        matrix, distortion, width, height = map(file.getNode, names)
         rows = np.asarray(matrix.mat(), dtype=float).reshape(3, 3).tolist()
-        more = [] if bent.empty() else np.asarray(bent.mat(), dtype=float).ravel().tolist()
-        said = size if width.empty() else (int(width.real()), int(height.real()))
+        more = (
+            [] if distortion.empty() else np.asarray(distortion.mat(), dtype=float).ravel().tolist()
+        )
+        stated = size if width.empty() else (int(width.real()), int(height.real()))
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except (cv2.error, TypeError, ValueError, SystemError):
@@ -144,15 +146,15 @@ def read_lens(path: Path, size: tuple[int, int]) -> Lens:
             f"{path} holds no lens; give a file that OpenCV's FileStorage wrote, with "
             "camera_matrix and distortion_coefficients."
         ) from None
-    if said != size:
+    if stated != size:
         raise InputError(
-            f"{path} is for pictures of {said[0]} x {said[1]} pixels, and this one has "
+            f"{path} is for pictures of {stated[0]} x {stated[1]} pixels, and this one has "
             f"{size[0]} x {size[1]}; calibrate the lens at that size."
         )
     return validated(path, "a lens", Lens, {"camera_matrix": rows, "distortion": more})
 
 
-def _on_board(grey: NDArray[np.uint8], board: Board) -> Found:
+def _on_board(grey: NDArray[np.uint8], board: Board) -> PointMatches:
     columns, rows = board.squares[0] - 1, board.squares[1] - 1
     if board.marker is None:
         kind = "chessboard"

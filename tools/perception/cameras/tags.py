@@ -24,13 +24,13 @@ SHARE = 0.1
 """The same as a share of the side, if that is less: a small tag's cells are not much larger."""
 
 
-def _known(name: str) -> str:
+def _known_dictionary(name: str) -> str:
     if not (name.startswith("DICT_") and hasattr(cv2.aruco, name)):
         raise ValueError(f"no such dictionary, such as DICT_4X4_50 or DICT_APRILTAG_36h11: {name}")
     return name
 
 
-Dictionary = Annotated[str, AfterValidator(_known)]
+Dictionary = Annotated[str, AfterValidator(_known_dictionary)]
 """OpenCV's name of a family of tags."""
 
 
@@ -52,7 +52,7 @@ def tags_in(pixels: NDArray[np.uint8], dictionary: Dictionary) -> dict[int, Floa
     tags = [int(tag) for tag in np.ravel(ids)] if len(corners) else []
     often = Counter(tags)
     return {
-        tag: _refined(grey, np.asarray(four, dtype=float).reshape(4, 2))
+        tag: _refine_corners(grey, np.asarray(four, dtype=float).reshape(4, 2))
         for tag, four in zip(tags, corners, strict=True)
         if often[tag] == 1
     }
@@ -71,7 +71,7 @@ def heading(corners: FloatArray) -> float:
     return math.atan2(y, x)
 
 
-def _refined(grey: NDArray[np.uint8], corners: FloatArray) -> FloatArray:
+def _refine_corners(grey: NDArray[np.uint8], corners: FloatArray) -> FloatArray:
     """Refine corners (4, 2) as the intersections of lines fitted to the tag's sides.
 
     A side is where black inside turns to white outside. Corners that would move too far are

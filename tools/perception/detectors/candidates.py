@@ -208,7 +208,7 @@ def _whole_objects(regions: Sequence[Region], features: Bytes) -> list[Thing]:
     """Return the regions that are neither parts of others nor several things merged into one."""
     things: list[Thing] = []
     for region in regions:
-        if not _run_together(region, regions):
+        if not _is_merged(region, regions):
             holes = _ground_holes(region, features)
             solid = region.proposal.mask.copy()
             for hole in holes:
@@ -266,7 +266,7 @@ def _lies_within(part: Region, whole: Region, body: Mask) -> bool:
     return part.shared(whole, body) >= WITHIN * part.area
 
 
-def _run_together(whole: Region, regions: Sequence[Region]) -> bool:
+def _is_merged(whole: Region, regions: Sequence[Region]) -> bool:
     """Return whether a region is several things, each with ground of its own around it."""
     parts: list[Region] = []
     for region in sorted(regions, key=lambda r: -r.area):

@@ -98,7 +98,7 @@ class Region:
 
 def scored_regions(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     """Score the proposals as regions of `features` (h, w, 3), best first."""
-    traced = [(p, t) for p in found if (t := _traced(p.ring)) is not None]
+    traced = [(p, t) for p in found if (t := _outline_samples(p.ring)) is not None]
     if not traced:
         return []
     points = np.asarray([t[0] + p.origin for p, t in traced], dtype=np.float32)
@@ -127,7 +127,7 @@ def scored_regions(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     return sorted(regions, key=lambda r: -r.score)
 
 
-def _traced(outermost: npt.NDArray[np.int32]) -> tuple[Floats, Floats] | None:
+def _outline_samples(outermost: npt.NDArray[np.int32]) -> tuple[Floats, Floats] | None:
     """Return points on an outline with outward normals, (n, 2) each; None for a speck."""
     ring = outermost.astype(np.float32)
     count = len(ring)

@@ -102,10 +102,10 @@ def _read_shape(shape: Shape, size: Size, place: Georeference | None) -> _Found:
     parts: list[BaseGeometry] = []
     notes: set[str] = set()
     for outer, *holes in (part for part in shape.rings if part):
-        region, done = _simple(_in_pixels(outer, size, place))
+        region, done = _simple_region(_in_pixels(outer, size, place))
         notes |= done
         for hole in holes:
-            region = region.difference(_simple(_in_pixels(hole, size, place))[0])
+            region = region.difference(_simple_region(_in_pixels(hole, size, place))[0])
         parts.append(region)
     return _Found(label, shapely.union_all(parts), "".join(f"; {note}" for note in sorted(notes)))
 
@@ -134,7 +134,7 @@ def _region_seen(thing: _Found, size: Size) -> Polygon:
         return outline_of_mask(thing.pixels()).polygon
     region = thing.region
     if region.area < MIN_AREA or not is_seen(region, np.asarray(size, dtype=float)):
-        raise _elsewhere(region)
+        raise _placement_error(region)
     frame = shapely.box(-0.5, -0.5, size[0] - 0.5, size[1] - 0.5)
     return outline_of(in_one_piece(region.intersection(frame))).polygon
 
@@ -162,7 +162,7 @@ def _no_number(text: str) -> NoReturn:
     raise refusal(f"it holds {text}, which is no place", "export it again")
 
 
-def _elsewhere(region: BaseGeometry) -> InputError:
+def _placement_error(region: BaseGeometry) -> InputError:
     """Return the error for a region that lies outside the picture or is too small."""
     if region.is_empty:
         return refusal("it has no polygon", "draw one around it")
@@ -191,7 +191,7 @@ def _in_pixels(ring: FloatArray, size: Size, place: Georeference | None) -> Floa
     return ring - 0.5
 
 
-def _simple(ring: FloatArray) -> tuple[BaseGeometry, set[str]]:
+def _simple_region(ring: FloatArray) -> tuple[BaseGeometry, set[str]]:
     region = Polygon(ring)
     if region.is_valid or region.convex_hull.area < MIN_AREA:
         return region if region.is_valid else region.convex_hull, set()

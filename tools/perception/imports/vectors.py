@@ -107,8 +107,8 @@ def _geojson(whole: Mapping[str, Any]) -> list[Shape]:
             raise refusal(
                 f"a geometry in it is a {str(kind)[:40]!r}", "give polygons or multipolygons"
             )
-        told = fields(feature.get("properties"))
-        label = next((told[k] for k in ("name", "label", "class") if told.get(k)), "")
+        properties = fields(feature.get("properties"))
+        label = next((properties[k] for k in ("name", "label", "class") if properties.get(k)), "")
         polygons = [parts] if kind == "Polygon" else parts
         rings = [[_flat(ring) for ring in items(polygon)] for polygon in polygons]
         found.append(Shape(str(label), rings=rings))

@@ -58,7 +58,7 @@ class Network:
         torch = _torch()
         with self._turn, torch.inference_mode():
             try:
-                return method(**{name: self._placed(value) for name, value in inputs.items()})
+                return method(**{name: self._to_device(value) for name, value in inputs.items()})
             except torch.OutOfMemoryError:
                 raise InputError(
                     f"The network does not fit in the memory of {self.device}: set "
@@ -74,7 +74,7 @@ class Network:
                 self.memory.pop(old, None)
         return self.memory[key]
 
-    def _placed(self, value: Any) -> Any:
+    def _to_device(self, value: Any) -> Any:
         torch = _torch()
         value = torch.from_numpy(value) if isinstance(value, np.ndarray) else value
         if not isinstance(value, torch.Tensor):

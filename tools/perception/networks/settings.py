@@ -31,11 +31,11 @@ def detection_threshold(usual: float) -> float:
     Raises:
         InputError: FORMUP_DETECTION_THRESHOLD is no score.
     """
-    said = os.environ.get(SCORE)
+    setting = os.environ.get(SCORE)
     try:
-        value = float(said) if said else usual
+        value = float(setting) if setting else usual
     except ValueError:
         value = -1.0
     if not 0 <= value < 1:
-        raise InputError(f"{SCORE}={said!r} is no score: give a number from 0 up to 1.")
+        raise InputError(f"{SCORE}={setting!r} is no score: give a number from 0 up to 1.")
     return value

@@ -80,12 +80,12 @@ def _templates() -> tuple[Template, ...]:
 
 def _drawn_shapes() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     """Yield every class in the forms it comes in."""
-    yield from _round_ones()
+    yield from _round_shapes()
     yield from _polygons()
-    yield from _concave_ones()
+    yield from _concave_shapes()
 
 
-def _round_ones() -> Iterator[tuple[ShapeName, BaseGeometry]]:
+def _round_shapes() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     disc = Polygon(_regular(64))
     yield "circle", disc
     for long in (1.35, 1.7, 2.2, 3.0):
@@ -113,7 +113,7 @@ def _polygons() -> Iterator[tuple[ShapeName, BaseGeometry]]:
             yield "frame", _stretched(square.difference(inner), long)
 
 
-def _concave_ones() -> Iterator[tuple[ShapeName, BaseGeometry]]:
+def _concave_shapes() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     for points in (4, 5, 6, 8):
         for inner in (0.38, 0.5) if points == 4 else (0.38, 0.5, 0.62):  # 0.62 looks square
             yield "star", Polygon(_star(points, inner))

@@ -13,7 +13,7 @@ from ..networks.runtime import Floats, array, load_network, resized
 from ..networks.settings import detection_threshold
 from ..target_prompt import TargetPrompt
 from .grabcut import bounding_box, pieces
-from .mask_scores import rated
+from .mask_scores import rate_mask
 from .protocol import Pixels, PromptKind, Segmentation
 
 CHECKPOINT = "CIDAS/clipseg-rd64-refined"
@@ -48,7 +48,7 @@ class ClipSegSegmenter:
                 "probability": float(chance[piece].mean()),
                 "stability": tight / int(loose_areas[loose[piece][0]]),
             }
-            mask = rated(pixels, piece, parts)
+            mask = rate_mask(pixels, piece, parts)
             if mask.confidence > 0:
                 found.append(Detection(bounding_box(piece), float(chance[piece].max()), mask))
         return tuple(sorted(found, key=lambda d: -d.score))

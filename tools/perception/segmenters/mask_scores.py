@@ -12,7 +12,7 @@ MOST = 0.9
 """Greatest share of the picture that a thing in it may cover."""
 
 
-def rated(pixels: Bytes, mask: Mask, parts: Mapping[str, float]) -> Segmentation:
+def rate_mask(pixels: Bytes, mask: Mask, parts: Mapping[str, float]) -> Segmentation:
     """Clean a mask (H, W) and rate it; it becomes empty, with confidence 0, if it is no thing.
 
     Args:

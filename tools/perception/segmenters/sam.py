@@ -15,7 +15,7 @@ from ..networks.runtime import Floats, array, load_network, resized
 from ..target_prompt import Point, TargetPrompt
 from .grabcut import Mask, bounding_box, iou, polygon_region
 from .grabcut_segmenter import visible_vertices
-from .mask_scores import rated
+from .mask_scores import rate_mask
 from .protocol import Pixels, PromptKind, Segmentation
 from .region_growing import box_iou
 
@@ -75,7 +75,7 @@ class SamSegmenter:
         height, width = pixels.shape[:2]
         frame = self._frame((height, width))
         embedding = self.network.remembered(pixels, lambda: self._embedding(pixels, frame))
-        box, on, drawn = _pointed(prompt, width, height)
+        box, on, drawn = _sam_prompt(prompt, width, height)
         inputs: dict[str, Any] = {"image_embeddings": embedding, "multimask_output": True}
         if box is not None:
             inputs["input_boxes"] = frame.points(box).reshape(1, 1, 4)
@@ -92,7 +92,7 @@ class SamSegmenter:
             "stability": _stability(logits),
             **_prompt_fit(logits > 0, box, drawn),
         }
-        return rated(pixels, logits > 0, parts)
+        return rate_mask(pixels, logits > 0, parts)
 
     def _frame(self, picture: tuple[int, int]) -> _Frame:
         side = int(self.network.model.config.prompt_encoder_config.image_size)
@@ -129,7 +129,7 @@ def _stability(logits: Floats) -> float:
     return int(np.count_nonzero(logits > STEP)) / loose if loose else 0.0
 
 
-def _pointed(
+def _sam_prompt(
     prompt: TargetPrompt, width: int, height: int
 ) -> tuple[tuple[float, ...] | None, list[Point], Mask | None]:
     """Convert a prompt to what SAM takes: a box and points on the thing.

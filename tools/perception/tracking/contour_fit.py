@@ -74,9 +74,9 @@ class ContourFit:
         self._rows[:, 2] *= across.std() >= ROUND * length
         self._units = np.array([1.0, 1.0, 1 / length])
         self._colours = Colours(first, view.mask)
-        self._mask, says = view.mask, self._colours.says(first)
-        self._alike = float(np.mean(says[self._mask] > 0))
-        self._rest, seen = self._edges(says)
+        self._mask, log_odds = view.mask, self._colours.log_odds(first)
+        self._alike = float(np.mean(log_odds[self._mask] > 0))
+        self._rest, seen = self._edges(log_odds)
         good = seen & (np.abs(self._rest) <= LOOSE)
         self.points, self._normals = self.points[good], self._normals[good]
         self._rows, self._rest = self._rows[good], self._rest[good]
@@ -89,8 +89,8 @@ class ContourFit:
             seen: (h, w, 3), the view.
             within: (n,), which of `points` lie in the picture.
         """
-        says = self._colours.says(seen)
-        edges, usable = self._edges(says)
+        log_odds = self._colours.log_odds(seen)
+        edges, usable = self._edges(log_odds)
         edges, usable = edges - self._rest, usable & within
         by = np.zeros(3)
         for limit in TUKEY:
@@ -98,18 +98,18 @@ class ContourFit:
             weights = np.where(usable, np.clip(1 - (off / limit) ** 2, 0, None) ** 2, 0)
             by = by + self._solved(weights, off)
         agrees = usable & (np.abs(edges - self._rows @ by) < AGREES)
-        held = self._held(agrees) >= HELD
-        alike = np.mean(says[self._mask] > 0) / self._alike
+        held = self._least_information(agrees) >= HELD
+        alike = np.mean(log_odds[self._mask] > 0) / self._alike
         share = float(min((agrees[within].mean() - CHANCE) / (1 - CHANCE), alike)) if held else 0.0
         if share >= LEARNT and np.linalg.norm(by[:2]) < 1:
             self._colours.learn(seen, self._mask)
         return Step(by, max(share, 0.0))
 
-    def _edges(self, says: Floats) -> tuple[FloatArray, Mask]:
+    def _edges(self, log_odds: Floats) -> tuple[FloatArray, Mask]:
         """Return how far out along the normals the edges are, (n,), px, and a mask (n,) of them."""
         offsets = np.arange(-REACH, REACH + 1)
         at = (self.points[:, None] + offsets[:, None] * self._normals[:, None]).astype(np.float32)
-        soft = cv2.GaussianBlur(says, (5, 5), 0)  # otherwise edges lie at pixels' borders
+        soft = cv2.GaussianBlur(log_odds, (5, 5), 0)  # otherwise edges lie at pixels' borders
         profiles = cv2.remap(soft, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderValue=0.0)
         inside = np.cumsum(profiles, axis=1) - NEAR * (offsets + 0.5) ** 2
         best = inside.argmax(axis=1)
@@ -125,7 +125,7 @@ class ContourFit:
         solved = np.linalg.solve(squares, rows.T @ (weights * off))
         return np.asarray(self._units * solved, dtype=float)
 
-    def _held(self, agrees: Mask) -> float:
+    def _least_information(self, agrees: Mask) -> float:
         """Return the least information on any motion, as a share of the whole outline's."""
         rows = self._rows * self._units
         whole, part = (r.T @ r + 1e-6 * np.eye(3) for r in (rows, rows[agrees]))
@@ -144,15 +144,15 @@ class Colours:
 
     def __init__(self, first: Bytes, mask: Mask) -> None:
         self._codes = _hues
-        self._shares = self._counted(first, mask)
+        self._shares = self._colour_shares(first, mask)
         hues, self._codes = self._shares, _colours
-        self._shares = self._counted(first, mask)
+        self._shares = self._colour_shares(first, mask)
         if _shared(hues) <= _shared(self._shares) + HUES:
             self._codes, self._shares = _hues, hues
         self.overlap = _shared(self._shares)
         self._odds = _odds(self._shares)
 
-    def says(self, bgr: Bytes) -> Floats:
+    def log_odds(self, bgr: Bytes) -> Floats:
         """Return the log odds (h, w) of a view (h, w, 3): above 0 where it looks like the thing."""
         return self._odds[self._codes(bgr)]
 
@@ -162,10 +162,10 @@ class Colours:
         Hues are not learnt anew.
         """
         if self._codes is _colours:
-            self._shares += NEW * (self._counted(bgr, mask) - self._shares)
+            self._shares += NEW * (self._colour_shares(bgr, mask) - self._shares)
             self._odds = _odds(self._shares)
 
-    def _counted(self, bgr: Bytes, mask: Mask) -> FloatArray:
+    def _colour_shares(self, bgr: Bytes, mask: Mask) -> FloatArray:
         """Return how common each colour is in the thing, and around it, (2, colours)."""
         from scipy.ndimage import gaussian_filter
 

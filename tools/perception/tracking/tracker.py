@@ -71,7 +71,7 @@ class ObjectTracker:
 
     def update(self, frame: Bytes) -> Tracked:
         """Find the thing in the next frame, (H, W, 3)."""
-        motion, confidence = self._found(frame)
+        motion, confidence = self._best_motion(frame)
         if confidence < (FOUND if self._unseen else LOST):
             self._unseen, confidence = self._unseen + 1, 0.0
         else:
@@ -80,7 +80,7 @@ class ObjectTracker:
         dx, dy, turn = self._motion.tolist()
         return Tracked(dx, dy, turn, confidence)
 
-    def _found(self, frame: Bytes) -> tuple[Points, float]:
+    def _best_motion(self, frame: Bytes) -> tuple[Points, float]:
         """Return the motion that most agrees with the frame, and its confidence."""
         best, confidence = self._motion, 0.0
         frames = 1 + self._unseen
