@@ -12,7 +12,7 @@ from formup.agent.first_message import read_task, task_text
 from formup.agent.session import load_run
 from formup.tools.context import Settings
 from formup.tools.draw import draw_plan
-from formup.tools.draw.scale_bar import length_words, round_metres
+from formup.tools.draw.scale_bar import length_label, round_metres
 from formup.tools.errors import InputError, ToolError
 from formup.tools.formation.units import in_metres
 from formup.tools.perception.image import load_picture, picture_from_array
@@ -219,7 +219,7 @@ def test_scale_bars_have_round_lengths(longest: float) -> None:
     metres = round_metres(longest)
     assert longest / 2.5 <= metres * (1 + 1e-6)
     assert metres <= longest * (1 + 1e-6)
-    number, _, unit = length_words(metres).partition(" ")
+    number, _, unit = length_label(metres).partition(" ")
     size = {"km": 1e3, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6}[unit]
     assert float(number) * size == pytest.approx(metres, rel=1e-5)
     assert number.strip("0.")[0] in "125"

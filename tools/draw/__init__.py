@@ -1,4 +1,4 @@
-"""Pictures of scenes, plans and deployments; nothing is decided here."""
+"""Pictures of scenes, plans and deployments. This package only draws; it decides nothing."""
 
 from .film import draw_deployment
 from .overlay import draw_look, draw_plan

@@ -1,4 +1,4 @@
-"""A photograph on a page that can be drawn on in the photograph's own pixel coordinates.
+"""A page with a photograph, drawn on in the photograph's own pixel coordinates.
 
 Everything is drawn at three times the page's resolution and averaged down, which smooths every
 edge. Strokes and text are sized in units of the page, never of the photograph.
@@ -43,17 +43,18 @@ MARKS: tuple[Colour, ...] = (
     (255, 130, 200),
     (190, 160, 255),
 )
-"""Light colours for things told apart by number; ink is legible on all of them."""
+"""Light colours for numbered things; ink is legible on all of them."""
 
 FINE = 3
-"""Drawn pixels per pixel of the page, each way."""
+"""Supersampling factor: drawn pixels per page pixel, along each axis."""
 
 
 class Canvas:
     """A page with the photograph on it.
 
-    Points are (n, 2) in pixels of the photograph (x right, y down, pixel centres at integers),
-    lengths in units of the page but where they say source px.
+    Points are (n, 2) in pixels of the photograph (x right, y down, pixel centres at integers).
+    Lengths are in units of the page unless documented as source px (pixels of the photograph) or
+    page px.
     """
 
     def __init__(
@@ -68,10 +69,10 @@ class Canvas:
 
         Args:
             picture: the photograph.
-            long: its long side on the page, page px.
+            long: length of its long side on the page, page px.
             unit: page px per unit of strokes and text.
             margins: left, top, right, bottom, page px.
-            origin: what the photograph's first pixel is called, where it was cut from a larger one.
+            origin: coordinates of the photograph's first pixel, if it is cut from a larger one.
         """
         left, top, right, bottom = margins
         width, height = shown_size(picture, long)
@@ -84,35 +85,35 @@ class Canvas:
         photo = Image.fromarray(picture.pixels).resize(
             (width, height),
             Image.Resampling.LANCZOS,
-            reducing_gap=1.0,  # a photograph twice as large or more is first averaged, far quicker
+            reducing_gap=1.0,  # average photographs of twice the size or more first: far faster
         )
         self._image = Image.new("RGB", (self.size[0] * FINE, self.size[1] * FINE), INK)
-        # Repeating pixels is what averaging down undoes without loss.
+        # Averaging down undoes repeated pixels without loss.
         fine = photo.resize((width * FINE, height * FINE), Image.Resampling.NEAREST)
         self._image.paste(fine, (left * FINE, top * FINE))
         self._draw = ImageDraw.Draw(self._image, "RGBA")
 
     def copy(self) -> "Canvas":
-        """A second canvas that starts from what is drawn here."""
+        """Return a second canvas that starts with everything drawn on this one."""
         twin = copy(self)
         twin._image = self._image.copy()
         twin._draw = ImageDraw.Draw(twin._image, "RGBA")
         return twin
 
     def finish(self) -> Image.Image:
-        """The page, RGB."""
+        """Return the page as an RGB image."""
         return self._image.reduce(FINE)
 
     def at(self, points: FloatArray) -> FloatArray:
-        """Where points of the photograph lie on the page, (n, 2), page px, pixel centres."""
+        """Map points (n, 2) of the photograph to the page, (n, 2), page px, pixel centres."""
         return self.offset + (points - np.array(self.origin) + 0.5) * self.scale - 0.5
 
     def page_length(self, source_px: float) -> float:
-        """A length of the photograph in units of the page."""
+        """Convert a length in source px to units of the page."""
         return source_px * float(self.scale.mean()) / self.unit
 
     def tint(self, geometry: BaseGeometry, colour: Colour, strength: float) -> None:
-        """Colour an area, in source px; strength 0 leaves the photograph, 1 covers it."""
+        """Colour an area given in source px; strength 0 leaves the photograph, 1 covers it."""
         mask = self._mask()
         draw = ImageDraw.Draw(mask)
         for part in shapely.get_parts(geometry):
@@ -148,7 +149,7 @@ class Canvas:
         self._cover(mask, colour)
 
     def cased(self, lines: Sequence[FloatArray], colour: Colour, width: float) -> None:
-        """Draw polylines with a dark seam on both sides, legible on any ground."""
+        """Draw polylines with a dark seam on both sides, legible on any background."""
         self.strokes(lines, INK, width + 2.4, 0.75)
         self.strokes(lines, colour, width)
 
@@ -159,26 +160,26 @@ class Canvas:
         self.cased(cut, colour, width)
 
     def disc(self, centre: FloatArray, radius: float, fill: Colour, rim: float) -> None:
-        """A disc of a radius with a white rim of a width and a soft dark edge."""
+        """Draw a disc with a white rim of width `rim` and a soft dark edge."""
         self._ellipse(centre, radius + 1.7 * rim, (*INK, 120))
         self._ellipse(centre, radius + rim, (*WHITE, 255))
         self._ellipse(centre, radius, (*fill, 255))
 
     def circle(self, centre: FloatArray, radius: float, colour: Colour, width: float) -> None:
-        """A hollow circle of a radius, cased, its inside darkened."""
+        """Draw a circle with a dark casing and a darkened inside."""
         self._ellipse(centre, radius, (*INK, 120))
         self._ellipse(centre, radius + width / 2 + 0.8, None, INK, width + 1.6)
         self._ellipse(centre, radius + width / 2, None, colour, width)
 
     def body(self, centre: FloatArray, radius: float) -> None:
-        """A robot's true extent as a thin circle; the radius in source px."""
+        """Draw a robot's true extent as a thin circle; the radius is in source px."""
         reach = self.page_length(radius)
         self._ellipse(centre, reach, (*ROBOT, 60))
         self._ellipse(centre, reach + 0.8, None, INK, 2.0)
         self._ellipse(centre, reach, None, WHITE, 1.0)
 
     def cross(self, centre: FloatArray, reach: float, colour: Colour, width: float) -> None:
-        """An x through a point."""
+        """Draw an x through a point."""
         x, y = self._fine(centre[None])[0]
         d = reach * self.unit * FINE
         for slope in (-1, 1):
@@ -187,24 +188,24 @@ class Canvas:
             )
 
     def text_size(self, text: str, size: float) -> tuple[float, float]:
-        """Width and height a line of text takes, page px."""
-        points = self.points(size)
+        """Return the width and height of a line of text, page px."""
+        points = self.font_px(size)
         return font(points * FINE).getlength(text) / FINE, float(points)
 
     def shortened(self, text: str, size: float, room: float) -> str:
-        """As much of a drawable text as fits a width, page px."""
-        return shortened(text, room * FINE, font(self.points(size) * FINE))
+        """Return as much of a drawable text as fits a width of `room` page px."""
+        return shortened(text, room * FINE, font(self.font_px(size) * FINE))
 
-    def points(self, size: float) -> int:
-        """A text size in page px."""
+    def font_px(self, size: float) -> int:
+        """Convert a text size to page px."""
         return max(round(size * self.unit), 6)
 
     def text(
         self, where: FloatArray, text: str, size: float, colour: Colour, seam: Colour | None = None
     ) -> None:
-        """Text with its middle at a point of the page, page px; a seam surrounds it."""
-        face = font(self.points(size) * FINE)
-        # The middle of capitals and digits: descenders must not push a line up.
+        """Draw text centred on a point of the page, page px, outlined in `seam` if given."""
+        face = font(self.font_px(size) * FINE)
+        # Centre on capitals and digits: descenders must not push a line up.
         x0, top, x1, bottom = face.getbbox("0", anchor="ls")
         x0, _, x1, _ = face.getbbox(text, anchor="ls")
         x, y = (where + 0.5) * FINE - 0.5
@@ -220,7 +221,7 @@ class Canvas:
         )
 
     def box(self, box: Box, colour: Colour, corner: float = 0.0, strength: float = 1.0) -> None:
-        """A filled box of the page, page px, with rounded corners of a radius in units."""
+        """Fill a box of the page, page px, with its corners rounded to a radius in units."""
         x0, y0, x1, y1 = (round(v * FINE) for v in box)
         self._draw.rounded_rectangle(
             (x0, y0, max(x1 - 1, x0), max(y1 - 1, y0)),
@@ -229,7 +230,7 @@ class Canvas:
         )
 
     def fill_margins(self, colour: Colour) -> None:
-        """Colour the page around the photograph."""
+        """Colour the page around the photograph, covering whatever was drawn there."""
         x0, y0, x1, y1 = self.photo
         width, height = self.size
         for box in (
@@ -250,9 +251,9 @@ class Canvas:
         ground: Colour,
         seam: float = 0.0,
     ) -> None:
-        """Text on a rounded ground, its middle at a point of the page, page px.
+        """Draw text on a rounded background, centred on a point of the page, page px.
 
-        `seam` is the width of a dark rim around it, units.
+        `seam` is the width of the dark rim around the background, units; 0 draws none.
         """
         x, y = where
         width, height = self.chip_size(text, size)
@@ -265,7 +266,7 @@ class Canvas:
         self.text(where, text, size, colour)
 
     def chip_size(self, text: str, size: float) -> tuple[float, float]:
-        """Width and height of a chip, page px."""
+        """Return the width and height of a chip, page px."""
         width, height = self.text_size(text, size)
         return width + 0.8 * height, 1.4 * height
 
@@ -274,7 +275,7 @@ class Canvas:
 
     def _cover(self, mask: Image.Image, colour: Colour) -> None:
         box = mask.getbbox()
-        if box is not None:  # most masks are empty but for a small part
+        if box is not None:  # most masks are empty except for a small part
             self._image.paste(colour, box, mask.crop(box))
 
     def _fine(self, points: FloatArray) -> FloatArray:
@@ -300,32 +301,34 @@ class Canvas:
 
 
 class Labels:
-    """The parts of a page already taken, so that labels keep clear of them and each other."""
+    """The occupied parts of a page, so that labels keep clear of them and of each other."""
 
     def __init__(self, room: Box) -> None:
         self._room = np.asarray(room, dtype=float)
         self._taken = np.empty((0, 4))
 
     def take(self, boxes: FloatArray) -> None:
-        """Mark boxes (m, 4) as taken, page px."""
+        """Mark boxes (m, 4), page px, as occupied."""
         self._taken = np.concatenate([self._taken, boxes])
 
     def place(
         self, anchor: FloatArray, size: tuple[float, float], away: FloatArray, gap: float
     ) -> FloatArray:
-        """Middle of a free place beside a point, which is then taken, (2,), page px.
+        """Choose the freest place beside a point, mark it occupied, and return its centre (2,).
+
+        All lengths are in page px.
 
         Args:
-            anchor: the point to stand beside.
+            anchor: the point (2,) that is labelled.
             size: width and height of the label.
-            away: the direction to prefer, any length.
-            gap: distance kept from the point.
+            away: the preferred direction (2,), of any length.
+            gap: least distance between label and point.
         """
         half = np.array(size) / 2
         first = float(np.arctan2(away[1], away[0])) if np.any(away) else -np.pi / 4
         turns = first + np.array([0, 1, -1, 2, -2, 3, -3, 4]) * np.pi / 4
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        # The box touches a circle of radius gap: its support in that direction is added.
+        # The box touches a circle of radius gap, so add the box's support in that direction.
         reach = np.concatenate([gap + half.min() + 0 * turns, 2.2 * gap + half.max() + 0 * turns])
         ways = np.concatenate([ways, ways])
         support = np.abs(ways) @ (half - half.min())
@@ -334,9 +337,9 @@ class Labels:
     def pick(
         self, centres: FloatArray, size: FloatArray, hidden: FloatArray | float = 0.0
     ) -> FloatArray:
-        """The best of some middles (n, 2) for a label of a size, which is then taken, (2,).
+        """Pick the best centre (2,) of candidates (n, 2) for a label, and mark it occupied.
 
-        `hidden` is what each would hide besides the parts taken, square page px.
+        `hidden` is the area that each would hide besides the occupied parts, square page px.
         """
         half = size / 2
         boxes = np.concatenate([centres - half, centres + half], axis=1)
@@ -346,7 +349,7 @@ class Labels:
         return centre
 
     def _cost(self, box: FloatArray) -> float:
-        """Area of the box that is taken or off the page."""
+        """Return how much of the box is occupied or off the page, square page px."""
         shared = np.minimum(self._taken[:, 2:], box[2:]) - np.maximum(self._taken[:, :2], box[:2])
         inner = np.minimum(self._room[2:], box[2:]) - np.maximum(self._room[:2], box[:2])
         taken = float(np.prod(np.maximum(shared, 0), axis=1).sum())
@@ -354,13 +357,13 @@ class Labels:
 
 
 def shown_size(picture: Picture, long: int) -> tuple[int, int]:
-    """Width and height of the photograph with its long side at a length, at least 1 each."""
+    """Return the photograph's width and height scaled to a long side; each is at least 1."""
     factor = long / max(picture.size)
     return max(round(picture.width * factor), 1), max(round(picture.height * factor), 1)
 
 
 def _dashes(line: FloatArray, dash: float, gap: float) -> list[FloatArray]:
-    """A polyline cut into pieces of a length with gaps between, starting and ending with one."""
+    """Cut a polyline (k, 2) into dashes with gaps between, with a dash at either end."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     stations = np.concatenate([[0.0], np.cumsum(steps)])
     length = float(stations[-1])

@@ -1,6 +1,6 @@
 """The page around a photograph: a title above it, a line of text below.
 
-Neither hides any of the photograph. Lengths are units of the page, see Canvas.
+Neither hides any of the photograph. Lengths are in units of the page, see Canvas.
 """
 
 import numpy as np
@@ -11,21 +11,21 @@ from .text import font, wrapped
 
 TITLE, FOOTER = 25.0, 19.0
 LINE, PAD = 1.35, 12.0
-"""Line height as a multiple of the text's size; room above, below and beside text."""
+"""Line height as a multiple of the text size; padding above, below and beside text."""
 FOOTER_HEIGHT = FOOTER * LINE + 2 * PAD
 
 
 def make_page(
     picture: Picture, long: int, unit: float, title: str, lines: int, narrowest: float
 ) -> tuple[Canvas, list[str]]:
-    """A canvas with room for a title above and a footer below, and the title's lines.
+    """Return a canvas with room for a title above and a footer below, and the title's lines.
 
     Args:
         picture: the photograph.
-        long: its long side on the page, page px.
+        long: length of its long side on the page, page px.
         unit: page px per unit of strokes and text.
-        title: any text; none takes no room.
-        lines: of title at most.
+        title: any text; an empty one takes no room.
+        lines: the most lines that the title may take.
         narrowest: the page's least width, units; the photograph is centred on it.
     """
     width = shown_size(picture, long)[0]
@@ -38,7 +38,7 @@ def make_page(
 
 
 def draw_bars(canvas: Canvas, title: list[str]) -> None:
-    """Title and footer grounds, over whatever was drawn beyond the photograph's edge."""
+    """Fill the margins, over whatever was drawn beyond the photograph, and write the title."""
     canvas.fill_margins(INK)
     for row, line in enumerate(title):
         y = (PAD + (row + 0.5) * TITLE * LINE) * canvas.unit
@@ -46,12 +46,12 @@ def draw_bars(canvas: Canvas, title: list[str]) -> None:
 
 
 def footer_middle(canvas: Canvas) -> float:
-    """The middle of the footer from the page's top, page px."""
+    """Return the y coordinate of the footer's middle, page px."""
     return (canvas.photo[3] + canvas.size[1]) / 2
 
 
 def left_text(canvas: Canvas, x: float, y: float, text: str, size: float, colour: Colour) -> None:
-    """Text that begins at x and has its middle at y, page px."""
+    """Draw text that starts at x and is vertically centred on y, page px."""
     width = canvas.text_size(text, size)[0]
     canvas.text(np.array([x + width / 2, y]), text, size, colour)
 
@@ -59,9 +59,9 @@ def left_text(canvas: Canvas, x: float, y: float, text: str, size: float, colour
 def draw_footer(
     canvas: Canvas, badge: str, ground: Colour, items: list[str], taken: float = 0.0
 ) -> None:
-    """A badge and after it as many of the items, most important first, as fit.
+    """Draw a badge, followed by as many of the items (most important first) as fit.
 
-    `taken` is how much at the right is left free for something else, page px.
+    `taken` is the width at the right to leave free for something else, page px.
     """
     y, pad = footer_middle(canvas), PAD * canvas.unit
     width, _ = canvas.chip_size(badge, FOOTER)

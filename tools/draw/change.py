@@ -1,4 +1,4 @@
-"""What an edit moves: arrows from the places of the plan before, and the robots that come or go."""
+"""Draws what an edit moves: arrows from the old places, and the robots that come or go."""
 
 from dataclasses import dataclass
 
@@ -13,20 +13,21 @@ from .canvas import CERTIFIED, IDLE, PAPER, Canvas
 from .marks import draw_outline, draw_robots, robot_size
 
 MOVED_PX = 0.5
-"""Robots that move less than that stay."""
+"""Robots that move no further than this count as staying, px."""
 SMALL_UNITS, SMALL_ROBOT = 300, 6.0
-"""Long side of a small picture, in units of strokes, and the greatest radius of a robot, units:
-strokes stay visible, texts would not."""
+"""Long side of a small picture and the greatest radius of a robot on it, both in units.
+
+Strokes stay visible at this size; text would not."""
 
 
 @dataclass(frozen=True)
 class Moves:
-    """How one plan differs from another, places (2,) px by robot.
+    """How two plans differ; all places are (2,) px, by robot id.
 
     Attributes:
-        moved: where a robot is in the plan before, and in the one after.
-        joined: robots only of the plan after.
-        left: robots only of the plan before.
+        moved: a robot's place in the earlier plan, and in the later one.
+        joined: robots that only the later plan has.
+        left: robots that only the earlier plan has.
     """
 
     moved: dict[str, tuple[FloatArray, FloatArray]]
@@ -35,7 +36,7 @@ class Moves:
 
 
 def moves_between(before: Plan | None, after: Plan) -> Moves:
-    """Who moves from a plan to the next one; nobody where there was none before."""
+    """Return which robots move from one plan to the next; none if there is no earlier plan."""
     if before is None:
         return Moves({}, {}, {})
     old, new = _places(before), _places(after)
@@ -48,12 +49,13 @@ def moves_between(before: Plan | None, after: Plan) -> Moves:
 
 
 def draw_moves(canvas: Canvas, moves: Moves, radius: float) -> None:
-    """Arrows to the places of robots that are drawn with a radius, units, over them afterwards.
+    """Draw an arrow to each robot's new place; call this before drawing the robots.
 
-    Robots that join have a green ring; where one has left is an empty circle.
+    Robots that join get a green ring; where one has left, there is an empty circle. `radius` is
+    the one the robots are drawn with, units.
     """
     reach = radius / canvas.page_length(1.0)
-    width = max(float(np.clip(0.3 * radius, 1.2, 3.0)), 0.9 / canvas.unit)  # a pixel, nearly
+    width = max(float(np.clip(0.3 * radius, 1.2, 3.0)), 0.9 / canvas.unit)  # nearly a pixel
     for old, new in moves.moved.values():
         canvas.circle(old, 0.35 * radius, PAPER, width / 2)
         if np.hypot(*(new - old)) > reach:
@@ -71,10 +73,12 @@ def draw_small(
     before: Plan | None,
     room: tuple[int, int],
 ) -> Image.Image:
-    """Targets, robots and who moves, with no text, for a picture of few pixels.
+    """Draw targets, robots and their moves, without text, as a small picture.
 
     Args:
-        room: its greatest width and height, px.
+        plan: the plan to draw; None draws the targets alone.
+        before: the plan that arrows start from, if any.
+        room: the picture's greatest width and height, px.
     """
     factor = min(room[0] / picture.width, room[1] / picture.height)
     long = max(int(factor * max(picture.size)), 1)
@@ -94,7 +98,10 @@ def _places(plan: Plan) -> dict[str, FloatArray]:
 
 
 def _arrow(old: FloatArray, new: FloatArray, reach: float) -> list[FloatArray]:
-    """The shaft up to the rim of a disc at its end, and the two strokes of the head, px."""
+    """Return the polylines of an arrow, px: its shaft and its head.
+
+    It stops short of `new` by 1.3 times `reach`, the radius of the disc there.
+    """
     way = (new - old) / np.hypot(*(new - old))
     tip = new - 1.3 * reach * way
     across = np.array([-way[1], way[0]])

@@ -1,6 +1,6 @@
-"""Draws how a target gets out of a cage: the path of its centre, and outlines along it.
+"""Draws how a target escapes from a cage: the path of its centre, and outlines along it.
 
-The path was found and checked elsewhere.
+The path is found and checked elsewhere.
 """
 
 import numpy as np
@@ -17,13 +17,16 @@ from .marks import rings
 
 WAY = MARKS[2]
 GHOSTS = 3
-"""So many outlines are drawn on the way, besides the target itself."""
+"""Number of outlines drawn along the way, besides the target itself."""
 STEPS = 25
-"""Straight pieces that a move with its turn is drawn in."""
+"""Number of straight pieces in which each move between two poses is drawn."""
 
 
 def draw_escape(canvas: Canvas, escape: Escape, site: Site) -> None:
-    """Draw faint outlines of the target on its way out, and its centre's path with an arrowhead."""
+    """Draw faint outlines of the target on its way out, and its centre's path with an arrowhead.
+
+    Only the part up to the path's last pose inside the picture is drawn.
+    """
     outline = site.outlines[escape.target]
     poses = _densified(np.asarray(escape.poses, dtype=float))
     centre = shapely.Point(outline.centre)
@@ -46,7 +49,7 @@ def draw_escape(canvas: Canvas, escape: Escape, site: Site) -> None:
 
 
 def _densified(poses: FloatArray) -> FloatArray:
-    """Poses with others between them, (k, 3)."""
+    """Interpolate linearly between successive poses (n, 3), to (k, 3)."""
     whole = np.arange(len(poses), dtype=float)
     between: FloatArray = np.linspace(0, len(poses) - 1, (len(poses) - 1) * STEPS + 1)
     columns = [np.asarray(np.interp(between, whole, poses[:, k]), dtype=float) for k in range(3)]
@@ -61,7 +64,7 @@ def _in_pose(thing: BaseGeometry, pose: FloatArray, start: FloatArray) -> BaseGe
 
 
 def _index_at_share(way: FloatArray, share: float) -> int:
-    """Index of the point after a share of a line's length."""
+    """Return the index of the first point at or past a share of the line's length."""
     steps: FloatArray = np.linalg.norm(np.diff(way, axis=0, prepend=way[:1]), axis=1)
     gone = np.cumsum(steps)
     return int(np.searchsorted(gone, share * float(gone[-1]) * (1 - 1e-9)))

@@ -1,4 +1,4 @@
-"""A deployment frame by frame: where the robots are, and where they go."""
+"""Draws a deployment frame by frame: where the robots are, and where they are going."""
 
 from collections.abc import Sequence
 
@@ -39,16 +39,16 @@ from .marks import draw_idle_robots, draw_met, draw_outline, draw_robots, rings,
 from .overlay import idle_robots
 
 SIDE = 640
-"""Greatest side of a frame, page px."""
+"""Longest side of a frame, page px."""
 UNIT = 0.8 / SIDE
-"""Units of strokes and text, as a share of a frame's greatest side."""
+"""Unit of strokes and text, as a share of a frame's longest side."""
 TITLE_LINES = 2
 NARROWEST = 400.0
 NUMBERED, TRAILED = 30, 400
-"""Up to so many robots bear numbers; up to so many leave trails."""
+"""The most robots that are drawn with numbers, and with trails."""
 NUMBER_RADIUS = 8.0
 TRAIL = 10
-"""Frames a trail is long."""
+"""Length of a trail, in frames."""
 
 
 def draw_deployment(
@@ -62,16 +62,16 @@ def draw_deployment(
     side: int = SIDE,
     moved: Sequence[Rigid] = (),
 ) -> list[Image.Image]:
-    """One picture per frame, all of one size.
+    """Draw one picture per frame, all of the same size.
 
     Args:
-        world: what the plan was made in.
-        plan: its places are the goals.
-        frames: (n, 2) each: where the robots are over time, in the order of their places, px.
+        world: the world that the plan was made in.
+        plan: the plan whose places are the goals.
+        frames: (n, 2) each, px: the robots' positions over time, in the order of their places.
         title: usually the instruction.
-        moments: which of the frames are drawn; all by default.
-        side: the greatest that a picture may have, px.
-        moved: how the thing that robots follow had moved in the last frames.
+        moments: indices of the frames to draw; all by default.
+        side: longest side that a picture may have, px.
+        moved: how the thing that the robots follow had moved, one for each of the last frames.
 
     Raises:
         ToolError: the plan names a target that the world does not have.
@@ -100,7 +100,10 @@ def draw_deployment(
 
 
 def _photo_long_side(picture: Picture, side: int) -> int:
-    """The photograph's long side with which a page of any title stays within a side."""
+    """Return the long side of the photograph, px, that keeps any page within `side`.
+
+    The title may take up to its greatest number of lines.
+    """
     bars = (TITLE_LINES * TITLE * LINE + 2 * PAD + FOOTER_HEIGHT) * UNIT * side + 2
     factor = min(side / picture.width, (side - bars) / picture.height)
     return int(factor * max(picture.size))
@@ -110,13 +113,13 @@ def _draw_goals(canvas: Canvas, plan: Plan, radius: float) -> None:
     goals = plan.formation.points
     for goal in goals:
         canvas.circle(goal, radius, WHITE, max(0.15 * radius, 0.7))
-    if not _numbered(len(goals), radius):
+    if not _shows_numbers(len(goals), radius):
         return
     for robot, goal in zip(plan.formation.robot_of_place, canvas.at(goals), strict=True):
         canvas.text(goal, robot, 1.2 * radius, WHITE)
 
 
-def _numbered(count: int, radius: float) -> bool:
+def _shows_numbers(count: int, radius: float) -> bool:
     return count <= NUMBERED and radius >= NUMBER_RADIUS
 
 
@@ -128,14 +131,14 @@ def _frame(
     radius: float,
     step: tuple[int, int],
 ) -> Image.Image:
-    """The canvas with trails, robots and footer; the last of the recent poses are the present."""
+    """Draw trails, robots and footer, and return the page; the last of `recent` is the present."""
     now = recent[-1]
     last = step[0] == step[1] - 1
     if not last and len(recent) > 1 and len(now) <= TRAILED:
         canvas.trails(np.stack(recent), ALLOWED, 0.5 * radius)
     robots = plan.formation.robot_of_place
     draw_robots(canvas, dict(zip(robots, now, strict=True)), radius)
-    if _numbered(len(now), radius):
+    if _shows_numbers(len(now), radius):
         for robot, centre in zip(robots, canvas.at(now), strict=True):
             canvas.text(centre, robot, 1.25 * radius, WHITE, ROBOT)
     if last:
@@ -146,7 +149,7 @@ def _frame(
 
 
 def _draw_progress(canvas: Canvas, index: int, count: int) -> None:
-    """A bar and the number of the step."""
+    """Draw the step's number and a progress bar in the footer."""
     y, pad = footer_middle(canvas), PAD * canvas.unit
     text = f"step {index + 1} of {count}"
     width = canvas.text_size(f"step {count} of {count}", FOOTER)[0]
@@ -158,7 +161,7 @@ def _draw_progress(canvas: Canvas, index: int, count: int) -> None:
 
 
 def _draw_end(canvas: Canvas, now: FloatArray, goals: FloatArray) -> None:
-    """How many of the places have a robot on them, within what a deployment tolerates."""
+    """Write how many goals have a robot within the deployment's tolerance of arrival."""
     diagonal = float(np.hypot(*(canvas.source)))
     tolerance = max(ARRIVED_PX, ARRIVED_SHARE * diagonal)
     there = int((nearest(now, goals, 1)[0] <= tolerance).sum())

@@ -1,6 +1,6 @@
-"""What is seen of robots while they drive: the ground they are on, bodies, figures.
+"""The parts of a live view of robots that drive: the ground, their bodies and the figures.
 
-A window puts them together, and hands on what a person does.
+A window puts them together and handles a person's input.
 """
 
 from collections import deque
@@ -38,30 +38,30 @@ from .text import drawable, font
 from .view import part_of
 
 BAR, PANEL, EDGE = 40, 270, 16
-"""Height of the title, width of the figures, and the room around text, px."""
+"""Height of the title bar, width of the panel of figures, and padding around text, px."""
 TEXT, TITLE_TEXT = 14, 17.0
 MOST_ZOOM = 16.0
 LEAST_BODY = 3.0
-"""A robot is drawn with this radius at least, px of the page."""
+"""Least radius that a robot is drawn with, page px."""
 TRAIL = 60
-"""Steps that a trail is long."""
+"""Length of a trail, in steps."""
 GOOD, BAD, HEAD = (94, 220, 140), (255, 110, 110), (60, 66, 76)
-"""Colours of figures: as they should be, as they must not be, and what the next ones are about."""
+"""Colours of figures: as they should be, as they must not be, and of headings."""
 
 
 class Course:
-    """What was seen of a drive to a plan so far, px.
+    """What has been seen so far of a drive to a plan; lengths in px.
 
     Attributes:
-        trail: (m, 2) where all robots of the fleet were, step by step.
-        apart: (m,) from the centre of each of them to that of the nearest other one.
-        least: the least of these so far.
-        demanded: how far centres have to be apart.
-        robots: ids of those that have places, in the order of the fleet.
-        links: (n, 2, 2) from each of them to its place.
-        residual: (n,) how far it is there.
-        moved: how the thing that they follow has moved; None where they follow none.
-        ended: whether nothing is driven any more.
+        trail: positions (m, 2) of all robots of the fleet, step by step.
+        apart: (m,) distance from each robot's centre to that of its nearest neighbour.
+        least: the least of these distances so far.
+        demanded: how far apart centres have to be.
+        robots: ids of the robots that have places, in the order of the fleet.
+        links: (n, 2, 2) line from each of these robots to its place.
+        residual: (n,) length of these lines.
+        moved: how the thing that the robots follow has moved; None if they follow none.
+        ended: whether driving has ended.
     """
 
     def __init__(self, plan: Plan, size: tuple[float, float], radius: float) -> None:
@@ -73,7 +73,7 @@ class Course:
         self.least, self.ended = np.inf, False
 
     def see(self, poses: tuple[Pose, ...], moved: Rigid | None = None) -> None:
-        """Take in where all robots of the fleet are, and how the thing that they follow moved."""
+        """Update from the fleet's current poses and the motion of the thing that robots follow."""
         self.moved = moved
         points, now = points_of(poses), max(pose.seen for pose in poses)
         if len(poses) != len(self.poses):
@@ -92,7 +92,7 @@ class Course:
         self.residual = np.linalg.norm(points[rows] - goals, axis=1)
 
     def state(self, pace: Pace | None, *, held: bool) -> tuple[str, Colour]:
-        """What the robots do, and the colour for it."""
+        """Return what the robots are doing, as a label, and the colour to show it in."""
         if self.ended and (self.residual <= self.tolerance).all():
             return "all arrived", CERTIFIED
         if held or self.ended:
@@ -102,7 +102,11 @@ class Course:
     def figures(
         self, pace: Pace | None, scale: float | None, most: int
     ) -> list[tuple[str, str, Colour]]:
-        """At most so many rows of a name, a value and its colour."""
+        """Return the rows of the panel: a name, a value and its colour.
+
+        The last rows list the robots furthest from their places, as many as fit in `most` rows.
+        `scale` is in metres per pixel.
+        """
 
         def length(px: float) -> str:
             return length_text(px, scale) if px < np.inf else "none"
@@ -129,13 +133,13 @@ class Course:
 
 
 class Ground:
-    """A part of the picture with what a plan demands, below a title, left of room for figures.
+    """Part of the picture with what a plan demands, under a title, beside a panel of figures.
 
     Args:
-        radius: of the robots, source px; 0 for points.
+        radius: radius of the robots, source px; 0 for points.
 
     Attributes:
-        canvas: it was drawn on last, which says where on the page points of the picture are.
+        canvas: the canvas drawn last; it maps points of the picture to the page.
     """
 
     def __init__(
@@ -147,7 +151,7 @@ class Ground:
         self._magnified = 1.0
 
     def draw(self, size: tuple[int, int]) -> Image.Image:
-        """A page of a size."""
+        """Draw a page of a width and height, px; the panel is left empty."""
         whole, area = np.array(self._picture.size), np.maximum(np.array(size) - (PANEL, BAR), 1)
         scale = self._magnified * float((area / whole).min())
         cut = np.clip(np.round(area / scale), 1, whole).astype(int)
@@ -175,26 +179,29 @@ class Ground:
         return canvas.finish()
 
     def seen(self, moved: Rigid) -> list[FloatArray]:
-        """Where the rings of a thing that has moved lie on the page, (k, 2) each."""
+        """Return the rings of a thing that has moved, (k, 2) each, page px."""
         outline = self._world.outline(moved.sighting.id).polygon
         return [self.canvas.at(ring) for ring in rings(moved.moved(outline))]
 
     @property
     def body(self) -> float:
-        """The radius of a robot on the page, px."""
+        """The radius to draw a robot with, page px."""
         return max(self.canvas.page_length(self._radius), LEAST_BODY)
 
     @property
     def look(self) -> tuple[float, ...]:
-        """Which part of the picture is looked at."""
+        """The part of the picture in view: its centre x, y, image pixels, and the zoom."""
         return float(self._centre[0]), float(self._centre[1]), self._magnified
 
     def pan(self, by: tuple[float, float]) -> None:
-        """Move the picture by so many px of the page."""
+        """Move the picture by (x, y) page px."""
         self._centre = self._centre - np.array(by) / self.canvas.scale
 
     def zoom(self, factor: float, where: tuple[float, float] | None = None) -> None:
-        """Enlarge the picture around a point of the page, by default its middle."""
+        """Zoom in by a factor around a point of the page, px; by default around the centre.
+
+        The zoom stays between 1 and 16.
+        """
         before = self._magnified
         self._magnified = float(np.clip(before * factor, 1.0, MOST_ZOOM))
         if where is not None:
@@ -203,7 +210,7 @@ class Ground:
 
 
 def body(radius: float, colour: Colour) -> Image.Image:
-    """A robot of a radius in px, white at its rim, with a soft edge, RGBA."""
+    """Draw a robot of a radius in px, with a white rim and a soft edge, as an RGBA image."""
     middle = (int(np.ceil(radius + 1.5)) + 0.5) * FINE
     image = Image.new("RGBA", (round(2 * middle), round(2 * middle)), (*INK, 0))
     draw, rim = ImageDraw.Draw(image), float(np.clip(0.17 * radius, 0.8, 2.0))
@@ -214,7 +221,7 @@ def body(radius: float, colour: Colour) -> Image.Image:
 
 
 def words(text: str, colour: Colour, seam: Colour | None = None) -> Image.Image:
-    """A line of text, within a seam where it has to be legible on a picture, RGBA."""
+    """Draw a line of text as an RGBA image; a seam keeps it legible on a picture."""
     face, text, stroke = font(TEXT), drawable(text), 2 if seam else 0
     ascent, descent = face.getmetrics()
     size = round(face.getlength(text)) + 2 * stroke + 1, ascent + descent + 2 * stroke

@@ -1,6 +1,6 @@
 """Marks on a photograph: what a contract demands, and the robots.
 
-Nothing is decided here: places come from the references the checker measures against.
+Nothing is decided here: positions come from the references that the checker measures against.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -34,23 +34,23 @@ from .canvas import (
 )
 
 OUTLINE_DETAIL = 0.3
-"""Units of the page by which a drawn outline may differ from the measured one."""
-NOSE = 2.2
-"""How far the nose of a robot with a heading reaches, as a multiple of its disc's radius."""
+"""Greatest distance of a drawn outline from the measured one, units of the page."""
+HEADING_TICK = 2.2
+"""Length of a heading tick from the robot's centre, as a multiple of its disc's radius."""
 LABEL = 17.0
 NUMBERED = 60
-"""Up to so many robots bear their numbers."""
+"""The most robots that are drawn with their numbers."""
 SIZES = ((NUMBERED, (5.5, 14.0)), (400, (3.0, 8.0)), (np.inf, (1.3, 4.0)))
-"""Up to so many robots: least and greatest radius they are drawn with."""
+"""For up to this many robots: the least and greatest radius they are drawn with, units."""
 NEIGHBOUR_SHARE = 0.42
-"""Greatest radius as a share of the distance to the nearest neighbour."""
+"""A disc's greatest radius as a share of the distance to the nearest neighbour."""
 NUMBER_RADIUS = 9.5
-"""Units of the page; on a smaller disc no number is legible."""
+"""Least radius of a disc on which a number is legible, units of the page."""
 
 
 @dataclass(frozen=True)
 class Opening:
-    """The widest gap of a ring: where its middle is, image pixels, and how wide, px."""
+    """The widest gap of a ring: its middle (2,), image pixels, and its width, px."""
 
     middle: FloatArray
     width: float
@@ -72,20 +72,24 @@ def draw_areas(canvas: Canvas, contract: Contract, site: Site, points: FloatArra
 
 
 def draw_outline(canvas: Canvas, outline: Outline, colour: tuple[int, int, int] = TARGET) -> None:
-    """The outline and its holes as a light line with dark seams."""
+    """Draw an outline and its holes as a light line with dark seams."""
     simple = outline.polygon.simplify(OUTLINE_DETAIL / canvas.page_length(1.0))
     canvas.cased(rings(simple), colour, 2.6)
 
 
 def draw_met(canvas: Canvas, outlines: Iterable[Outline]) -> None:
-    """Other things that robots stand on or drive over."""
+    """Tint and outline other things that robots stand on or drive over."""
     for outline in outlines:
         canvas.tint(outline.polygon, MET, 0.25)
         draw_outline(canvas, outline, MET)
 
 
 def draw_guides(canvas: Canvas, contract: Contract, site: Site, points: FloatArray) -> None:
-    """Dashes along what robots stand on: gaps of a ring, a side or line, ways to corners."""
+    """Draw what each group is lined up with.
+
+    A curve (a ring, side or line), the straight gaps of a cage and the polygon through the corners
+    are dashed, the ways from robots to their corners solid; a centre is marked by a cross.
+    """
     for part in parts_of(contract, points, site):
         if not len(part.points):
             continue
@@ -104,7 +108,10 @@ def draw_guides(canvas: Canvas, contract: Contract, site: Site, points: FloatArr
 def label_openings(
     canvas: Canvas, contract: Contract, site: Site, points: FloatArray, labels: Labels
 ) -> None:
-    """The widest gap of every ring in px, or in metres if it can be, where the checker measures."""
+    """Label every ring's widest gap, as the checker measures it.
+
+    The width is in px, or in metres where the scale is known.
+    """
     for part in parts_of(contract, points, site):
         opening = _widest_opening(part)
         if opening is None:
@@ -119,26 +126,29 @@ def label_openings(
 
 
 def robot_size(canvas: Canvas, points: FloatArray, room: float = np.inf) -> float:
-    """Radius robots are drawn with, units of the page, so that neighbours stay apart.
+    """Return the radius to draw robots with, units of the page, so that neighbours do not touch.
 
     Args:
-        canvas: what they are drawn on.
+        canvas: the page they are drawn on.
         points: (n, 2), where they stand, image pixels.
-        room: to keep clear of other things, source px, as far as a disc remains visible.
+        room: greatest radius that keeps clear of other things, source px; exceeded where a disc
+            would be too small to see.
     """
     count = len(points)
     least, most = next(size for limit, size in SIZES if count <= limit)
     if count > 1:
-        # A quantile, because a few robots that stand wrongly must not shrink all.
+        # A quantile, so that a few misplaced robots do not shrink all discs.
         apart = np.quantile(nearest(points, points, 2)[0][:, 1], 0.1)
         room = min(room, NEIGHBOUR_SHARE * float(apart))
     return float(np.clip(canvas.page_length(room), least, most))
 
 
 def target_room(contract: Contract, site: Site, points: FloatArray) -> float:
-    """How far most robots outside a target stand from its edge, half as far as from a corner, px.
+    """Return the room that most robots outside a target have for their discs, px.
 
-    Infinite where no robot stands outside a target.
+    It is the 0.2 quantile of their distances from the target's edge and, of robots at corners, of
+    half their distances from the nearest corner. Robots exactly on corners do not count. Infinite
+    if there are no others outside a target.
     """
     away: list[FloatArray] = []
     for part in parts_of(contract, points, site):
@@ -155,12 +165,12 @@ def target_room(contract: Contract, site: Site, points: FloatArray) -> float:
 def draw_robots(
     canvas: Canvas, points: Mapping[str, FloatArray], radius: float, flagged: Collection[str] = ()
 ) -> None:
-    """Discs on the robots' exact places.
+    """Draw the robots as discs at their exact places.
 
     Args:
-        canvas: what to draw on.
-        points: robot to its place, (2,), image pixels.
-        radius: of the discs, units of the page.
+        canvas: the page to draw on.
+        points: place (2,) of each robot by its id, image pixels.
+        radius: radius of the discs, units of the page.
         flagged: robots to draw in red with a cross, above the others.
     """
     rim = float(np.clip(0.17 * radius, 0.6, 1.9))
@@ -175,8 +185,11 @@ def draw_robots(
 def draw_headings(
     canvas: Canvas, points: FloatArray, headings: Sequence[float | None], radius: float
 ) -> None:
-    """A nose on each robot that looks somewhere; to be drawn before its disc, of a radius."""
-    reach = NOSE * radius / canvas.page_length(1.0)
+    """Draw a heading tick on each robot that has a heading; call this before drawing the discs.
+
+    Headings are in degrees, from x towards y; `radius` is that of the discs, units of the page.
+    """
+    reach = HEADING_TICK * radius / canvas.page_length(1.0)
     for point, angle in zip(points, headings, strict=False):
         if angle is not None:
             turn = np.radians(angle)
@@ -192,12 +205,14 @@ def number_robots(
     away: Mapping[str, FloatArray],
     flagged: Collection[str] = (),
 ) -> None:
-    """Numbers in the discs where they fit and no cross is, else beside them.
+    """Number the robots: in the disc where the number fits and no cross is, else beside it.
+
+    More than 60 robots get no numbers. The discs are marked as occupied in any case.
 
     Args:
-        canvas, points, radius, flagged: as of draw_robots.
-        labels: where there is room beside.
-        away: robot to the direction its number may best stand in.
+        canvas, points, radius, flagged: as for draw_robots.
+        labels: the occupied parts of the page.
+        away: preferred direction (2,) of each robot's number from its disc, by robot.
     """
     reach = 1.4 * radius * canvas.unit
     on_page = {robot: canvas.at(point[None])[0] for robot, point in points.items()}
@@ -216,13 +231,16 @@ def number_robots(
 
 
 def draw_idle_robots(canvas: Canvas, points: Mapping[str, FloatArray], radius: float) -> None:
-    """Grey discs where robots stand that have no place in a plan."""
+    """Draw grey discs where robots without a place in the plan stand."""
     for point in points.values():
         canvas.disc(point, radius, IDLE, float(np.clip(0.17 * radius, 0.6, 1.9)))
 
 
-def directions(contract: Contract, site: Site, points: FloatArray) -> list[FloatArray]:
-    """For each place the way off its target, (2,), zero where there is none such."""
+def outward_vectors(contract: Contract, site: Site, points: FloatArray) -> list[FloatArray]:
+    """Return for each place the vector (2,) from its target's centre, px.
+
+    It is zero for places that are not outside a target.
+    """
     ways: list[FloatArray] = []
     for part in parts_of(contract, points, site):
         off = part.group.relation in OUTSIDE
@@ -233,7 +251,10 @@ def directions(contract: Contract, site: Site, points: FloatArray) -> list[Float
 
 
 def _guides(part: Part) -> list[FloatArray]:
-    """Polylines to dash, image pixels: straight across a cage's gaps, else the reference curve."""
+    """Return the polylines to dash: straight across a cage's gaps, else the reference curve.
+
+    Each is (k, 2), image pixels. Robots inside a target or placed freely have none.
+    """
     if part.group.relation == "inside" or _is_free(part):
         return []
     curve = curve_of(part)
@@ -251,7 +272,11 @@ def _is_free(part: Part) -> bool:
 
 
 def _widest_opening(part: Part) -> Opening | None:
-    """A cage's straight between robots' edges, another ring's along the curve."""
+    """Return a ring's widest gap, or None if the group is no ring or has fewer than two robots.
+
+    In a cage, or a ring that has to leave an opening, it is the straight gap between robots' edges;
+    in other rings that between their centres, measured along the curve.
+    """
     if part.group.relation not in ("around", "cage") or len(part.points) < 2:
         return None
     curve = curve_of(part)
@@ -268,7 +293,7 @@ def _widest_opening(part: Part) -> Opening | None:
 
 
 def _gap_along(points: FloatArray, stations: FloatArray, curve: Curve) -> Opening | None:
-    """The widest gap between robots in order along a ring in one piece."""
+    """Return the widest gap along a ring between robots in order, None if it is in pieces."""
     if len(curve.lines) != 1:
         return None
     cut = 0.0 if curve.closed else curve.cut(len(points))
@@ -283,13 +308,13 @@ def _gap_along(points: FloatArray, stations: FloatArray, curve: Curve) -> Openin
 
 
 def _feet_on_curve(points: FloatArray, curve: Curve) -> FloatArray:
-    """Arc length of each point's foot on the curve, (n,), px."""
+    """Return the arc length of each point's foot on the curve, (n,), px."""
     feet = shapely.line_locate_point(curve.geometry(), shapely.points(points))
     return np.asarray(feet, dtype=float)
 
 
 def _corner_links(part: Part, corners: FloatArray) -> list[FloatArray]:
-    """From each robot to the corner it is matched with."""
+    """Return a line (2, 2) from each robot to its corner, matched for the least total length."""
     from scipy.optimize import linear_sum_assignment
 
     distance = np.linalg.norm(part.points[:, None] - corners[None], axis=2)
@@ -298,7 +323,7 @@ def _corner_links(part: Part, corners: FloatArray) -> list[FloatArray]:
 
 
 def rings(geometry: BaseGeometry) -> list[FloatArray]:
-    """Every boundary line of an area, closed, (k, 2) each."""
+    """Return the boundary lines of an area, each a closed line (k, 2)."""
     lines = shapely.get_parts(shapely.boundary(geometry))
     return [
         shapely.get_coordinates(x) for x in lines if isinstance(x, LineString | MultiLineString)

@@ -1,7 +1,7 @@
 """Draws numbered candidates, each outlined in a colour that differs from its neighbours'.
 
-A person must be able to answer "the third": a number stands inside its thing where most of the
-thing stays visible, else beside it.
+A person must be able to answer "the third": a number stands inside its object where most of the
+object stays visible, else beside it.
 """
 
 from collections.abc import Sequence
@@ -18,22 +18,22 @@ from .canvas import INK, MARKS, Canvas, Colour, Labels
 from .marks import OUTLINE_DETAIL, rings
 
 FEW, LARGE, USUAL, LEAST = 12, 23.0, 17.0, 12.0
-"""Up to so many numbers are written large; where things crowd none is smaller than the least."""
+"""Up to FEW numbers are LARGE, units; more are USUAL, or smaller in a crowd, but at least LEAST."""
 PITCH_SHARE = 0.35
-"""Size of the numbers as a share of the distance from thing to thing, where things crowd."""
+"""Size of the numbers in a crowd, as a share of the distance between neighbouring objects."""
 LINE, SEAM = 2.4, 1.4
 INSET = 3.0
-"""Units of a thing that stay in sight around a number in it."""
+"""Width of the margin around a number within which its object stays visible, units."""
 COVERED = 0.3
-"""The share of a thing that its number may cover."""
+"""Greatest share of an object that its number may cover."""
 WAYS = 24
-"""Directions in which there may be room beside a thing."""
+"""Number of directions tried when placing a number beside an object."""
 GAP = 3.0
-"""Distance from a thing to a number beside it, units."""
+"""Distance from an object to a number beside it, units."""
 
 
 def colours_of(outlines: Sequence[Outline]) -> list[Colour]:
-    """A colour for each, the one that its neighbours have least."""
+    """Choose a colour for each outline, the one that is least used nearby."""
     edges = [o.polygon.simplify(1.0).boundary for o in outlines]
     chosen: list[int] = []
     for edge in edges:
@@ -47,7 +47,7 @@ def colours_of(outlines: Sequence[Outline]) -> list[Colour]:
 def draw_numbered(
     canvas: Canvas, candidates: Sequence[Candidate], colours: Sequence[Colour], labels: Labels
 ) -> None:
-    """Outlines with their holes, and the numbers: 3 for c3."""
+    """Draw the candidates' outlines with their holes, and their numbers: 3 for c3."""
     _draw_outlines(canvas, candidates, colours)
     text = _text_size(canvas, candidates)
     names = [c.id.removeprefix("c") for c in candidates]
@@ -77,7 +77,7 @@ def _text_size(canvas: Canvas, candidates: Sequence[Candidate]) -> float:
 def _draw_outlines(
     canvas: Canvas, candidates: Sequence[Candidate], colours: Sequence[Colour]
 ) -> None:
-    """All seams lie below all lines, and what is small lies above what is large."""
+    """Draw the outlines: all seams below all lines, and small objects above large ones."""
     detail = OUTLINE_DETAIL / canvas.page_length(1.0)
     largest = sorted(zip(candidates, colours, strict=True), key=lambda c: -c[0].outline.area)
     lines = [(rings(c.outline.polygon.simplify(detail)), colour) for c, colour in largest]
@@ -87,7 +87,7 @@ def _draw_outlines(
 
 
 def _on_page(canvas: Canvas, outline: Outline) -> BaseGeometry:
-    """The thing in page px, as simple as placing a number needs."""
+    """Return the outline in page px, simplified as far as placing a number allows."""
     placed = shapely.transform(outline.polygon, canvas.at)
     return shapely.make_valid(placed.simplify(canvas.unit))
 
@@ -95,7 +95,10 @@ def _on_page(canvas: Canvas, outline: Outline) -> BaseGeometry:
 def _place_in(
     thing: BaseGeometry, things: Sequence[BaseGeometry], size: FloatArray, inset: float
 ) -> FloatArray | None:
-    """Middle of a place for a number in a thing, off the smaller things in it, (2,), page px."""
+    """Return the centre (2,) of a place for a number inside an object, page px.
+
+    It keeps clear of smaller objects on this one. None if there is no such place.
+    """
     if float(np.prod(size)) > COVERED * thing.area:
         return None
     smaller = [t for t in things if t.area < thing.area and t.intersects(thing)]
@@ -116,7 +119,7 @@ def _place_beside(
     size: FloatArray,
     labels: Labels,
 ) -> FloatArray:
-    """Middle of the place beside a thing where a number hides least, (2,), page px."""
+    """Return the centre (2,) of the place beside an object where a number hides least, page px."""
     turns = -np.pi / 4 + np.arange(WAYS) * 2 * np.pi / WAYS
     ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     rim = shapely.get_coordinates(thing)

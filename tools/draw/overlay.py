@@ -1,7 +1,7 @@
-"""Pictures for people and models: a plan on its photograph, a look at a scene, a deployment.
+"""Pictures for people and models: a plan on its photograph, and a look at a scene.
 
-Only drawing: every position, outline and verdict comes from elsewhere. Photographs of any size
-come out at about the same size, so that strokes and text always read.
+This module only draws: every position, outline and verdict comes from elsewhere. Photographs of
+any size come out at about the same size, so that strokes and text are always legible.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,6 @@ from .captions import draw_bars, draw_footer, make_page
 from .change import draw_moves, moves_between
 from .escape_path import draw_escape
 from .marks import (
-    directions,
     draw_areas,
     draw_guides,
     draw_headings,
@@ -33,6 +32,7 @@ from .marks import (
     draw_robots,
     label_openings,
     number_robots,
+    outward_vectors,
     robot_size,
     target_room,
 )
@@ -42,9 +42,9 @@ from .scale_bar import draw_scale_bar
 from .text import drawable
 
 LEAST_LONG, MOST_LONG = 1200, 1500
-"""The photograph's long side on the page, page px."""
+"""Least and greatest length of the photograph's long side on the page, page px."""
 UNITS = 1200
-"""The long side in units of strokes and text."""
+"""Length of the long side in units of strokes and text."""
 NARROWEST = 700.0
 TITLE_LINES = 3
 TAG = 16.0
@@ -57,32 +57,32 @@ MEASURES = (
     ("spacing_ratio", "spacing ratio {:.2f}"),
     ("min_spacing_px", "closest pair {}"),
 )
-"""What the footer tells: of those measured the first three."""
+"""Measures in the footer, most important first; it shows at most three facts."""
 CAGED = {
     "certified": "cannot get out",
     "not certified": "may get out",
     "gets out": "can get out",
 }
 NEAR = 2.0
-"""Robots more than so many long sides of the picture away are not led lines to."""
+"""Robots are not drawn if a coordinate exceeds this many long sides of the picture."""
 
 
 def draw_plan(
     picture: Picture, world: World, plan: Plan, title: str, before: Plan | None = None
 ) -> Image.Image:
-    """The photograph with the contract, the robots and the verdict.
+    """Draw the photograph with the contract, the robots and the verdict.
 
     Areas where robots' centres may stand are tinted; other things that robots stand on or drive
-    over are orange, as are rings about who stands there; what a ring leaves open, a side, a line
-    and the ways to corners are dashed. Robots with a finding are red with a cross. Where a target
-    was found to get out of a cage, its way is shown. Where the scale is known, lengths are given in
-    metres too and the footer has a scale bar.
+    over are orange, and so are rings around the robots that stand on them or at the picture's
+    border. The curves that robots stand along are dashed, see `draw_guides`. Robots with a finding
+    are red with a cross. If a target was found to get out of a cage, its path is shown. If the
+    scale is known, lengths are given in metres too and the footer has a scale bar.
 
     Args:
-        world: what the plan was made in.
-        plan: certified or not; robots at no finite place are left out.
+        world: the world that the plan was made in.
+        plan: certified or not; robots at no finite place, or far outside the picture, are left out.
         title: usually the instruction; in any language, of any length.
-        before: the plan that an edit made this one from: arrows show who moves.
+        before: the plan that an edit made this one from; arrows show which robots move.
 
     Returns:
         RGB, the photograph's long side 1200 to 1500 px, with a title above and a footer below.
@@ -118,10 +118,10 @@ def draw_plan(
 def draw_look(
     picture: Picture, world: World, *, candidates: Sequence[Candidate] = ()
 ) -> Image.Image:
-    """The photograph with what coordinates and ids can be read from.
+    """Draw the photograph so that coordinates and ids can be read from it.
 
     Args:
-        world: its targets are outlined and tagged with their ids.
+        world: the world whose targets are outlined and tagged with their ids.
         candidates: outlined and numbered, 3 for c3.
 
     Returns:
@@ -139,7 +139,7 @@ def draw_look(
 def draw_world(
     canvas: Canvas, world: World, plan: Plan | None, candidates: Sequence[Candidate]
 ) -> None:
-    """Targets with their ids, a plan's robots and numbered candidates, on a photograph."""
+    """Draw targets with their ids, a plan's robots and numbered candidates on a photograph."""
     labels = Labels(canvas.photo)
     count = len(world.targets)
     colours = colours_of([thing.outline for thing in (*world.targets, *candidates)])
@@ -157,15 +157,15 @@ def _long(picture: Picture) -> int:
 
 
 def _near_picture(points: FloatArray, site: Site) -> NDArray[np.bool_]:
-    """Which points are in the picture or not absurdly far from it, (n,)."""
-    # NaN compares false.
+    """Return a mask (n,) of the points inside the picture or not absurdly far from it."""
+    # NaN compares false, so points that are not finite are left out.
     return np.all(np.abs(points) <= NEAR * max(site.room), axis=1)
 
 
 def _draw_robots(
     canvas: Canvas, world: World, plan: Plan, labels: Labels, before: Plan | None = None
 ) -> None:
-    """Discs and the robots' numbers, who moves; the labels learn where robots are."""
+    """Draw the robots with their headings, moves and numbers, and mark them in the labels."""
     contract, points = plan.formation.contract, plan.formation.points
     site, names = world.site(contract), plan.formation.robot_of_place
     near = _near_picture(points, site)
@@ -187,12 +187,15 @@ def _draw_robots(
         draw_moves(canvas, moves_between(before, plan), radius)
         draw_headings(canvas, points, plan.formation.place_headings, radius)
     draw_robots(canvas, shown, radius, flagged)
-    away = dict(zip(names, directions(contract, site, points), strict=True))
+    away = dict(zip(names, outward_vectors(contract, site, points), strict=True))
     number_robots(canvas, shown, radius, labels, away, flagged)
 
 
 def idle_robots(world: World, plan: Plan) -> dict[str, FloatArray]:
-    """Robots without a place in a plan that has robots, and where they stand, (2,) px."""
+    """Return where robots without a place in the plan stand, (2,) px by id.
+
+    Empty if the plan does not choose its robots.
+    """
     busy = set(plan.formation.robots)
     idle = [pose for pose in world.robots if busy and pose.id not in busy]
     return {pose.id: np.array([pose.x, pose.y]) for pose in idle}
@@ -208,7 +211,7 @@ def _badge(plan: Plan, scale: float | None) -> tuple[str, Colour]:
 
 
 def _plan_facts(plan: Plan, scale: float | None) -> list[str]:
-    """Plan id, robots and what was measured, most important first."""
+    """Return the plan id, the number of robots and up to three facts, most important first."""
     measured = plan.verdict.measures
     count = len(plan.formation.positions)
     facts = [
@@ -223,7 +226,7 @@ def _plan_facts(plan: Plan, scale: float | None) -> list[str]:
 
 
 def _draw_tag(canvas: Canvas, name: str, box: Box, colour: Colour, labels: Labels) -> None:
-    """An id at the upper left of what it names."""
+    """Draw an id near the upper left corner of a box (x0, y0, x1, y1), image pixels."""
     text = canvas.shortened(drawable(name), TAG, canvas.size[0] / 3)
     anchor = canvas.at(np.array([box[:2]]))[0]
     size = canvas.chip_size(text, TAG)

@@ -1,4 +1,4 @@
-"""Films of deployments as files: a GIF, an MP4, or a strip of moments as PNG, by the name."""
+"""Films of deployments as files: a GIF, an MP4, or a strip of moments as PNG, by file name."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -32,16 +32,16 @@ from .canvas import (
 from .film import draw_deployment
 
 FILMS = (".gif", ".mp4", ".png")
-"""Endings of the names of films."""
+"""File name extensions of films."""
 TICK_MS, LAST_MS = 80, 2000
-"""How long a frame is shown, and the last one."""
+"""How long each frame is shown, and how long the last one."""
 GIF_FRAMES, GIF_BYTES = 48, 3_000_000
 GIF_SIDES = (640, 520, 420, 320)
-"""Sides tried in turn until the file is small enough."""
+"""Longest sides tried in turn until the file is small enough, px."""
 MP4_SIDE, MP4_CODEC = 960, "mp4v"
-"""Of those that OpenCV's wheels can write, VP9 plays in browsers but takes twenty times as long."""
+"""Of the codecs in OpenCV's wheels, VP9 plays in browsers but takes twenty times as long."""
 STRIP, STRIP_COLUMNS, STRIP_GAP = 6, 3, 6
-"""Moments in a strip, how many side by side, and the room between them, px."""
+"""Number of moments in a strip, how many stand side by side, and the gap between them, px."""
 STYLE: tuple[Colour, ...] = (
     ROBOT,
     WHITE,
@@ -54,7 +54,7 @@ STYLE: tuple[Colour, ...] = (
     ALLOWED,
     MET,
 )
-"""Colours a palette made from the photograph alone would lose."""
+"""Colours that a palette made from the photograph alone would lose."""
 
 
 def save_film(
@@ -66,19 +66,21 @@ def save_film(
     title: str,
     moved: Sequence[Rigid] = (),
 ) -> None:
-    """Write a deployment as the film that a name's ending asks for; see `draw_deployment`.
+    """Write a deployment as a film in the format of the file name's extension.
+
+    For the arguments see `draw_deployment`.
 
     Raises:
-        InputError: another ending, or the file cannot be written.
+        InputError: the extension is none of `FILMS`, or the file cannot be written.
     """
     kind, made = path.suffix.lower(), (picture, world, plan, frames, title)
     drawn = partial(draw_deployment, *made, moved=moved)
     if kind == ".mp4":
         save_mp4(drawn(side=MP4_SIDE), path)
     elif kind == ".gif":
-        save_gif(drawn(moments=_evenly(len(frames), GIF_FRAMES)), path)
+        save_gif(drawn(moments=_even_indices(len(frames), GIF_FRAMES)), path)
     elif kind == ".png":
-        save_strip(drawn(moments=_evenly(len(frames), STRIP)), path)
+        save_strip(drawn(moments=_even_indices(len(frames), STRIP)), path)
     else:
         raise InputError(f"{path} is no film's name; let it end in {', '.join(FILMS)}.")
 
@@ -86,15 +88,15 @@ def save_film(
 def save_gif(frames: Sequence[Image.Image], path: Path) -> None:
     """Write a looping GIF of 12 frames a second that rests on its last frame for 2 s.
 
-    Of more than 48 frames as many are kept, evenly; the first frame's size goes for all and is
-    reduced to sides of 640 px, or less until the file has under 3 MB. The file appears whole
-    or not at all.
+    Of more than 48 frames, 48 evenly spaced ones are kept. All get the first frame's size, reduced
+    to sides of at most 640 px, or less until the file is at most 3 MB (but never below 320 px). The
+    file is written whole or not at all.
 
     Raises:
         InputError: there are no frames, or the file cannot be written.
     """
     _check_frames(frames)
-    kept = [frames[i].convert("RGB") for i in _evenly(len(frames), GIF_FRAMES)]
+    kept = [frames[i].convert("RGB") for i in _even_indices(len(frames), GIF_FRAMES)]
     data = b""
     for side in GIF_SIDES:
         data = _gif_bytes(kept, side)
@@ -148,19 +150,19 @@ def _check_frames(frames: Sequence[Image.Image]) -> None:
         raise InputError("There are no frames to save; draw at least one.")
 
 
-def _evenly(count: int, most: int) -> list[int]:
-    """At most so many of 0 to count - 1, evenly, the first and the last among them."""
+def _even_indices(count: int, most: int) -> list[int]:
+    """Return at most `most` evenly spaced indices of `count`, including the first and the last."""
     return [round(float(i)) for i in np.linspace(0, count - 1, min(count, most))]
 
 
 def _gif_bytes(frames: Sequence[Image.Image], side: int) -> bytes:
-    """The frames as GIF with no side over a length, one palette for all."""
+    """Encode the frames as a GIF with no side longer than `side` px and one shared palette."""
     width, height = frames[0].size
     factor = min(side / max(width, height), 1.0)
     size = (max(round(width * factor), 1), max(round(height * factor), 1))
     sized = [f if f.size == size else f.resize(size, Image.Resampling.LANCZOS) for f in frames]
     palette = _shared_palette(sized)
-    # Without dithering what stands still stays the same, which is most of a small file.
+    # Without dithering, what stands still stays identical, which is what keeps the file small.
     flat = [f.quantize(palette=palette, dither=Image.Dither.NONE) for f in sized]
     buffer = BytesIO()
     flat[0].save(
@@ -177,7 +179,10 @@ def _gif_bytes(frames: Sequence[Image.Image], side: int) -> bytes:
 
 
 def _shared_palette(frames: Sequence[Image.Image]) -> Image.Image:
-    """A palette for all frames: the style's colours, and the rest from first, middle and last."""
+    """Return a palette for all frames: the style's colours, the rest from three of the frames.
+
+    These are the first, the middle and the last one.
+    """
     width, height = frames[0].size
     sample = Image.new("RGB", (width, 3 * height))
     for row, frame in enumerate((frames[0], frames[len(frames) // 2], frames[-1])):

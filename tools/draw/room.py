@@ -1,7 +1,7 @@
-"""A room as a camera on its ceiling or wall sees it, where no camera and no robots are.
+"""A simulated room as a camera on its ceiling or wall sees it, for use without a camera or robots.
 
 The floor is in metres: x to the right and y up in the picture of a camera straight above, z up.
-What is measured in such a picture can be held against the truth, which is known here.
+Since the truth is known here, measurements made in such a picture can be compared with it.
 """
 
 import math
@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 from ..geometry.outline import FloatArray
 
 Pose = tuple[float, float, float]
-"""x and y on the floor, m, and the heading about the x axis towards the y axis, radians."""
+"""x and y on the floor, m, and the heading, radians from the x axis towards the y axis."""
 Pixels = NDArray[np.uint8]
 
 FINE = 2
-"""Everything is drawn so many times as large, so that edges are smooth."""
+"""Supersampling factor along each axis, which makes edges smooth."""
 FLOOR_SCALE = 200
-"""Pixels of the floor's texture to a metre."""
+"""Pixels of the floor's texture per metre."""
 CELL = 6
-"""Pixels of a printed tag's cell."""
+"""Side of a printed tag's cell, px."""
 MARGIN = 0.25
-"""Share of its size that a picture without distortion reaches beyond one with it."""
+"""Margin drawn on each side of a picture that is then distorted, as a share of its size."""
 BODY, THING, WALL = (70, 66, 62), (40, 110, 215), (52, 50, 48)
 SHADE = 0.62
 
@@ -37,8 +37,8 @@ class Sheet:
 
     Attributes:
         pixels: (h, w) or (h, w, 3) BGR uint8.
-        pose: of its centre; its right side points along the heading.
-        width: of its pixels, m; its height follows.
+        pose: pose of its centre; its right side points along the heading.
+        width: width of the picture, m; its height follows from its pixels.
     """
 
     pixels: Pixels
@@ -47,10 +47,12 @@ class Sheet:
 
 
 def tag_sheet(dictionary: str, tag: int, pose: Pose, size: float) -> Sheet:
-    """A printed tag with its white border.
+    """Return a printed tag with its white border.
 
     Args:
-        dictionary: a name of OpenCV's, such as DICT_4X4_50.
+        dictionary: OpenCV's name of the dictionary, such as DICT_4X4_50.
+        tag: id of the tag in the dictionary.
+        pose: pose of its centre.
         size: side of its black square, m.
     """
     known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
@@ -62,22 +64,23 @@ def tag_sheet(dictionary: str, tag: int, pose: Pose, size: float) -> Sheet:
 
 @dataclass(frozen=True)
 class Room:
-    """A room, its camera, and what its robots and its thing look like.
+    """A room, its camera, and what its robots and its one object look like.
 
     Attributes:
         size: width and depth of the floor, m, a corner of which is (0, 0).
-        eye, aim: where the camera is (x, y, z) and the point (x, y) of the floor it looks at, m.
-        picture: width and height, px.
+        eye, aim: position (x, y, z) of the camera and the point (x, y) on the floor it looks at, m.
+        picture: width and height of the camera's picture, px.
         view: the camera's horizontal field of view, degrees.
-        distortion: k1, k2, p1, p2, k3 as of OpenCV.
-        sheets: what lies on the floor.
-        dictionary, tag_size, tag_height: of the tags on robots; side and height, m.
-        thing: width, depth and height of the box-like thing, m.
-        textured: whether it is, or plain.
-        light: (x, y) by which a shadow moves away for each metre of height.
-        noise: standard deviation, grey levels.
+        distortion: lens distortion k1, k2, p1, p2, k3 as in OpenCV; empty for none.
+        sheets: pictures that lie on the floor.
+        dictionary: OpenCV's name of the dictionary of the tags on robots.
+        tag_size, tag_height: side of these tags and their height above the floor, m.
+        thing: width, depth and height of the box-shaped object, m.
+        textured: whether the object is textured rather than plain.
+        light: offset (x, y) of a shadow for each metre of height.
+        noise: standard deviation of the sensor noise, grey levels.
         blur: length of a blur along the picture's rows, px; 0 or 1 for none.
-        seed: of textures.
+        seed: seed of the textures and of the noise pattern.
     """
 
     size: tuple[float, float] = (4.0, 3.0)
@@ -99,31 +102,31 @@ class Room:
 
     @property
     def camera_matrix(self) -> FloatArray:
-        """(3, 3), px, pixel centres at .0."""
+        """The camera matrix (3, 3), px, with pixel centres at integers."""
         width, height = self.picture
         focal = width / 2 / math.tan(math.radians(self.view) / 2)
         return np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1.0]])
 
     @property
     def homography(self) -> FloatArray:
-        """(3, 3), from the undistorted picture, px, to the floor, m."""
+        """The homography (3, 3) from the undistorted picture, px, to the floor, m."""
         found = np.linalg.inv(self.camera_matrix @ self._pose[:, [0, 1, 3]])
         return found / found[2, 2]
 
     def seen_at(self, points: FloatArray) -> FloatArray:
-        """(n, 2) px of the picture, distorted as it is, for (n, 3) m."""
+        """Project points (n, 3), m, into the distorted picture, (n, 2), px."""
         turn, _ = cv2.Rodrigues(self._pose[:, :3])
         lens = np.array(self.distortion or (0.0, 0.0, 0.0, 0.0))
         found, _ = cv2.projectPoints(points, turn, self._pose[:, 3], self.camera_matrix, lens)
         return np.asarray(found, dtype=float).reshape(-1, 2)
 
     def frame(self, robots: Mapping[int, Pose], thing: Pose | None = None, seed: int = 0) -> Pixels:
-        """What the camera sees.
+        """Render what the camera sees.
 
         Args:
-            robots: where robots stand, by the ids of their tags, whose right sides point ahead.
-            thing: where the box-like thing stands.
-            seed: of the noise.
+            robots: poses of the robots by tag id; a tag's right side points ahead.
+            thing: pose of the box-shaped object; None leaves it out.
+            seed: seed that varies the noise from frame to frame.
 
         Returns:
             (H, W, 3) BGR uint8.
@@ -139,10 +142,10 @@ class Room:
             self._prism(canvas, discs[tag], self.tag_height, BODY)
             sheet = tag_sheet(self.dictionary, tag, robots[tag], self.tag_size)
             self._lay(canvas, sheet, self.tag_height)
-        return self._taken(canvas, seed)
+        return self._camera_picture(canvas, seed)
 
-    def _taken(self, canvas: Pixels, seed: int) -> Pixels:
-        """The canvas through lens and sensor."""
+    def _camera_picture(self, canvas: Pixels, seed: int) -> Pixels:
+        """Apply lens, blur and sensor noise to the canvas."""
         if self.distortion:
             canvas = np.asarray(cv2.remap(canvas, *self._lens, cv2.INTER_LINEAR), np.uint8)
         seen = cv2.resize(canvas, self.picture, interpolation=cv2.INTER_AREA)
@@ -155,7 +158,7 @@ class Room:
 
     @cached_property
     def _pose(self) -> FloatArray:
-        """(3, 4), from the floor's frame to the camera's, which looks along its z axis."""
+        """The transform (3, 4) from floor to camera coordinates; the camera looks along its z."""
         eye = np.array(self.eye)
         ahead = np.array([*self.aim, 0.0]) - eye
         ahead /= np.linalg.norm(ahead)
@@ -171,7 +174,7 @@ class Room:
 
     @cached_property
     def _projection(self) -> FloatArray:
-        """(3, 4), from the floor's frame, m, to the canvas, px."""
+        """The projection (3, 4) from floor coordinates, m, to the canvas, px."""
         matrix = self.camera_matrix.copy()
         matrix[:2, 2] += self._margin
         matrix[:2] *= FINE
@@ -179,14 +182,14 @@ class Room:
         return matrix @ self._pose
 
     def _on_canvas(self, points: FloatArray, height: float) -> FloatArray:
-        """(n, 2) px for (n, 2) m at a height, m."""
+        """Project points (n, 2), m, at a height, m, onto the canvas, (n, 2), px."""
         rows = np.column_stack([points, np.full(len(points), height), np.ones(len(points))])
         found = rows @ self._projection.T
         return found[:, :2] / found[:, 2:]
 
     @cached_property
     def _lens(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Where each fine pixel of the picture lies on the canvas."""
+        """The x and y coordinates on the canvas of each supersampled pixel of the picture."""
         width, height = self.picture
         rows, columns = np.mgrid[0 : height * FINE, 0 : width * FINE].astype(np.float32)
         seen = (np.stack([columns, rows], axis=-1).reshape(-1, 1, 2) + 0.5) / FINE - 0.5
@@ -197,7 +200,7 @@ class Room:
 
     @cached_property
     def _empty(self) -> Pixels:
-        """The canvas with the floor and what lies on it."""
+        """The canvas with the floor and the sheets on it."""
         width, height = np.add(self.picture, np.multiply(2, self._margin)) * FINE
         canvas = np.full((height, width, 3), WALL, np.uint8)
         centre = self.size[0] / 2, self.size[1] / 2, 0.0
@@ -207,7 +210,7 @@ class Room:
         return canvas
 
     def _floor(self) -> Pixels:
-        """Tiles of half a metre with spots and scratches of many sizes, (h, w, 3) BGR."""
+        """Return a floor with tiles of half a metre and spots of many sizes, (h, w, 3) BGR."""
         width, height = (round(side * FLOOR_SCALE) for side in self.size)
         grey = 158.0 + _cloud((height, width), self.seed)
         for at in range(FLOOR_SCALE // 2, max(width, height), FLOOR_SCALE // 2):
@@ -223,13 +226,13 @@ class Room:
         return np.rint(grain).astype(np.int16)
 
     def _lay(self, canvas: Pixels, sheet: Sheet, height: float) -> None:
-        """Put a flat picture into the room."""
+        """Lay a sheet flat at a height, m."""
         rows, columns = sheet.pixels.shape[:2]
         places = _corners(sheet.pose, sheet.width, sheet.width * rows / columns)
         self._put(canvas, sheet.pixels, self._on_canvas(places, height))
 
     def _put(self, canvas: Pixels, pixels: Pixels, corners: FloatArray) -> None:
-        """Draw a picture into a quadrilateral, its top left corner first."""
+        """Warp a picture into a convex quadrilateral (4, 2), px, its top left corner first."""
         rows, columns = pixels.shape[:2]
         left, top = np.clip(np.floor(corners.min(axis=0)), 0, None).astype(int)
         right, bottom = np.minimum(np.ceil(corners.max(axis=0)) + 1, canvas.shape[1::-1])
@@ -247,7 +250,7 @@ class Room:
         part[mask > 0] = np.asarray(drawn)[mask > 0]
 
     def _shadow(self, canvas: Pixels, base: FloatArray, height: float) -> None:
-        """Darken the floor behind what stands on it, (n, 2) m."""
+        """Darken the floor where a body on a base (n, 2), m, casts its shadow."""
         if height > 0:
             away = base + height * np.array(self.light)
             hull = _hull(self._on_canvas(np.vstack([base, away]), 0.0))
@@ -258,7 +261,7 @@ class Room:
     def _prism(
         self, canvas: Pixels, base: FloatArray, height: float, colour: tuple[int, int, int]
     ) -> None:
-        """A body with upright sides on a base, (n, 2) m."""
+        """Draw a body with upright sides on a base (n, 2), m."""
         ends = [self._on_canvas(base, 0.0), self._on_canvas(base, height)]
         dark = tuple(round(0.6 * part) for part in colour)
         _fill(canvas, _hull(np.vstack(ends)), dark)
@@ -274,7 +277,7 @@ class Room:
 
 
 def _corners(pose: Pose, width: float, depth: float) -> FloatArray:
-    """(4, 2) m of a rectangle, clockwise from above, its left side's far end first."""
+    """Return a rectangle's corners (4, 2), m, clockwise from above, the far left one first."""
     half = np.array([(-1, 1), (1, 1), (1, -1), (-1, -1)]) * (width / 2, depth / 2)
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     return half @ np.array([(cos, sin), (-sin, cos)]) + pose[:2]
@@ -286,7 +289,7 @@ def _disc(pose: Pose, radius: float) -> FloatArray:
 
 
 def _cloud(shape: tuple[int, ...], seed: int) -> FloatArray:
-    """Noise of many sizes, grey levels about 0."""
+    """Return noise of several scales, grey levels around 0."""
     rng, found = np.random.default_rng(seed), np.zeros(shape)
     for cell, strength in ((64, 5.0), (16, 3.5), (4, 2.5), (1, 1.5)):
         coarse = rng.normal(0, strength, (shape[0] // cell + 2, shape[1] // cell + 2))
@@ -299,6 +302,6 @@ def _hull(points: FloatArray) -> FloatArray:
 
 
 def _fill(canvas: Pixels, points: FloatArray, colour: Iterable[int]) -> None:
-    """Fill a convex polygon, px, at a sixteenth of a pixel."""
+    """Fill a convex polygon (n, 2), px, to a sixteenth of a pixel."""
     sixteenths = np.rint(points * 16).astype(np.int32)
     cv2.fillConvexPoly(canvas, sixteenths, tuple(colour), shift=4)

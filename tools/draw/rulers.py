@@ -1,6 +1,6 @@
 """Rulers along the edges of a photograph, in its own pixels.
 
-They stand in the page's margins and hide nothing; an edge without a margin has none.
+They stand in the page's margins and hide nothing; an edge without a margin gets no ruler.
 """
 
 import numpy as np
@@ -9,11 +9,11 @@ from .canvas import INK, PAPER, Canvas, Margins
 
 TEXT, LABELS = 15.0, 16
 RULER: Margins = (52, 30, 52, 30)
-"""Room for the rulers, units of the page."""
+"""Margins for the rulers, units of the page."""
 
 
 def draw_rulers(canvas: Canvas) -> None:
-    """Ticks at round pixels of the photograph, with their numbers, in every margin."""
+    """Draw ticks at round pixels of the photograph, with their numbers, in every margin."""
     canvas.fill_margins(PAPER)
     for axis in (0, 1):
         step = _label_step(canvas, axis)
@@ -23,7 +23,7 @@ def draw_rulers(canvas: Canvas) -> None:
 
 
 def _draw_tick(canvas: Canvas, axis: int, value: int, *, labelled: bool) -> None:
-    """One tick of the rulers for x (axis 0) or y (axis 1)."""
+    """Draw one tick on each of the rulers for x (axis 0) or y (axis 1)."""
     unit = canvas.unit
     along = float(canvas.at(np.full((1, 2), float(value)))[0, axis]) + 0.5
     reach, half = (8 if labelled else 4) * unit, 0.75 * unit
@@ -35,7 +35,7 @@ def _draw_tick(canvas: Canvas, axis: int, value: int, *, labelled: bool) -> None
         low, high = sorted((edge, edge + out * reach))
         tick = (along - half, low, along + half, high)
         canvas.box(tick if axis == 0 else (tick[1], tick[0], tick[3], tick[2]), INK)
-        if labelled:  # whole: half a number is another number
+        if labelled:  # kept whole on the page: half a number reads as another number
             half_label = canvas.text_size(str(value), TEXT)[axis] / 2
             whole = min(max(along - 0.5, half_label), canvas.size[axis] - 1 - half_label)
             where = np.array([whole, edge + out * middle])
@@ -43,7 +43,7 @@ def _draw_tick(canvas: Canvas, axis: int, value: int, *, labelled: bool) -> None
 
 
 def _label_step(canvas: Canvas, axis: int) -> int:
-    """The smallest of 1, 2, 5, 10, 20, ... px whose labels are neither too many nor too tight."""
+    """Return the smallest of 1, 2, 5, 10, ... px with labels neither too many nor too close."""
     count = canvas.source[axis]
     widest = canvas.text_size(f"{canvas.origin[axis] + count}0", TEXT)[axis]
     for power in range(6):

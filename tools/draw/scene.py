@@ -1,6 +1,6 @@
-"""A world as plain numbers for a page to draw: outlines, areas, robots and their verdicts.
+"""A world as plain data for a web page to draw: outlines, areas, robots and their verdicts.
 
-Frame: image pixels, x right, y down. Outlines are simplified to what a screen shows.
+Frame: image pixels, x right, y down. Outlines are simplified to what a screen can show.
 """
 
 import math
@@ -23,19 +23,19 @@ from ..world import PlanNode, World
 from .marks import rings
 
 DETAIL = 0.5
-"""How far a line on the page may be from what it stands for, px."""
+"""Greatest deviation of a line on the page from the true one, px."""
 MOST_PLANS = 40
-"""Plans that are listed, the newest."""
+"""The most plans that are listed, the newest ones."""
 TELLING = ("min_clearance_px", "min_spacing_px", "widest_opening_px", "worst_gap_px")
-"""Measures that a certificate in words has."""
+"""Measures that a page lists for a plan."""
 Rings = list[list[list[float]]]
 
 
 def scene_data(world: World, plan_id: str | None = None) -> dict[str, Any]:
-    """All that a page draws of a world.
+    """Return everything that a page draws of a world.
 
     Args:
-        plan_id: which plan; the one that stands by default, else the one proposed last.
+        plan_id: the plan to show; by default the current one, else the one proposed last.
     """
     name = plan_id or world.current or next(reversed(world.plans), None)
     node = world.plans.get(name or "")
@@ -54,17 +54,17 @@ def scene_data(world: World, plan_id: str | None = None) -> dict[str, Any]:
         "robots": [pose_data(pose) for pose in world.robots],
         "current": world.current,
         "plan": None if node is None else _plan_data(world, node),
-        "plans": [_brief(world, n) for n in list(world.plans.values())[-MOST_PLANS:]],
+        "plans": [_thumbnail_data(world, n) for n in list(world.plans.values())[-MOST_PLANS:]],
     }
 
 
 def thing_data(name: str, label: str, outline: Outline) -> dict[str, Any]:
-    """An outline with what it is called."""
+    """Return an outline with its id and label."""
     return {"id": name, "label": label, "rings": ring_data(outline.polygon)}
 
 
 def candidate_data(candidates: Iterable[Candidate]) -> list[dict[str, Any]]:
-    """Things found in the picture, with how sure it is that they are things."""
+    """Return candidates found in the picture, with how likely each is to be an object."""
     return [
         thing_data(c.id, c.label, c.outline) | {"salience": round(c.salience, 3)}
         for c in candidates
@@ -72,20 +72,21 @@ def candidate_data(candidates: Iterable[Candidate]) -> list[dict[str, Any]]:
 
 
 def pose_data(pose: Pose) -> dict[str, Any]:
-    """Where a robot was seen, px and radians clockwise from the x axis."""
+    """Return a robot's pose, px, and its heading, radians clockwise from the x axis, or None."""
     return {"id": pose.id, "x": round(pose.x, 2), "y": round(pose.y, 2), "heading": pose.heading}
 
 
 def ring_data(area: BaseGeometry) -> Rings:
-    """The boundary lines of an area, closed, rounded to hundredths of a pixel."""
+    """Return an area's closed boundary lines, simplified and rounded to hundredths of a pixel."""
     return [line.round(2).tolist() for line in rings(area.simplify(DETAIL)) if len(line)]
 
 
 def robot_data(plan: Plan, before: Plan | None = None) -> list[dict[str, Any]]:
-    """Each robot's place in a plan, which way it looks, and whether something is wrong with it.
+    """Return each robot's place in a plan, its heading, and whether a finding concerns it.
 
     Args:
-        before: the plan it was made from: `from` is the place there, where that was another.
+        plan: the plan.
+        before: the plan it was made from; a robot that moved has its place there as `from`.
     """
     formation = plan.formation
     wrong = {str(f.robot) for f in plan.verdict.findings if f.robot is not None}
@@ -106,7 +107,7 @@ def robot_data(plan: Plan, before: Plan | None = None) -> list[dict[str, Any]]:
 
 
 def verdict_data(plan: Plan) -> dict[str, Any]:
-    """Whether a plan is certified, and what its certificate says, in sentences."""
+    """Return whether a plan is certified, and its certificate's statements as sentences."""
     verdict = plan.verdict
     return {
         "certified": verdict.certified,
@@ -124,8 +125,8 @@ def _places_of_robots(plan: Plan) -> Mapping[str, tuple[float, float]]:
     }
 
 
-def _brief(world: World, node: PlanNode) -> dict[str, Any]:
-    """A plan as a thumbnail shows it."""
+def _thumbnail_data(world: World, node: PlanNode) -> dict[str, Any]:
+    """Return what a thumbnail shows of a plan."""
     plan = node.plan
     return {
         "id": plan.id,
@@ -158,14 +159,17 @@ def _plan_data(world: World, node: PlanNode) -> dict[str, Any]:
             for name, value in plan.verdict.measures.items()
             if name in TELLING and isinstance(value, int | float)
         ],
-        "worst": _worst(plan, world),
+        "worst": _nearest_robot_data(plan, world),
         "motion": node.motion and node.motion.model_dump(mode="json"),
         "arrival": arrival and arrival.model_dump(mode="json"),
     }
 
 
 def _clearances_of_robots(plan: Plan, world: World) -> dict[str, float]:
-    """How far the edges of robots that stand outside of something are from it, px, by their ids."""
+    """Return the clearance, px by robot id, of robots that stand outside a target.
+
+    It is measured from the robot's edge to the target's filled outline.
+    """
     contract, formation = plan.formation.contract, plan.formation
     names, off, first = formation.robot_of_place, dict[str, float](), 0
     for group in contract.groups:
@@ -179,7 +183,7 @@ def _clearances_of_robots(plan: Plan, world: World) -> dict[str, float]:
 
 
 def _groups(plan: Plan, world: World) -> list[dict[str, Any]]:
-    """The contract's groups; of those outside of something also how far the nearest robot is."""
+    """Return the contract's groups, with the least clearance, px, of those outside a target."""
     off, first, rows = _clearances_of_robots(plan, world), 0, list[dict[str, Any]]()
     for group in plan.formation.contract.groups:
         names = plan.formation.robot_of_place[first : first + group.robots]
@@ -191,8 +195,11 @@ def _groups(plan: Plan, world: World) -> list[dict[str, Any]]:
     return rows
 
 
-def _worst(plan: Plan, world: World) -> dict[str, Any] | None:
-    """The robot nearest to what it stands around, and how far its edge is from it."""
+def _nearest_robot_data(plan: Plan, world: World) -> dict[str, Any] | None:
+    """Return the robot nearest to the target it stands around, and its edge's distance as text.
+
+    None if no robot stands outside a target.
+    """
     off = _clearances_of_robots(plan, world)
     if not off:
         return None

@@ -1,6 +1,6 @@
 """Text on pictures: the built-in font, substitutes for what it lacks, and line wrapping.
 
-Pillow's own font keeps pictures the same on every machine but knows hardly more than ASCII,
+Pillow's own font keeps pictures the same on every machine but covers little more than ASCII,
 while instructions come in any language: what it lacks is folded to ASCII or named in brackets.
 """
 
@@ -22,17 +22,17 @@ _MISSING = "\uffff"
 
 @lru_cache(maxsize=64)
 def font(size: int) -> ImageFont.FreeTypeFont:
-    """The built-in font at a size in pixels."""
+    """Return the built-in font at a size in pixels."""
     loaded = ImageFont.load_default(size=max(size, 1))
     assert isinstance(loaded, ImageFont.FreeTypeFont)
     return loaded
 
 
 def drawable(text: str) -> str:
-    """The text in one line of characters the font has.
+    """Return the text as one line of characters that the font has.
 
-    Accents are dropped; a stretch in another script becomes its name, such as [Arabic], an
-    emoji its own, such as [robot face].
+    Accents are dropped; a run in another script becomes the script's name, such as [Arabic], and
+    an emoji its own name, such as [robot face].
     """
     parts: list[str] = []
     last = ""
@@ -49,7 +49,7 @@ def drawable(text: str) -> str:
 
 
 def wrapped(text: str, width: float, face: ImageFont.FreeTypeFont, most: int) -> list[str]:
-    """The text in at most so many lines of a width in pixels, the last one ending in … if cut."""
+    """Wrap the text into at most `most` lines of a width in pixels, the last with … if cut."""
     lines: list[str] = []
     words = drawable(text).split()
     while words and len(lines) < most:
@@ -66,7 +66,7 @@ def wrapped(text: str, width: float, face: ImageFont.FreeTypeFont, most: int) ->
 
 
 def shortened(text: str, width: float, face: ImageFont.FreeTypeFont, mark: str = "…") -> str:
-    """A drawable text cut to a width in pixels, one character at least, with a mark if cut."""
+    """Cut a drawable text to a width in pixels, to at least one character, adding a mark if cut."""
     if face.getlength(text) <= width:
         return text
     low, high = 1, len(text)
@@ -81,13 +81,13 @@ def shortened(text: str, width: float, face: ImageFont.FreeTypeFont, mark: str =
 
 @lru_cache(maxsize=4096)
 def _substitute(char: str) -> str:
-    """The character, an ASCII digit, a name in brackets, a space, or nothing."""
+    """Replace a character by itself, an ASCII digit, a name in brackets, a space, or nothing."""
     category = unicodedata.category(char)
     if char.isspace():
         return " "
     if category[0] in "CM":
         return ""
-    if _has(char):
+    if _has_glyph(char):
         return char
     digit = unicodedata.decimal(char, None)
     if digit is not None:
@@ -103,8 +103,8 @@ def _script_name(name: str) -> str:
     return "Han" if word == "CJK" else word.capitalize()
 
 
-def _has(char: str) -> bool:
-    """Whether the font has a glyph of its own for a character."""
+def _has_glyph(char: str) -> bool:
+    """Return whether the font has a glyph of its own for a character."""
     return _glyph_bitmap(char) != _glyph_bitmap(_MISSING)
 
 

@@ -1,8 +1,8 @@
 """Draws the picture a model is shown: what it needs to point, in as few pixels as possible.
 
-The photograph lies at the upper left, unscaled where it has a usual size, so that a place read
-off the image and one read off the rulers are the same. Providers bill by the pixel, and shrink
-what is longer than some 1,500 px.
+The photograph is at the upper left, unscaled if it has a common size, so that coordinates read
+off the image and off the rulers agree. Providers bill by the pixel, and shrink pictures longer
+than some 1,500 px.
 """
 
 from collections.abc import Sequence
@@ -23,14 +23,16 @@ from .overlay import draw_world
 from .rulers import RULER, draw_rulers
 
 MOST_LONG, LEAST_LONG = 1024, 400
-"""Long side of the photograph in a view, px: shrunk above, enlarged below by a whole factor."""
+"""Greatest and least long side of the photograph in a view, px.
+
+A longer one is shrunk, a shorter one enlarged by a whole factor."""
 CLOSER = 768
-"""Long side of a part that is looked at closer, px."""
+"""Long side of a region that is looked at more closely, px."""
 QUALITY = 90
 
 
 def view_scale(picture: Picture) -> float:
-    """Pixels of the view per pixel of the picture."""
+    """Return the scale of a view: its pixels per pixel of the picture."""
     long = max(picture.size)
     if long > MOST_LONG:
         return MOST_LONG / long
@@ -47,15 +49,16 @@ def draw_view(
     drawn: TargetPrompt | None = None,
     before: Outline | None = None,
 ) -> bytes:
-    """The photograph with rulers along its right and lower edge, as a JPEG file.
+    """Draw the photograph with rulers along its right and lower edges, as a JPEG file.
 
     Args:
-        world: its targets are outlined and tagged with their ids.
-        plan: its robots are drawn.
+        world: the world whose targets are outlined and tagged with their ids.
+        plan: the plan whose robots are drawn.
         candidates: outlined and numbered, 3 for c3.
-        region: x0, y0, x1, y1, a part to look at closer, image pixels; the rulers go with it.
-        drawn: an outline somebody drew, dashed, and the points that correct it.
-        before: an outline as it was before they did, in blue dashes.
+        region: x0, y0, x1, y1, a part to look at more closely, image pixels; the rulers show its
+            coordinates in the whole picture.
+        drawn: a hand-drawn outline, dashed in white, and the points that correct it.
+        before: the outline as it was before somebody drew, dashed in blue.
 
     Raises:
         ToolError: the plan names a target that the world does not have.
@@ -83,7 +86,11 @@ def draw_view(
 
 
 def part_of(picture: Picture, region: Box) -> tuple[Picture, tuple[int, int]]:
-    """A part of the picture, whole pixels, and where it begins."""
+    """Cut a region out of the picture, widened to whole pixels.
+
+    Returns:
+        The part, and the (x, y) of its first pixel in the whole picture.
+    """
     low = np.maximum(np.floor(region[:2]), 0).astype(int)
     high = np.minimum(np.ceil(region[2:]), picture.size).astype(int)
     (x0, y0), (x1, y1) = low, high

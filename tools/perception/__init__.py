@@ -1,12 +1,12 @@
-"""Picture to candidates to masks to outlines, without learned weights."""
+"""From a picture to candidates, masks and outlines, by default without trained weights."""
 
 import os
 
-# A camera that cannot be opened is one sentence of ours; it is read as cv2 is loaded.
+# We report a camera that cannot be opened in a sentence of our own. cv2 reads this as it loads.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 import cv2
 
-# A picture has the same mask on every processor: IPP's filters round otherwise where there is
-# AVX-512. Segmenting takes no longer without them.
+# IPP's filters round differently on processors with AVX-512; without them a picture has the same
+# mask on every processor. Segmenting takes no longer without them.
 cv2.ipp.setUseIPP(False)

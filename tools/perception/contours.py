@@ -1,4 +1,4 @@
-"""Masks to outlines: the pixel borders of a mask as a polygon with holes."""
+"""Converts masks to outlines, polygons with holes along the pixels' borders, and back."""
 
 import math
 
@@ -13,29 +13,29 @@ from ..errors import InputError
 from ..geometry.outline import Outline, largest_part, outline_of
 
 WHOLE = 0.9
-"""The share of a mask that one piece must hold to stand for it."""
+"""Least share of a mask that one piece must hold to represent it."""
 GAP_SHARES = (0.0, 0.02, 0.05, 0.1)
-"""Half the width of a gap that may be bridged, as a share of the mask's size; tried in order."""
+"""Half the width of the gaps to bridge, as a share of the mask's size; tried in order."""
 
 FINEST = 5e-4
-"""Detail kept, as a share of the size: under half a pixel, so none is lost, up to 700 px."""
+"""Simplification tolerance as a share of the size; below half a pixel up to a size of 700 px."""
 
 
 def outline_of_mask(mask: NDArray[np.bool_]) -> Outline:
-    """The outline of a mask, holes kept; parts that a narrow gap splits are joined.
+    """Return the outline of a mask, with its holes; parts split by a narrow gap are joined.
 
     OpenCV traces pixel centres (Suzuki and Abe 1985); growing the polygon by half a pixel gives
-    the pixels' borders: exact for upright edges, up to half a pixel wide of slanted ones.
+    the pixels' borders: exact for upright edges, up to half a pixel too wide for slanted ones.
 
     Args:
         mask: (H, W).
 
     Raises:
         InputError: nothing in the mask is wide enough to have an area, or it falls into pieces
-            of which none holds nine tenths.
+            none of which holds nine tenths of it.
     """
     raster = np.ascontiguousarray(mask).view(np.uint8)
-    x, y, width, height = cv2.boundingRect(raster)  # most of a large picture is not the thing
+    x, y, width, height = cv2.boundingRect(raster)  # most of a large picture is background
     part = np.ascontiguousarray(raster[y : y + height, x : x + width])
     contours, hierarchy = cv2.findContours(
         part, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE, offset=(x, y)
@@ -55,7 +55,11 @@ def outline_of_mask(mask: NDArray[np.bool_]) -> Outline:
 
 
 def in_one_piece(region: BaseGeometry) -> BaseGeometry:
-    """The largest part if it holds nearly all, else of the region with its narrow gaps bridged."""
+    """Return the region's largest part, with narrow gaps bridged as far as that is needed.
+
+    Raises:
+        InputError: no part holds nine tenths of the region, even with gaps bridged.
+    """
     for share in GAP_SHARES:
         reach = share * math.sqrt(region.area)
         joined = region if share == 0 else region.buffer(reach).buffer(-reach).union(region)
@@ -67,7 +71,7 @@ def in_one_piece(region: BaseGeometry) -> BaseGeometry:
 
 
 def mask_of_outline(outline: Outline, width: int, height: int) -> NDArray[np.bool_]:
-    """Pixels whose centres lie in the outline, (height, width)."""
+    """Return a mask (height, width) of the pixels whose centres lie in the outline."""
     mask = np.zeros((height, width), dtype=bool)
     x0, y0, x1, y1 = outline.bounds
     columns = np.arange(max(int(x0), 0), min(int(x1) + 2, width))

@@ -1,7 +1,7 @@
-"""Pictures of more than 8 bits as 8 bits, with the contrast a person would expect.
+"""Reduces pictures of more than 8 bits to 8, with the contrast a person would expect.
 
-A few dead pixels, or a value that stands for none, must not stretch the range so far that nothing
-is left of the rest: they are left out of account, shown black or white, and said.
+A few dead pixels, or a no-data value, must not stretch the range so far that nothing is left of
+the rest: they are ignored in choosing the range, shown black or white, and mentioned in the note.
 """
 
 import cv2
@@ -10,28 +10,28 @@ from numpy.typing import NDArray
 from PIL import Image
 
 FEW = 0.01
-"""Share of dead pixels; a single value that stands for none may take up to half of the picture."""
+"""Greatest share of dead pixels; a single no-data value may fill up to half of the picture."""
 NOISE = 12
-"""Times the usual step between neighbours; what spans less is noise, whatever lies beyond it."""
+"""A span below this many median steps between neighbours is noise, whatever lies beyond it."""
 MARGIN = 32
-"""Shades between what is left out of account and the rest."""
+"""Shades of grey between ignored values and the rest."""
 SAMPLED = 1_000_000
-"""Values among which the range is looked for."""
+"""Number of values sampled to find the range."""
 FULL = 1 << 14
-"""Colour that reaches so far uses its 16 bits, and is no less deep a picture stored in them."""
+"""Colour that reaches this value uses all 16 bits; below, a shallower picture is stored in them."""
 
 
 def as_8_bits(image: Image.Image, data: bytes | None) -> tuple[Image.Image, str]:
-    """The picture with 8 bits a channel, and a note, which may be empty.
+    """Return the picture with 8 bits per channel, and a note, which may be empty.
 
     Values that all lie in 0..255 stay as they are, floats that all lie in 0..1 are multiplied by
-    255, colour that uses its 16 bits is divided by 257; else the smallest value becomes black and
-    the largest white. NaN and -inf become black, +inf white.
+    255, and colour that uses its 16 bits is divided by 257; otherwise the smallest value becomes
+    black and the largest white. NaN and -inf become black, +inf white.
 
     Args:
-        image: decoded.
-        data: the file, if it has 16 bits of each colour, of which Pillow drops the lower 8; with
-            transparency they stay dropped.
+        image: the decoded picture.
+        data: the file's content if it has 16 bits per colour, of which Pillow drops the lower 8;
+            pictures with transparency are left with Pillow's 8 bits.
     """
     if image.mode == "F" or image.mode.startswith("I"):
         grey, note = _scaled(np.array(image, dtype=np.float64), "grey", whole=image.mode != "F")
@@ -79,24 +79,31 @@ def _scaled(
 
 
 def _range(values: NDArray[np.floating], step: float) -> tuple[float, float]:
-    """The least and the greatest value that count, infinite where all do; of values in steps."""
+    """Return the least and greatest values that count; infinite where nothing is ignored.
+
+    `step` is the least step between different values, 0 if they are continuous.
+    """
     rows = values[:: max(1, values.size // SAMPLED)]
     with np.errstate(invalid="ignore"):
         steps = np.abs(np.diff(rows, axis=1))
     seen = steps[np.isfinite(steps)]
     noise = NOISE * max(step, float(np.median(seen)) if seen.size else 0.0)
     ranked = np.sort(rows[np.isfinite(rows)])
-    bounds = [np.inf, np.inf]  # of the values, and of the same with the other sign
+    bounds = [np.inf, np.inf]  # upper bounds of the values, and of the negated values
     for turn in (0, 1, 0, 1):
-        last = _last(ranked, noise)
+        last = _last_inlier(ranked, noise)
         if last < len(ranked) - 1:
             bounds[turn] = float(ranked[last])
         ranked = -ranked[last::-1]
     return -bounds[1], bounds[0]
 
 
-def _last(ranked: NDArray[np.floating], noise: float) -> int:
-    """The last of (n,) sorted values that is not alone: further on than all before it span."""
+def _last_inlier(ranked: NDArray[np.floating], noise: float) -> int:
+    """Return the index of the last of sorted values (n,) before any outliers.
+
+    Outliers are few, or all equal, in the upper half, and the gap up to them is wider than the
+    span of all values below it, which exceeds `noise`.
+    """
     index = np.arange(max(len(ranked) - 1, 0))
     span = ranked[:-1] - ranked[:1]
     alone = (np.diff(ranked) > span) & (span > noise) & (index >= len(ranked) // 2)

@@ -1,4 +1,4 @@
-"""What is found by a noun phrase: where, how surely, and as which mask."""
+"""Things found by a noun phrase: where, with what score, and with which mask."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -13,10 +13,10 @@ class Detection:
 
     Attributes:
         box: x0, y0, x1, y1, px; it may reach beyond the picture.
-        score: the detector's own, in [0, 1]: that it is such a thing. What a mask is worth is
-            another matter, and its own score.
-        mask: where one was made.
-        most: the greatest confidence that a mask of it is given.
+        score: the detector's own score in [0, 1] that it is such a thing. It says nothing about
+            the quality of a mask, which has its own confidence.
+        mask: its mask, if one was made.
+        most: upper limit on the confidence of its mask.
     """
 
     box: Box
@@ -27,10 +27,10 @@ class Detection:
 
 @runtime_checkable
 class Finder(Protocol):
-    """What finds things by words: some detectors, and the segmenters that take text."""
+    """A finder of things by words: some detectors, and the segmenters that take text."""
 
     def find(self, pixels: Pixels, phrase: str) -> tuple[Detection, ...]:
-        """The things that a bare noun phrase names, such as "car"; none is no error.
+        """Find the things that a bare noun phrase names, such as "car"; none is no error.
 
         Args:
             pixels: (H, W, 3) RGB.

@@ -1,6 +1,6 @@
-"""Where on the Earth the pixels of a GeoTIFF lie, and how large they are, from its tags.
+"""Reads from a GeoTIFF's tags where on the Earth its pixels lie, and how large they are.
 
-What says nothing sure gives no scale, and why: a wrong one would send robots to wrong distances.
+Tags that leave doubt give no scale, and a reason: a wrong scale would send robots wrong distances.
 """
 
 import math
@@ -13,29 +13,29 @@ from ..geometry.outline import FloatArray
 
 PIXEL_SCALE, TIE_POINT, TRANSFORM, KEYS = 33550, 33922, 34264, 34735
 MODEL, GEOGRAPHIC_CRS, PROJECTED_CRS, LINEAR_UNIT = 1024, 2048, 3072, 3076
-"""Keys of the directory: what is between them is the standard's (OGC 19-008r4)."""
+"""Keys of the GeoKey directory, as numbered by the standard (OGC 19-008r4)."""
 UNITS = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}
-"""Metres of the units that maps have, by EPSG's numbers: metre, foot, US survey foot."""
+"""Metres per unit of a map, by the unit's EPSG code: metre, foot, US survey foot."""
 UTM = (range(32601, 32661), range(32701, 32761), range(25828, 25839), range(26901, 26924))
-"""Maps in metres, where a file does not say their unit."""
+"""EPSG codes of maps that are in metres if the file does not state a unit."""
 WEB_MERCATOR, RADIUS = frozenset({3857, 3785, 900913}), 6378137.0
-"""A map whose metres are longer than the ground's, by how much depends on the latitude."""
+"""EPSG codes and radius, m, of a map whose metres exceed the ground's, depending on latitude."""
 UNEVEN, TURNED = 1.01, 0.02
-"""Sides of pixels that differ more have no one scale; more turned, the picture is no map."""
+"""Greatest ratio of a pixel's sides for there to be one scale, and greatest turn on the map."""
 POSSIBLE = (1e-6, 1e3)
-"""Metres per pixel that a picture may have."""
+"""Least and greatest metres per pixel that are plausible."""
 
 
 @dataclass(frozen=True, eq=False)
 class Georeference:
-    """The map that a picture is of.
+    """How a picture lies on its map.
 
     Attributes:
-        matrix: (3, 3); column and row of a pixel centre and 1 to x and y on the map and 1.
+        matrix: (3, 3), maps (column, row, 1) of a pixel centre to (x, y, 1) on the map.
         geographic: whether x and y are longitude and latitude.
-        crs: EPSG's number of the map; 0 where it is not said.
-        metres_per_pixel: None where there is no one scale, or none that is sure.
-        note: which it is, or why there is none.
+        crs: EPSG code of the map; 0 if not stated.
+        metres_per_pixel: the scale; None if there is no single scale, or none that is certain.
+        note: the scale in words, or why there is none.
     """
 
     matrix: FloatArray
@@ -45,13 +45,13 @@ class Georeference:
     note: str
 
     def to_pixels(self, points: FloatArray) -> FloatArray:
-        """Pixels of (n, 2) places on the map."""
+        """Return the pixels (n, 2) of places (n, 2) on the map."""
         there = np.column_stack([points, np.ones(len(points))])
         return (there @ np.linalg.inv(self.matrix).T)[:, :2]
 
 
 def georeference_of(opened: Image.Image) -> Georeference | None:
-    """What a TIFF's tags say; None where they say nothing, or nothing that can be read."""
+    """Read the georeference from a TIFF's tags; None if there is none, or none that is valid."""
     if not isinstance(opened, TiffImagePlugin.TiffImageFile):
         return None
     tags, size = opened.tag_v2, opened.size
@@ -75,13 +75,16 @@ def georeference_of(opened: Image.Image) -> Georeference | None:
 
 
 def _keys(values: list[int]) -> dict[int, int]:
-    """The keys whose values are numbers in the directory itself."""
+    """Return the keys whose values are stored in the directory itself."""
     entries = (values[i : i + 4] for i in range(4, len(values) - 3, 4))
     return {key: value for key, place, _, value in entries if place == 0}
 
 
 def _matrix(scale: list[float], tie: list[float], transform: list[float]) -> FloatArray | None:
-    """Pixel centres to the map; the tags' own pixels begin at the corner of the first one."""
+    """Return the matrix (3, 3) from pixel centres to the map; None if the tags give none.
+
+    The tags count pixels from the outer corner of the first one.
+    """
     if len(transform) == 16:
         whole = np.array(transform).reshape(4, 4)[np.ix_((0, 1, 3), (0, 1, 3))]
     elif len(scale) >= 2 and len(tie) >= 6:
@@ -96,8 +99,11 @@ def _matrix(scale: list[float], tie: list[float], transform: list[float]) -> Flo
 def _metres(
     keys: dict[int, int], crs: int, y: float, *, geographic: bool
 ) -> tuple[float, float] | None:
-    """Metres on the ground of one unit of the map in x and in y, there; None where unknown."""
-    if geographic:  # of a degree, on the WGS 84 ellipsoid
+    """Return the metres on the ground of one unit of the map in x and in y, at a map's y.
+
+    None if the map's unit is unknown.
+    """
+    if geographic:  # length of a degree on the WGS 84 ellipsoid
         lat = math.radians(y)
         along = 111412.84 * math.cos(lat) - 93.5 * math.cos(3 * lat)
         return along, 111132.92 - 559.82 * math.cos(2 * lat) + 1.175 * math.cos(4 * lat)
@@ -108,7 +114,7 @@ def _metres(
 
 
 def _scale(matrix: FloatArray, metres: tuple[float, float] | None) -> tuple[float | None, str]:
-    """Metres per pixel, where there is one such number, and what there is to say of it."""
+    """Return the metres per pixel, None if there is no single such number, and a note on it."""
     none = "the file's georeference gives no scale"
     if metres is None:
         return None, f"{none}: the unit of its map is not known"

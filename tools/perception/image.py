@@ -1,7 +1,7 @@
 """Loads picture files safely, whatever they hold.
 
 The result is plain RGB pixels as a person would see them, or one ImageError that says what is
-wrong and what to do. File size and header are checked before a decoder may spend memory.
+wrong and what to do. File size and header are checked before a decoder can use much memory.
 """
 
 import hashlib
@@ -29,9 +29,9 @@ MAX_PIXELS = 50_000_000
 MAX_SIDE = 20_000
 MIN_SIDE = 16
 STRIP = 64
-"""Rows that are copied at a time: few enough to stay in the processor's cache."""
+"""Number of rows copied at a time: few enough to stay in the processor's cache."""
 
-# A closed list: Pillow reads dozens of rare formats whose decoders are little tested.
+# An allow list: Pillow reads dozens of rare formats whose decoders are little tested.
 _FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "GIF", "TIFF") + (
     ("AVIF",) if "avif" in features.modules and features.check_module("avif") else ()
 )
@@ -62,15 +62,16 @@ _TURNS = {
 # Arrays have no single truth value, so a generated __eq__ would raise; compare sha256.
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """One picture as a person sees it; compare two by `sha256`.
+    """A picture as a person sees it; compare two by `sha256`.
 
-    pixels: (H, W, 3) uint8 RGB, read-only, row 0 at the top, column 0 at the left.
-    sha256: hex digest of the file's bytes, or of shape and pixels for an array.
-    name: file name, for messages.
-    notes: what a person should know of how the pixels came about; often empty.
-    path: absolute, of the file it was loaded from; None where it came from none.
-    file: the content of the file, where it has no path.
-    place: on a map, of a GeoTIFF.
+    Attributes:
+        pixels: (H, W, 3) uint8 RGB, read-only, row 0 at the top, column 0 at the left.
+        sha256: hex digest of the file's bytes, or of shape and pixels for an array.
+        name: file name, for messages.
+        notes: what a person should know about how the pixels came about; often empty.
+        path: absolute path of the file it was loaded from, if any.
+        file: the file's content, if it was given as bytes rather than by path.
+        place: its place on a map, of a GeoTIFF.
     """
 
     pixels: NDArray[np.uint8]
@@ -83,30 +84,31 @@ class Picture:
 
     @property
     def metres_per_pixel(self) -> float | None:
-        """As its file says; a resolution for printing (DPI) says nothing of the ground."""
+        """The scale its file gives, if any; a print resolution (DPI) says nothing of the ground."""
         return None if self.place is None else self.place.metres_per_pixel
 
     @property
     def width(self) -> int:
-        """Pixels across."""
+        """Width in pixels."""
         return self.pixels.shape[1]
 
     @property
     def height(self) -> int:
-        """Pixels down."""
+        """Height in pixels."""
         return self.pixels.shape[0]
 
     @property
     def size(self) -> tuple[int, int]:
-        """(width, height) in pixels."""
+        """Width and height in pixels."""
         return self.width, self.height
 
 
 def load_picture(path: str | os.PathLike[str]) -> Picture:
     """Read a picture file of at most 64 MiB, as `picture_from_bytes` does.
 
-    Raises ImageError if it is missing, unreadable, not a regular file, too large, or for
-    any reason for which `picture_from_bytes` would.
+    Raises:
+        ImageError: it is missing, unreadable, not a regular file or too large, or
+            `picture_from_bytes` refuses it.
     """
     shown = os.fspath(path)
     try:
@@ -120,12 +122,12 @@ def load_picture(path: str | os.PathLike[str]) -> Picture:
 def picture_from_bytes(data: bytes, name: str) -> Picture:
     """Decode a picture file's bytes; `name` is the file name for messages.
 
-    EXIF orientation is applied, transparent parts are shown on white, of several frames the
-    first is used; more than 8 bits are made 8 as `as_8_bits` says. Colour profiles are not
-    applied.
+    EXIF orientation is applied, transparent parts are shown on white, the first of several frames
+    is used, and more than 8 bits are reduced to 8 by `as_8_bits`. Colour profiles are not applied.
 
-    Raises ImageError if the bytes are none or too many, of a format not allowed, damaged,
-    under 16 pixels on a side, over 20,000 on a side or over 50 megapixels.
+    Raises:
+        ImageError: there are no bytes or too many, their format is not allowed, they are damaged,
+            or the picture has under 16 or over 20,000 pixels on a side or over 50 megapixels.
     """
     if not data:
         raise _empty(name)
@@ -138,8 +140,8 @@ def picture_from_bytes(data: bytes, name: str) -> Picture:
 def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Picture:
     """Copy an array of (H, W, 3) RGB or (H, W) grey uint8 into a Picture.
 
-    Raises ImageError for any other dtype or shape, and for the sizes that
-    `picture_from_bytes` refuses.
+    Raises:
+        ImageError: another dtype or shape, or a size that `picture_from_bytes` refuses.
     """
     if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3) or pixels.shape[2:] not in ((), (3,)):
         raise _image_error(
@@ -157,7 +159,10 @@ def picture_from_array(pixels: NDArray[np.uint8], name: str = "array") -> Pictur
 
 
 def picture_file(picture: Picture) -> bytes:
-    """A file that holds the picture: the one it came from while that is the same, else a PNG."""
+    """Return the content of a file that holds the picture.
+
+    It is the file that the picture came from if that is unchanged, else a PNG of its pixels.
+    """
     if picture.path is not None:
         with suppress(ImageError, OSError, ValueError):
             data = _file_bytes(picture.path, picture.name)
@@ -171,10 +176,12 @@ def picture_file(picture: Picture) -> bytes:
 
 
 def picture_from_file(data: bytes, name: str, sha256: str) -> Picture:
-    """The picture with a hash that `picture_file` made a file of, be it one of a file or an array.
+    """Restore the picture with a hash from the file content that `picture_file` returned.
+
+    The picture may have come from a file or an array.
 
     Raises:
-        ImageError: as `picture_from_bytes` does.
+        ImageError: as for `picture_from_bytes`.
     """
     picture = picture_from_bytes(data, name)
     return picture if picture.sha256 == sha256 else picture_from_array(picture.pixels, name)
@@ -199,7 +206,7 @@ def _file_bytes(path: Path, shown: str) -> bytes:
         raise _empty(shown)
     _check_bytes(shown, info.st_size)
     with path.open("rb") as file:
-        # Bounded, because the file may have grown since its size was asked.
+        # Bounded, because the file may have grown since its size was checked.
         return file.read(MAX_FILE_BYTES + 1)
 
 
@@ -251,7 +258,7 @@ def _decode(
             _check_size(name, *opened.size)
             _check_tiles(name, opened)
             frames = _frames_note(opened)
-            colours = data if ";16" in str(opened.tile) else None  # there until it is loaded
+            colours = data if ";16" in str(opened.tile) else None  # load() clears the tiles
             opened.load()
             # Some decoders learn the true size only now.
             _check_size(name, *opened.size)
@@ -261,7 +268,7 @@ def _decode(
             pixels, note = _to_rgb(upright)
     except ImageError:
         raise
-    # Over the years Pillow's readers have let out nearly every built-in exception.
+    # Over the years Pillow's readers have raised nearly every built-in exception.
     except Exception as error:
         raise _undecodable(name, data, error) from None
     pixels.setflags(write=False)
@@ -271,7 +278,7 @@ def _decode(
 
 @contextmanager
 def _pillow_silenced() -> Generator[None]:
-    """Keep Pillow's warnings, and the one error it logs, from the user for a while."""
+    """Hide Pillow's warnings, and the one error it logs, from the user within the context."""
     logger = logging.getLogger(TiffImagePlugin.__name__)
 
     def drop(_: logging.LogRecord) -> bool:
@@ -301,7 +308,7 @@ def _undecodable(name: str, data: bytes, error: Exception) -> ImageError:
 
 
 def _check_tiles(name: str, opened: Image.Image) -> None:
-    """Refuse a small TIFF cut into one vast tile, for which libtiff would make room."""
+    """Refuse a small TIFF with a vast tile, for which libtiff would allocate memory."""
     if isinstance(opened, TiffImagePlugin.TiffImageFile):
         tags = opened.tag_v2
         width = tags.get(TiffImagePlugin.TILEWIDTH, 0)
@@ -311,8 +318,9 @@ def _check_tiles(name: str, opened: Image.Image) -> None:
 
 
 def _frames_note(opened: Image.Image) -> str:
-    # Frames are not counted: that walks the whole file, for which a hostile one takes minutes.
-    # MPO is a phone's JPEG with a gain map or preview behind it, which is no frame to a person.
+    # Frames are not counted: that walks the whole file, which takes minutes for a hostile one.
+    # MPO is a phone's JPEG with a gain map or preview behind it, which a person would not call a
+    # frame.
     several = opened.format != "MPO" and getattr(opened, "is_animated", False)
     return "first of several frames" if several else ""
 
@@ -327,7 +335,7 @@ def _upright(image: Image.Image, opened: Image.Image) -> Image.Image:
 
 
 def _to_rgb(image: Image.Image) -> tuple[NDArray[np.uint8], str]:
-    """(H, W, 3) pixels and a note, which may be empty."""
+    """Return the RGB pixels (H, W, 3) and a note, which may be empty."""
     note = ""
     if image.has_transparency_data:
         image = image.convert("RGBA")
@@ -340,7 +348,7 @@ def _to_rgb(image: Image.Image) -> tuple[NDArray[np.uint8], str]:
 
 
 def _pixels_of(image: Image.Image) -> NDArray[np.uint8]:
-    """An RGB picture's pixels; Pillow's own way copies all of them twice more."""
+    """Return an RGB picture's pixels (H, W, 3); Pillow's own way makes two more copies of them."""
     pixels = np.empty((image.height, image.width, 3), dtype=np.uint8)
     for top in range(0, image.height, STRIP):
         bottom = min(top + STRIP, image.height)

@@ -1,4 +1,4 @@
-"""Measures the outline of what a prompt points at, with its confidence, by any segmenter."""
+"""Measures the outline of what a prompt points at, and its confidence, with any segmenter."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,18 +20,18 @@ from .segmenters.protocol import PromptKind, Segmenter
 from .target_prompt import Point, TargetPrompt
 
 FEW_PX, FEW_SHARE = 4.0, 0.03
-"""Differences from an outline drawn are named beyond so many px, or this share of its size."""
+"""Deviations from a drawn outline are reported beyond these px and this share of the size."""
 MOST_NAMED = 3
-"""Parts named of each kind."""
+"""The most parts that are reported of each kind."""
 
 
 Deviation = tuple[float, float, float]
-"""A point x, y, and by how much it lies off an outline, px."""
+"""A point x, y, and its distance from an outline, px."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """An outline in image px, its confidence in [0, 1], and the cues it is made of, by name."""
+    """An outline in image px, its confidence in [0, 1], and the cues behind that, by name."""
 
     outline: Outline
     confidence: float
@@ -41,14 +41,16 @@ class Measured:
 def measure_outline(
     picture: Picture, prompt: TargetPrompt, segmenter: Segmenter, candidate: Candidate | None = None
 ) -> Measured:
-    """The outline of the thing pointed at.
+    """Measure the outline of the thing pointed at.
 
     Args:
-        picture: the prompt was checked on.
-        candidate: the one that the prompt names, if it names one.
+        picture: the picture on which the prompt was checked.
+        prompt: what is pointed at.
+        segmenter: makes the mask.
+        candidate: the candidate that the prompt names, if it names one.
 
     Raises:
-        ToolError: the segmenter does not take such a prompt; the text says which it takes.
+        ToolError: the segmenter does not take such a prompt; the message says which it takes.
         InputError: the mask is empty or in pieces.
     """
     if prompt.mask is not None:
@@ -81,11 +83,12 @@ def measure_outline(
 def unlike_drawn(
     outline: Outline, prompt: TargetPrompt, width: int, height: int
 ) -> tuple[tuple[Deviation, ...], tuple[Deviation, ...]]:
-    """Where what was measured differs from the outline drawn, in a picture of width x height px.
+    """Find where the measured outline differs from the drawn one, in a picture of a size in px.
 
     Returns:
-        What was drawn and is left out, and what was not drawn and is there, the farthest first;
-        parts that points were given for are meant so. None without an outline drawn.
+        What was drawn but not measured, and what was measured but not drawn, the farthest first.
+        Parts that a correcting point asked for are not among them. Both are empty if no outline
+        was drawn.
     """
     if prompt.outline is None:
         return (), ()
@@ -98,7 +101,10 @@ def unlike_drawn(
 def _parts_off(
     region: BaseGeometry, other: BaseGeometry, few: float, meant: Sequence[Point]
 ) -> tuple[Deviation, ...]:
-    """The farthest point of each part of a region that lies off another by more than a few px."""
+    """Return the farthest point of each part of a region more than `few` px outside another.
+
+    Parts near one of the `meant` points are left out.
+    """
     found: list[Deviation] = []
     for part in shapely.get_parts(region - other.buffer(few)):
         corners = shapely.get_coordinates(part)
@@ -110,7 +116,7 @@ def _parts_off(
 
 
 def _prompt_kinds(prompt: TargetPrompt, segmenter: Segmenter) -> set[PromptKind]:
-    """The kinds of prompt it is made of; a candidate is pointed at by outline, or else by box."""
+    """Return the kinds of prompt it is made of; a candidate counts as an outline, or else a box."""
     kinds: set[PromptKind] = set()
     if prompt.candidate is not None:
         by_box = "box" in segmenter.takes and "outline" not in segmenter.takes

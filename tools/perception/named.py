@@ -1,6 +1,6 @@
-"""Candidates that a noun phrase names: what a network finds, beside what was found before it.
+"""Adds the candidates that a noun phrase names to those found before, with a network.
 
-Nothing is chosen here: all come back with ids, and code compares them as it does all others.
+Nothing is chosen here: all come back with ids, and are compared like all other candidates.
 """
 
 from collections.abc import Sequence
@@ -19,9 +19,9 @@ from .segmenters.protocol import Segmenter
 from .target_prompt import TargetPrompt, box_problems
 
 SAME = 0.7
-"""Masks that overlap so far (intersection over union) are of one thing."""
+"""Least overlap (intersection over union) of two masks of the same thing."""
 MOST_NAMED = 60
-"""Things that one phrase can name, the surest first: a question shows fewer."""
+"""The most things that one phrase can name, the surest first; a question shows fewer."""
 
 
 def with_named(
@@ -31,12 +31,15 @@ def with_named(
     finder: Finder,
     segmenter: Segmenter,
 ) -> tuple[Candidate, ...]:
-    """Candidates and, under the next ids, the further things that a phrase names.
+    """Return the candidates and, under the next ids, the further things that a phrase names.
 
-    What is among the candidates already keeps its id and outline, and is said to be named too.
+    Something that is already among the candidates keeps its id and outline, and gets the naming.
 
     Args:
+        candidates: those found so far.
+        picture: the picture to search.
         phrase: see `Finder.find`.
+        finder: finds the things.
         segmenter: makes the masks where the finder makes none.
     """
     if not np.ptp(picture.pixels, axis=(0, 1)).any():
@@ -51,7 +54,7 @@ def with_named(
         if not overlaps or overlaps[same] < SAME:
             new = candidate_of(f"c{len(known) + 1}", naming.outline, picture, naming.score)
             known.append(replace(new, named=(naming,)))
-        elif not known[same].as_named(phrase):  # else the same thing was found twice
+        elif not known[same].as_named(phrase):  # otherwise the same thing was found twice
             known[same] = replace(known[same], named=(*known[same].named, naming))
     return tuple(known)
 
@@ -59,7 +62,7 @@ def with_named(
 def _naming(
     picture: Picture, phrase: str, detection: Detection, segmenter: Segmenter
 ) -> Naming | None:
-    """A detection with its outline; None where it has none, or is as good as the picture."""
+    """Return a detection with its outline; None if it has none, or covers nearly the picture."""
     mask = detection.mask
     if mask is None:
         if box_problems(detection.box, *picture.size) or _covers(detection, picture):

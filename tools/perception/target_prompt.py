@@ -1,4 +1,4 @@
-"""How a thing is pointed at: candidate, text, box, points, rough outline, or somebody's mask."""
+"""How a thing is pointed at: candidate, text, box, points, rough outline, or a mask from a file."""
 
 from typing import Annotated, Any, Self
 
@@ -15,9 +15,9 @@ Point = Annotated[tuple[_Number, _Number], WithJsonSchema(_PAIR)]
 Box = Annotated[tuple[_Number, _Number, _Number, _Number], WithJsonSchema(_FOUR)]
 
 MAX_POINTS = 20
-"""Points of a kind."""
+"""The most points of each kind."""
 MAX_VERTICES = 200
-"""Of an outline that somebody draws."""
+"""The most vertices of a drawn outline."""
 MIN_SIDE = 2.0
 """Smallest side of a box, px."""
 
@@ -37,7 +37,7 @@ class Mask(BaseModel):
 
     @property
     def region(self) -> Polygon:
-        """It as a polygon."""
+        """The region as a polygon with holes."""
         return Polygon(self.rings[0], self.rings[1:])
 
 
@@ -79,20 +79,23 @@ class TargetPrompt(BaseModel):
         return self
 
     def corrected_by(self, later: "TargetPrompt") -> "TargetPrompt":
-        """This outline, corrected by another prompt's points as well."""
+        """Return this prompt with another prompt's points, and its label if it has one, added."""
         points = (*(self.points or ()), *(later.points or ()))
         update = {"points": points or None, "negative": self.negative + later.negative}
         return self.model_copy(update=update | ({"label": later.label} if later.label else {}))
 
     @property
     def brief(self) -> dict[str, Any]:
-        """As JSON, with its box alone in place of a mask."""
+        """The prompt as JSON data, with the bounding box alone in place of a mask."""
         box = {} if self.mask is None else {"box": self.mask.region.bounds}
         given = self.model_dump(mode="json", exclude_defaults=True, exclude={"mask"})
         return given | {"id": self.id} | box
 
     def mended(self) -> tuple["TargetPrompt", str]:
-        """The prompt with an outline that does not cross itself, and what was done to it if so."""
+        """Return the prompt with its outline mended if it crosses itself, and what was done to it.
+
+        The text is empty if the outline was not changed.
+        """
         made = None if self.outline is None else _mended_outline(self.outline)
         if made is None:
             return self, ""
@@ -111,7 +114,7 @@ class TargetPrompt(BaseModel):
         return "box" if self.box is not None else "point"
 
     def problems(self, width: int, height: int) -> list[str]:
-        """All that makes it unusable on a picture of this size; each one sentence."""
+        """Return all that makes it unusable on a picture of this size, one sentence each."""
         found = [
             f"The point ({x:g}, {y:g}) lies outside the picture; {_picture_extent(width, height)}."
             for x, y in (*(self.points or ()), *self.negative)
@@ -127,7 +130,7 @@ class TargetPrompt(BaseModel):
 
 
 def box_problems(box: Box, width: int, height: int) -> list[str]:
-    """All that makes a box unusable on a picture of this size; each one sentence."""
+    """Return all that makes a box unusable on a picture of this size, one sentence each."""
     x0, y0, x1, y1 = box
     shown = f"The box ({x0:g}, {y0:g}, {x1:g}, {y1:g})"
     if x1 < x0 or y1 < y0:
@@ -157,7 +160,7 @@ def _outline_problems(outline: tuple[Point, ...], width: int, height: int) -> li
 
 
 def _mended_outline(outline: tuple[Point, ...]) -> tuple[Polygon, str] | None:
-    """An outline that crosses itself, mended; None for one that does not, or cannot be."""
+    """Mend an outline that crosses itself; None if it does not, or cannot be mended."""
     made = None if Polygon(outline).is_valid else mended(outline)
     if made is None or len(made[0].exterior.coords) - 1 > MAX_VERTICES:
         return None

@@ -1,1 +1,1 @@
-"""Cameras above a floor: what they see now, and where on the floor that is."""
+"""Cameras above a floor: what they see now, and where that is on the floor."""

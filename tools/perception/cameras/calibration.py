@@ -1,7 +1,8 @@
-"""Where on the floor the pixels of a camera are, as `formup calibrate` has measured it.
+"""Maps the pixels of a camera to the floor, as measured by `formup calibrate`.
 
-Once the lens is accounted for, a floor is seen by a homography. What is seen above the floor seems
-further from the camera's foot, by as much as it is high: that takes only where the camera is.
+Once lens distortion is removed, the floor is seen through a homography. Something above the floor
+seems further from the point below the camera the higher it is; correcting that takes only the
+camera's position.
 """
 
 from dataclasses import replace
@@ -32,21 +33,21 @@ Place = tuple[Metres, Metres]
 Side = Annotated[int, Field(ge=MIN_SIDE, le=MAX_SIDE)]
 PRECISE = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-9)
 BORDER = 40
-"""Points of a side of the floor that have to be in the picture."""
+"""Number of points on each side of the floor that are checked to be in the picture."""
 
 
-class Part(BaseModel):
-    """What files about cameras hold; they take no keys that they do not know."""
+class CameraFileModel(BaseModel):
+    """Base of the models that files about cameras hold; unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class Residuals(Part):
-    """How far off known points are, in the picture and on the floor.
+class Residuals(CameraFileModel):
+    """Errors of the known points, in the picture and on the floor.
 
     Attributes:
-        corners_mm: by how much the floor's corners would be off, if pixels were by as much as known
-            points are; the more, the less of the floor what is known covers.
+        corners_mm: expected error of the floor's worst corner, if pixels were off by as much as the
+            known points are; the less of the floor these cover, the larger it is.
     """
 
     mean_px: float
@@ -56,27 +57,29 @@ class Residuals(Part):
     corners_mm: float
 
 
-class Lens(Part):
-    """How a camera's lens bends what it sees; as of OpenCV.
+class Lens(CameraFileModel):
+    """The distortion of a camera's lens, as OpenCV models it.
 
     Attributes:
-        camera_matrix: px.
-        distortion: k1, k2, p1, p2 and so on; none for none.
+        camera_matrix: (3, 3), px.
+        distortion: k1, k2, p1, p2 and so on; empty for no distortion.
     """
 
     camera_matrix: Matrix
     distortion: tuple[Number, ...] = Field(default=(), max_length=14)
 
-    def straightened(self, pixels: FloatArray) -> FloatArray:
-        """Where (n, 2) px would be without the distortion."""
+    def undistorted(self, pixels: FloatArray) -> FloatArray:
+        """Return where pixels (n, 2) would be without the distortion."""
         if not self.distortion or not len(pixels):
             return pixels
-        matrix, bent = np.array(self.camera_matrix), np.array(self.distortion)
-        found = cv2.undistortImagePoints(pixels.reshape(-1, 1, 2), matrix, bent, arg1=PRECISE)
+        matrix, coefficients = np.array(self.camera_matrix), np.array(self.distortion)
+        found = cv2.undistortImagePoints(
+            pixels.reshape(-1, 1, 2), matrix, coefficients, arg1=PRECISE
+        )
         return np.asarray(found, dtype=float).reshape(-1, 2)
 
-    def bent(self, pixels: FloatArray) -> FloatArray:
-        """Where (n, 2) px without distortion are in the picture."""
+    def distorted(self, pixels: FloatArray) -> FloatArray:
+        """Return where undistorted pixels (n, 2) are in the picture."""
         if not self.distortion or not len(pixels):
             return pixels
         matrix, none = np.array(self.camera_matrix), np.zeros(3)
@@ -85,17 +88,17 @@ class Lens(Part):
         return np.asarray(found, dtype=float).reshape(-1, 2)
 
 
-class Calibration(Part):
-    """A camera above a floor.
+class Calibration(CameraFileModel):
+    """A calibrated camera above a floor.
 
     Attributes:
-        picture: its width and height, px.
-        homography: from the picture without distortion, px, to the floor, m.
-        lens: None for one that does not bend anything.
-        camera: where it is, m: on the floor, and how high above it; None where nobody knows.
-        floor: x0, y0, x1, y1 of what the top view shows, m.
-        metres_per_pixel: of the top view.
-        residuals: of the known points it was made from.
+        picture: width and height of its pictures, px.
+        homography: from the undistorted picture, px, to the floor, m.
+        lens: its distortion; None for a lens without any.
+        camera: its x and y on the floor and its height above it, m; None if not known.
+        floor: x0, y0, x1, y1 of the part of the floor that the top view shows, m.
+        metres_per_pixel: scale of the top view.
+        residuals: errors of the known points that it was fitted to.
     """
 
     picture: tuple[Side, Side]
@@ -116,7 +119,7 @@ class Calibration(Part):
             raise ValueError(f"the floor would be shown in {width} x {height} pixels")
         if abs(np.linalg.det(np.array(self.homography))) < 1e-15:
             raise ValueError("homography takes the picture to a line, not to a floor")
-        if not self.sees(_around(self.floor)).all():
+        if not self.sees(_border_points(self.floor)).all():
             raise ValueError(
                 f"the floor {x0:g}, {y0:g} to {x1:g}, {y1:g} m is not all in the picture: give one "
                 "that is, as `floor: [x0, y0, x1, y1]`"
@@ -136,19 +139,23 @@ class Calibration(Part):
 
     @cached_property
     def to_top(self) -> FloatArray:
-        """(3, 3), from the floor, m, to the top view, px."""
+        """The transform (3, 3) from the floor, m, to the top view, px."""
         x0, y0, _, y1 = self.floor
         m = self.metres_per_pixel
         down = (0, -1 / m, y1 / m - 0.5) if self.y_up else (0, 1 / m, -y0 / m - 0.5)
         return np.array([(1 / m, 0, -x0 / m - 0.5), down, (0, 0, 1)])
 
     def on_floor(self, pixels: FloatArray, height: float = 0.0) -> FloatArray:
-        """(n, 2) m of what is seen at (n, 2) px, and is so high above the floor, m.
+        """Return the places (n, 2), m, of what is seen at pixels (n, 2).
+
+        Args:
+            pixels: (n, 2), px of the picture.
+            height: height of what is seen above the floor, m.
 
         Raises:
-            InputError: it is, and where the camera is is not known.
+            InputError: the height is not 0, and the camera's position is not known.
         """
-        straight = pixels if self.lens is None else self.lens.straightened(pixels)
+        straight = pixels if self.lens is None else self.lens.undistorted(pixels)
         found = through(np.array(self.homography), straight)
         if not height:
             return found
@@ -161,22 +168,22 @@ class Calibration(Part):
         return found + (np.array([x, y]) - found) * height / above
 
     def in_picture(self, places: FloatArray) -> FloatArray:
-        """(n, 2) px where (n, 2) m of the floor are seen."""
+        """Return the pixels (n, 2) at which places (n, 2) on the floor, m, are seen."""
         straight = through(np.linalg.inv(np.array(self.homography)), places)
-        return straight if self.lens is None else self.lens.bent(straight)
+        return straight if self.lens is None else self.lens.distorted(straight)
 
     def sees(self, places: FloatArray) -> NDArray[np.bool_]:
-        """(n,), whether the camera sees (n, 2) m of the floor."""
+        """Return a mask (n,) of the places (n, 2) on the floor, m, that the camera sees."""
         back = np.linalg.inv(np.array(self.homography))
         ahead = np.column_stack([places, np.ones(len(places))]) @ back[2] > 0
         at = self.in_picture(places)
         inside = ((at > -0.5) & (at < np.array(self.picture) - 0.5)).all(axis=1)
-        # Far out, what a lens model bends comes back into the picture.
+        # Far outside, a lens model can map points back into the picture.
         again = np.abs(self.on_floor(at) - places).max(axis=1) < self.metres_per_pixel
         return ahead & inside & again
 
     def _seen_at(self, top: int, bottom: int) -> NDArray[np.float32]:
-        """(bottom - top, w, 2) px where rows of the top view are in the picture."""
+        """Return where rows of the top view are in the picture, (bottom - top, w, 2), px."""
         rows, columns = np.mgrid[top:bottom, 0 : self.size[0]].astype(float)
         places = np.column_stack([columns.ravel(), rows.ravel()])
         floor = through(np.linalg.inv(self.to_top), places)
@@ -184,22 +191,23 @@ class Calibration(Part):
 
     @cached_property
     def all_seen_at(self) -> NDArray[np.float32]:
-        """(h, w, 2) px where the top view is in the picture."""
+        """Where each pixel of the top view is in the picture, (h, w, 2), px."""
         return self._seen_at(0, self.size[1])
 
     def rectified(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """One of many frames, (H, W, 3), as the floor is seen from straight above, (h, w, 3)."""
+        """Warp one of many frames (H, W, 3) into a view from straight above, (h, w, 3)."""
         at = self.all_seen_at
         return np.asarray(cv2.remap(frame, at[..., 0], at[..., 1], cv2.INTER_LINEAR), np.uint8)
 
     def top_view(self, picture: Picture, source: str) -> Picture:
-        """The floor from straight above, with its scale.
+        """Warp a picture into the top view: the floor from straight above, with its scale.
 
         Args:
-            source: of the calibration, for the note.
+            picture: taken by this camera.
+            source: name of the calibration, for messages and the picture's note.
 
         Raises:
-            InputError: the picture has another size than the camera's.
+            InputError: the picture is not of the camera's size.
         """
         if picture.size != self.picture:
             (width, height), (w, h) = self.picture, picture.size
@@ -221,30 +229,30 @@ class Calibration(Part):
         return replace(found, place=place, notes=(note,))
 
     def to_yaml(self) -> str:
-        """The file's content."""
+        """Return the content of a calibration file."""
         return yaml.safe_dump(
             self.model_dump(mode="json"), default_flow_style=None, sort_keys=False
         )
 
 
 def read_calibration(path: Path) -> Calibration:
-    """What `formup calibrate` wrote.
+    """Read a calibration that `formup calibrate` wrote.
 
     Raises:
-        InputError: it cannot be read, or is no calibration; names every mistake.
+        InputError: the file cannot be read, or holds no calibration; names every mistake.
     """
     content = content_of(path, "picture: [1280, 720]")
     return validated(path, "a camera above a floor", Calibration, content)
 
 
 def through(matrix: Floats, points: FloatArray) -> FloatArray:
-    """(n, 2) points through a homography."""
+    """Map points (n, 2) through a homography (3, 3)."""
     found = np.column_stack([points, np.ones(len(points))]) @ matrix.T
     return found[:, :2] / found[:, 2:]
 
 
-def _around(floor: tuple[float, float, float, float]) -> FloatArray:
-    """(n, 2) m on the border of a floor."""
+def _border_points(floor: tuple[float, float, float, float]) -> FloatArray:
+    """Return points (n, 2), m, along the border of a floor."""
     x0, y0, x1, y1 = floor
     x, y = np.linspace(x0, x1, BORDER), np.linspace(y0, y1, BORDER)
     sides = [(x, np.full(BORDER, y0)), (x, np.full(BORDER, y1)), (np.full(BORDER, x0), y)]

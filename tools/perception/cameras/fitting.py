@@ -1,4 +1,4 @@
-"""Fits the homography of a floor to points that are known on it; refuses what does not fit."""
+"""Fits the homography of a floor to known points on it, and refuses points that do not fit."""
 
 import math
 from collections.abc import Sequence
@@ -15,31 +15,33 @@ from .calibration import Calibration, Lens, Residuals, through
 from .known import Known, read_lens
 
 LARGE = 0.005
-"""Share of the picture's diagonal by which a known point may be off."""
+"""Greatest error of a known point, as a share of the picture's diagonal."""
 UNSURE = 0.01
-"""Share of the floor's diagonal by which its corners may be off, with pixels off by"""
+"""Greatest expected error of the floor's corners, as a share of its diagonal."""
 CLICK = 0.1
-"""so many px at least."""
+"""Least error of pixels assumed in estimating that of the corners, px."""
 FLAT = 0.02
-"""Points whose spread across a line is a smaller share of that along it are on the line."""
+"""Points lie on a line if their spread across it is at most this share of that along it."""
 
 
 def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibration:
-    """The calibration of the camera that took a picture, (H, W, 3) RGB.
+    """Calibrate the camera that took a picture.
 
     Args:
-        path: of the file that says what is known, for messages.
+        known: what is known of the floor and the camera.
+        pixels: the picture, (H, W, 3) RGB.
+        path: the file that states what is known, for messages.
 
     Raises:
-        InputError: too few points, points on a line or off what the others say, or a floor that is
-            not all in the picture; names the points.
+        InputError: too few points, points on a line or inconsistent with the others, or a floor
+            that is not entirely in the picture; names the points.
     """
     size = pixels.shape[1], pixels.shape[0]
     names, at, floor = known.found(pixels)
     lens = None if known.lens is None else read_lens(known.lens, size)
     _check_points(names, at, floor, size)
-    straight = at if lens is None else lens.straightened(at)
-    matrix = _fitted(straight, floor)
+    straight = at if lens is None else lens.undistorted(at)
+    matrix = _fit_homography(straight, floor)
     off = _residuals(matrix, straight, floor)
     _check_fit(names, straight, floor, off, LARGE * math.hypot(*size))
     if not (_depths(matrix, straight) > 0).all():
@@ -62,21 +64,28 @@ def calibrated(known: Known, pixels: NDArray[np.uint8], path: Path) -> Calibrati
             worst_px=off.max(),
             mean_mm=mm.mean(),
             worst_mm=mm.max(),
-            corners_mm=_at_corners(straight, floor, corners, max(float(off.mean()), CLICK)),
+            corners_mm=_corner_error_mm(straight, floor, corners, max(float(off.mean()), CLICK)),
         ),
     }
     return validated(path, "a floor that can be used", Calibration, values)
 
 
-def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, noise: float) -> float:
-    """By how much places, (4, 2) m, are off where pixels are, mm.
+def _corner_error_mm(
+    pixels: FloatArray, floor: FloatArray, corners: FloatArray, noise: float
+) -> float:
+    """Estimate the error of the floor's worst corner, mm, from pixel noise, by simulation.
+
+    Args:
+        pixels, floor: the known points, (n, 2) px and (n, 2) m.
+        corners: (4, 2), m.
+        noise: standard deviation of the pixel noise, px.
 
     Raises:
-        InputError: by too much.
+        InputError: the error is too large.
     """
     rng, size = np.random.default_rng(0), float(np.linalg.norm(corners[2] - corners[0]))
-    at = through(np.linalg.inv(_fitted(pixels, floor)), corners)
-    tries = [_fitted(pixels + rng.normal(0, noise, pixels.shape), floor) for _ in range(30)]
+    at = through(np.linalg.inv(_fit_homography(pixels, floor)), corners)
+    tries = [_fit_homography(pixels + rng.normal(0, noise, pixels.shape), floor) for _ in range(30)]
     off = np.linalg.norm([through(matrix, at) - corners for matrix in tries], axis=2)
     worst = float(off.mean(axis=0).max())
     if worst > UNSURE * size:
@@ -87,8 +96,12 @@ def _at_corners(pixels: FloatArray, floor: FloatArray, corners: FloatArray, nois
     return 1000 * worst
 
 
-def _fitted(pixels: FloatArray, floor: FloatArray) -> FloatArray:
-    """(3, 3) from px to m, with which what is known is in front of the camera."""
+def _fit_homography(pixels: FloatArray, floor: FloatArray) -> FloatArray:
+    """Fit a homography (3, 3) from px to m, with the known points in front of the camera.
+
+    Raises:
+        InputError: no homography maps these points to these places.
+    """
     found, _ = cv2.findHomography(pixels, floor, 0)
     if np.shape(found) != (3, 3):
         raise InputError("No view of a floor takes these points to these places; check them.")
@@ -101,7 +114,7 @@ def _depths(matrix: FloatArray, pixels: FloatArray) -> FloatArray:
 
 
 def _residuals(matrix: FloatArray, pixels: FloatArray, floor: FloatArray) -> FloatArray:
-    """(n,) px by which points are off."""
+    """Return the errors of points in the picture, (n,), px."""
     return np.linalg.norm(through(np.linalg.inv(matrix), floor) - pixels, axis=1)
 
 
@@ -133,26 +146,26 @@ def _check_points(
 def _check_fit(
     names: Sequence[str], pixels: FloatArray, floor: FloatArray, off: FloatArray, limit: float
 ) -> None:
-    """Refuse points that are off; where one of six or more is to blame, that one is named."""
+    """Refuse points that do not fit; if leaving out one of six or more mends it, name that one."""
     if off.max() <= limit:
         return
     worst = [i for i in np.argsort(-off) if off[i] > limit]
     if len(names) >= 6:
         for i in range(len(names)):
             rest = np.delete(pixels, i, axis=0), np.delete(floor, i, axis=0)
-            matrix = _fitted(*rest)
+            matrix = _fit_homography(*rest)
             if _residuals(matrix, *rest).max() <= limit:
                 worst, off = [i], _residuals(matrix, pixels, floor)
                 break
-    told = ", ".join(f"{names[i]} by {off[i]:.1f} px" for i in worst[:10])
+    shown = ", ".join(f"{names[i]} by {off[i]:.1f} px" for i in worst[:10])
     raise InputError(
-        f"Points do not fit one flat floor: {told}, and {limit:.1f} px are allowed; measure these "
+        f"Points do not fit one flat floor: {shown}, and {limit:.1f} px are allowed; measure these "
         "anew, or give a lens file if straight lines are bent in the picture."
     )
 
 
 def _camera(matrix: FloatArray, lens: Lens) -> tuple[float, float, float]:
-    """Where the camera is above the floor, m."""
+    """Return the camera's x and y on the floor and its height above it, m."""
     axes = np.linalg.inv(matrix @ np.array(lens.camera_matrix))
     axes *= np.sign(axes[2, 2]) * 2 / (np.linalg.norm(axes[:, 0]) + np.linalg.norm(axes[:, 1]))
     turn = np.column_stack([axes[:, :2], np.cross(axes[:, 0], axes[:, 1])])
@@ -162,7 +175,7 @@ def _camera(matrix: FloatArray, lens: Lens) -> tuple[float, float, float]:
 
 
 def _metres_per_pixel(matrix: FloatArray, middle: FloatArray) -> float:
-    """Metres to a pixel at a place of the floor, (2,) m, to two digits."""
+    """Return the metres per pixel at a place (2,) on the floor, m, to two digits."""
     at = through(np.linalg.inv(matrix), middle[None])
     area = abs(np.linalg.det(matrix)) / abs(_depths(matrix, at)[0]) ** 3
     return float(f"{math.sqrt(area):.2g}")

@@ -1,6 +1,6 @@
-"""What is known of a floor before its camera is calibrated, and where a picture shows that.
+"""What is known of a floor before its camera is calibrated, and where a picture shows it.
 
-That is points that somebody clicked, tags that lie on the floor, or a board that does.
+These are points that somebody clicked, or tags or a board on the floor.
 """
 
 from collections.abc import Mapping
@@ -15,33 +15,33 @@ from pydantic import Field, model_validator
 from ...errors import InputError
 from ...geometry.outline import FloatArray
 from ...yaml_files import content_of, validated
-from .calibration import Lens, Metres, Number, Part, Place
+from .calibration import CameraFileModel, Lens, Metres, Number, Place
 from .tags import Dictionary, centre, tags_in
 
 Squares = Annotated[int, Field(ge=3, le=100)]
 Above0 = Annotated[float, Field(gt=0, le=100)]
-Found = tuple[list[str], FloatArray, FloatArray]
-"""Names of points, where they are seen, (n, 2) px, and where they are, (n, 2) m."""
+PointMatches = tuple[list[str], FloatArray, FloatArray]
+"""Names of points, where they are seen, (n, 2) px, and where they are on the floor, (n, 2) m."""
 
 
-class KnownPoint(Part):
-    """A point that is known: where it is seen, px, and where it is on the floor, m."""
+class KnownPoint(CameraFileModel):
+    """A known point: where it is seen, px, and where it is on the floor, m."""
 
     name: str = Field(default="", max_length=100)
     pixel: tuple[Number, Number]
     floor: Place
 
 
-class Board(Part):
-    """A board that lies on the floor, along its axes.
+class Board(CameraFileModel):
+    """A board that lies on the floor, aligned with its axes.
 
     Attributes:
-        squares: how many there are in a row and in a column.
-        square: side of one, m.
-        at: where the inner corner is that is at the upper left in the picture (for ChArUco in the
-            print), m. From there rows run along x, and columns against y.
+        squares: number of squares in a row and in a column.
+        square: side of a square, m.
+        at: position of the inner corner that is at the upper left in the picture (of a ChArUco
+            board, in the print), m. From there rows run along x, and columns against y.
         marker: side of a ChArUco board's tags, m; None for a chessboard.
-        dictionary: of these tags.
+        dictionary: OpenCV's dictionary of these tags.
     """
 
     squares: tuple[Squares, Squares]
@@ -51,18 +51,18 @@ class Board(Part):
     dictionary: Dictionary = "DICT_4X4_50"
 
 
-class Known(Part):
-    """What is known of a floor and its camera: a file for `formup calibrate`.
+class Known(CameraFileModel):
+    """What is known of a floor and its camera: the content of a file for `formup calibrate`.
 
     Attributes:
-        points: that were clicked.
-        tags: where the centres of tags on the floor are, m, by their ids.
-        dictionary: of these tags.
-        board: that lies on the floor.
-        floor: x0, y0, x1, y1 of what the top view is to show, m; by default, as far as what is
-            known reaches.
-        camera: where it is, m: on the floor, and how high above it.
-        lens: a file of OpenCV's with camera_matrix and distortion_coefficients, beside this one.
+        points: points that somebody clicked.
+        tags: centres of the tags on the floor, m, by tag id.
+        dictionary: OpenCV's dictionary of these tags.
+        board: a board on the floor.
+        floor: x0, y0, x1, y1 of what the top view is to show, m; by default, the bounds of the
+            known points.
+        camera: its x and y on the floor and its height above it, m.
+        lens: an OpenCV file with camera_matrix and distortion_coefficients, relative to this one.
     """
 
     points: tuple[KnownPoint, ...] = Field(default=(), max_length=1_000)
@@ -81,14 +81,14 @@ class Known(Part):
             raise ValueError("a board does not say how far the floor reaches: give floor too")
         return self
 
-    def found(self, pixels: NDArray[np.uint8]) -> Found:
-        """What is known, in a picture.
+    def found(self, pixels: NDArray[np.uint8]) -> PointMatches:
+        """Find the known points in a picture.
 
         Args:
             pixels: (H, W, 3) RGB.
 
         Raises:
-            InputError: tags, or the board, are not seen.
+            InputError: a tag is not seen exactly once, or the board is not seen.
         """
         if self.points:
             names = [p.name or f"{p.pixel[0]:g},{p.pixel[1]:g}" for p in self.points]
@@ -109,32 +109,36 @@ class Known(Part):
 
 
 def read_known(path: Path) -> Known:
-    """What a person wrote down of a floor.
+    """Read what a person wrote down about a floor.
 
     Raises:
-        InputError: it cannot be read, or does not say such; names every mistake.
+        InputError: the file cannot be read, or has another content; names every mistake.
     """
     known = validated(path, "what is known of a floor", Known, content_of(path, "points:"))
     return known.model_copy(update={"lens": known.lens and path.parent / known.lens})
 
 
 def read_lens(path: Path, size: tuple[int, int]) -> Lens:
-    """A lens as OpenCV's calibration stores it, in YAML, JSON or XML.
+    """Read a lens as OpenCV's calibration stores it, in YAML, JSON or XML.
 
     Args:
-        size: of the picture, px.
+        path: the file.
+        size: width and height of the picture, px.
 
     Raises:
-        InputError: it cannot be read, is for pictures of another size, or has no camera_matrix.
+        InputError: the file cannot be read, is for pictures of another size, or has no
+            camera_matrix.
     """
     try:
         path.read_bytes()
         file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         names = "camera_matrix", "distortion_coefficients", "image_width", "image_height"
-        matrix, bent, width, height = map(file.getNode, names)
+        matrix, distortion, width, height = map(file.getNode, names)
         rows = np.asarray(matrix.mat(), dtype=float).reshape(3, 3).tolist()
-        more = [] if bent.empty() else np.asarray(bent.mat(), dtype=float).ravel().tolist()
-        said = size if width.empty() else (int(width.real()), int(height.real()))
+        more = (
+            [] if distortion.empty() else np.asarray(distortion.mat(), dtype=float).ravel().tolist()
+        )
+        stated = size if width.empty() else (int(width.real()), int(height.real()))
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except (cv2.error, TypeError, ValueError, SystemError):
@@ -142,21 +146,21 @@ def read_lens(path: Path, size: tuple[int, int]) -> Lens:
             f"{path} holds no lens; give a file that OpenCV's FileStorage wrote, with "
             "camera_matrix and distortion_coefficients."
         ) from None
-    if said != size:
+    if stated != size:
         raise InputError(
-            f"{path} is for pictures of {said[0]} x {said[1]} pixels, and this one has "
+            f"{path} is for pictures of {stated[0]} x {stated[1]} pixels, and this one has "
             f"{size[0]} x {size[1]}; calibrate the lens at that size."
         )
     return validated(path, "a lens", Lens, {"camera_matrix": rows, "distortion": more})
 
 
-def _on_board(grey: NDArray[np.uint8], board: Board) -> Found:
+def _on_board(grey: NDArray[np.uint8], board: Board) -> PointMatches:
     columns, rows = board.squares[0] - 1, board.squares[1] - 1
     if board.marker is None:
         kind = "chessboard"
         ok, corners = cv2.findChessboardCornersSB(grey, (columns, rows), flags=0)
         at = np.asarray(corners, dtype=float).reshape(-1, 2) if ok else np.empty((0, 2))
-        if ok and at[-1].sum() < at[0].sum():  # a half turn looks the same
+        if ok and at[-1].sum() < at[0].sum():  # a chessboard looks the same after a half turn
             at = at[::-1]
         ids = np.arange(len(at))
     else:

@@ -1,7 +1,7 @@
-"""A camera's newest frame and how old it is, whatever the camera and its driver do.
+"""Gives a camera's newest frame and its age, whatever the camera and its driver do.
 
-OpenCV hands out frames that waited in a buffer, blocks for ever, and says it has read from a camera
-that is unplugged. So a thread reads all the time, and whoever asks is never kept waiting by it.
+OpenCV may return frames that waited in a buffer, block for ever, or claim to have read from a
+camera that is unplugged. So a thread reads continuously, and callers never wait for a read.
 """
 
 import re
@@ -20,28 +20,28 @@ from ...errors import InputError
 from ..image import Picture, picture_from_bytes
 
 MAX_AGE = 0.3
-"""Seconds after which a frame says nothing of now."""
+"""Age in seconds beyond which a frame no longer shows what is there now."""
 SAME = 1.0
-"""Seconds for which pixels may stay the very same: noise changes those of a camera that lives."""
+"""Seconds for which all pixels may stay identical: noise changes those of a live camera."""
 OPENING = 10.0
-"""Seconds for which a camera is waited for."""
+"""Seconds to wait for a camera to open."""
 WARM = 5
-"""Frames in which a camera finds its exposure."""
+"""Number of frames that a camera takes to find its exposure."""
 CLOSING = 1.0
 PAUSE = 0.01
 
 
 class CameraError(InputError):
-    """A camera that does not show what is there now; the text says why."""
+    """Raised for a camera that does not show what is there now; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a camera saw.
+    """A frame of a camera.
 
     Attributes:
         pixels: (H, W, 3) BGR uint8.
-        seen: when, seconds on this computer's monotonic clock.
+        seen: when it was read, seconds on this computer's monotonic clock.
     """
 
     pixels: NDArray[np.uint8]
@@ -49,13 +49,13 @@ class Frame:
 
 
 class Camera:
-    """Reads a camera until it is closed.
+    """A camera that a thread reads until it is closed.
 
     Args:
         source: the number of a device, the URL of a stream, or a video file.
 
     Attributes:
-        name: it, without who logs in.
+        name: the source, without a URL's login.
     """
 
     def __init__(self, source: str) -> None:
@@ -69,10 +69,11 @@ class Camera:
         self._thread.start()
 
     def newest(self, max_age: float = MAX_AGE) -> Frame:
-        """The last frame.
+        """Return the newest frame.
 
         Raises:
-            CameraError: there is none so young, or the camera shows the same one all the time.
+            CameraError: it is older than `max_age` seconds, there is none, or the camera keeps
+                showing the same one.
         """
         now, frame = time.monotonic(), self._newest
         if frame is None or now - frame.seen > max_age:
@@ -91,18 +92,18 @@ class Camera:
         return frame
 
     def first(self) -> Frame:
-        """A frame soon after the camera was opened, which is waited for.
+        """Wait until the camera has found its exposure, 10 s at most, and return a frame.
 
         Raises:
-            CameraError: there is none.
+            CameraError: there is no frame that can be used, see `newest`.
         """
         ends = self._begun + OPENING
         while not self._over and time.monotonic() < ends and self._count < WARM:
             time.sleep(PAUSE)
-        return (self._over and self._newest) or self.newest()  # a file of one frame is over soon
+        return (self._over and self._newest) or self.newest()  # a one-frame file ends at once
 
     def close(self) -> None:
-        """Let go of the camera; a read that hangs is not waited for."""
+        """Release the camera, without waiting for a read that hangs."""
         self._over = "is closed"
         self._closed.set()
         self._thread.join(CLOSING)
@@ -129,10 +130,10 @@ class Camera:
 
 
 def picture_taken(source: str) -> Picture:
-    """What a camera sees now.
+    """Take a picture with a camera.
 
     Raises:
-        CameraError: it shows nothing that can be used.
+        CameraError: the camera shows nothing that can be used.
     """
     camera = Camera(source)
     try:

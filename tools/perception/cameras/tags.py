@@ -1,7 +1,7 @@
-"""Printed tags in a picture: ArUco's or AprilTag's, their corners to a fraction of a pixel.
+"""Finds printed ArUco or AprilTag tags in a picture, with corners to a fraction of a pixel.
 
-Corners as the detector has them turn a tag of 24 px by up to 4 degrees, so that lines are fitted to
-its sides and met.
+The detector's own corners can turn a tag of 24 px by up to 4 degrees, so lines are fitted to its
+sides and intersected.
 """
 
 import math
@@ -17,31 +17,32 @@ from ...geometry.outline import FloatArray
 
 PASSES = 2
 ALONG = np.linspace(0.12, 0.88, 16)
-"""Where a side is looked at, as shares of its length: not where others begin."""
+"""Where a side is sampled, as shares of its length: away from its ends, where others begin."""
 REACH = 2.5
-"""A side is looked for within so many px, or"""
+"""Greatest distance within which a side's edge is searched for, px."""
 SHARE = 0.1
-"""this share of it, as the cells of a small tag are not much larger."""
+"""The same as a share of the side, if that is less: a small tag's cells are not much larger."""
 
 
-def _known(name: str) -> str:
+def _known_dictionary(name: str) -> str:
     if not (name.startswith("DICT_") and hasattr(cv2.aruco, name)):
         raise ValueError(f"no such dictionary, such as DICT_4X4_50 or DICT_APRILTAG_36h11: {name}")
     return name
 
 
-Dictionary = Annotated[str, AfterValidator(_known)]
-"""What OpenCV calls a family of tags."""
+Dictionary = Annotated[str, AfterValidator(_known_dictionary)]
+"""OpenCV's name of a family of tags."""
 
 
 def tags_in(pixels: NDArray[np.uint8], dictionary: Dictionary) -> dict[int, FloatArray]:
-    """The tags of a picture that are there once.
+    """Find the tags that a picture shows exactly once.
 
     Args:
         pixels: (H, W, 3) BGR.
+        dictionary: the family of tags to look for.
 
     Returns:
-        by the tags' ids their corners, (4, 2) px, clockwise from the upper left of the print.
+        The corners (4, 2) by tag id, px, clockwise from the upper left of the print.
     """
     grey = np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), np.uint8)
     family = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
@@ -51,27 +52,31 @@ def tags_in(pixels: NDArray[np.uint8], dictionary: Dictionary) -> dict[int, Floa
     tags = [int(tag) for tag in np.ravel(ids)] if len(corners) else []
     often = Counter(tags)
     return {
-        tag: _refined(grey, np.asarray(four, dtype=float).reshape(4, 2))
+        tag: _refine_corners(grey, np.asarray(four, dtype=float).reshape(4, 2))
         for tag, four in zip(tags, corners, strict=True)
         if often[tag] == 1
     }
 
 
 def centre(corners: FloatArray) -> FloatArray:
-    """Where the centre of a square is seen: where its diagonals meet, (2,) px."""
+    """Return where the centre of a square is seen, (2,), px: the intersection of its diagonals."""
     a, b, c, d = corners
     (ax, ay), (bx, by), (cx, cy) = (b - a).tolist(), (c - a).tolist(), (d - b).tolist()
     return a + (c - a) * (ax * cy - ay * cx) / (bx * cy - by * cx)
 
 
 def heading(corners: FloatArray) -> float:
-    """Where the right side of a tag points to, radians about x towards y, from (4, 2) m."""
+    """Return where a tag's right side points, radians from x towards y, from corners (4, 2), m."""
     x, y = corners[1] + corners[2] - corners[0] - corners[3]
     return math.atan2(y, x)
 
 
-def _refined(grey: NDArray[np.uint8], corners: FloatArray) -> FloatArray:
-    """Corners where lines meet that were fitted to the sides, black within and white without."""
+def _refine_corners(grey: NDArray[np.uint8], corners: FloatArray) -> FloatArray:
+    """Refine corners (4, 2) as the intersections of lines fitted to the tag's sides.
+
+    A side is where black inside turns to white outside. Corners that would move too far are
+    returned as they are.
+    """
     for _ in range(PASSES):
         ways = np.roll(corners, -1, axis=0) - corners
         sides = np.linalg.norm(ways, axis=1, keepdims=True)
@@ -90,7 +95,7 @@ def _refined(grey: NDArray[np.uint8], corners: FloatArray) -> FloatArray:
         pairs = np.stack([np.roll(normals, 1, axis=0), normals], axis=1)
         reaches = np.stack([np.roll(reach, 1), reach], axis=1)[..., None]
         met = np.asarray(np.linalg.pinv(pairs) @ reaches, dtype=float)[..., 0]
-        if np.abs(met - corners).max() > 2 * REACH:  # something lies across a side
+        if np.abs(met - corners).max() > 2 * REACH:  # something covers part of a side
             return corners
         corners = met
     return corners

@@ -1,1 +1,1 @@
-"""What is in a picture: things that stand out, found without trained weights."""
+"""Detectors of things in a picture: those that stand out, or those that a network finds by name."""

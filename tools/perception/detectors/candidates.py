@@ -1,7 +1,7 @@
 """Finds the things that stand out in a picture, without trained weights or labels.
 
-Of many proposals those that look most like a thing are kept; a part of a thing, or several things
-run together, give way to the thing itself.
+Of many proposals, those that look most like a thing are kept; a part of a thing, or several things
+merged into one, give way to the thing itself.
 """
 
 import math
@@ -26,43 +26,44 @@ from ..target_prompt import TargetPrompt
 from .objectness import Region, scored_regions
 from .proposals import CELLS, IN_CELL, proposals
 
-# The score of a thing as clear as can be, and the least that is shown to a person.
+# The score of a thing of full salience, and the least score that is shown to a person.
 SURE, LEAST = 1.5, 0.4
-# Words are decided among things at least this salient, or this share of the most salient one.
+# Words are resolved among things at least this salient, or this share as salient as the first.
 CLEAR, CLEAR_SHARE = 0.6, 0.62
-# What comes three times or more is likelier a thing: so much its score rises. Alike are sizes to
-# this logarithm of their ratio, and colours to this distance in the features.
+# Something seen three times or more is likelier to be a thing: its score rises by this factor.
+# Sizes are alike up to this logarithm of their ratio, colours up to this distance in the features.
 REPEATED, ALIKE_SIZE, ALIKE_COLOUR = 1.15, 0.2, 15.0
-# Regions that share more than this are the same thing.
+# Overlaps (intersection over union) from which two regions show the same thing, likely or surely.
 SAME, VERY_SAME = 0.5, 0.85
-# One in another may be a part of it, if it is no more than this much the same.
+# A region of which this share lies in another may be a part of it, if they overlap less than this.
 NESTED, SAME_NESTED = 0.95, 0.7
-# More than a person or a model can look through.
+# The most regions that are kept: more than a person or a model can look through.
 MOST = 80
-# What fills this share of a hole is the hole.
+# A thing that fills this share of a hole is the hole.
 FILLS = 0.6
-# A part lies in its thing by this share, and looks no more like a thing than this many times it.
+# This share of a part lies in its whole, and its score is at most this many times the whole's.
 WITHIN, PART = 0.85, 1.3
-# Things run together: each has its own ground around this share of its edge, together they cover
-# so much of the whole, and none of them looks much worse than it.
+# Merged things: each has ground of its own around this share of its edge, together they cover this
+# share of the whole, and their mean score is more than this share of the whole's.
 OWN_GROUND, COVERED, AS_GOOD = 0.6, 0.6, 0.7
 GROUND = 4.0
-# A colour is everywhere where it fills so much of a cell in this share of the cells; it is met
-# again within a side's length of a region at this share of its outline.
+# A colour is everywhere if this share of the cells holds enough of it, colours within this distance
+# being alike. It is met again within a region's size beyond it along this share of the outline.
 EVERYWHERE, ALIKE, AGAIN = 0.4, 9.0, 0.6
 COARSE, BEYOND = 3, 12
-# Measured again, an outline is taken if it overlaps so far with the candidate's.
+# An outline that is measured again is taken if it overlaps this far with the candidate's.
 REFINED = 0.92
-# A rough outline has 30 vertices at most, and closes with the first.
+# A rough outline has at most 30 vertices, and closes with the first.
 MOST_VERTICES = 31
-# Masks are smoothed at this many times their size, so that outlines show no stairs.
+# Masks are smoothed at this many times their size, so that outlines show no staircase.
 FINER = 3
-# Holes count from this share of the thing, when they show the ground: its colours or nearly.
+# Holes count from this share of the thing if they show the ground: colours within this distance of
+# the ground's in more than this share of the hole.
 HOLE, SHOWS_GROUND, SHOWN = 0.1, 16.0, 0.4
 
 
 class StandoutDetector:
-    """What stands out from its surroundings; knows no words."""
+    """Detector of things that stand out from their surroundings; it knows no words."""
 
     name = "standout"
 
@@ -72,7 +73,7 @@ class StandoutDetector:
 
 
 def find_candidates(pixels: Bytes) -> tuple[Candidate, ...]:
-    """The things in a picture (H, W, 3) RGB, numbered c1, c2, ... from the most salient one."""
+    """Find the things in a picture (H, W, 3) RGB, numbered c1, c2, ... by falling salience."""
     height, width = pixels.shape[:2]
     window = open_window(pixels, (0, 0, width, height), SIDE)
     least = LEAST / REPEATED
@@ -99,7 +100,10 @@ def find_candidates(pixels: Bytes) -> tuple[Candidate, ...]:
 
 
 def salient_candidates(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Those that words can mean: what was found by words, or stands out more than a texture."""
+    """Return the candidates that words can mean.
+
+    These were found by words, or stand out more than a texture does.
+    """
     most = max((c.salience for c in candidates if not c.named), default=0.0)
     least = min(CLEAR, CLEAR_SHARE * most)
     return tuple(c for c in candidates if c.named or c.salience >= least)
@@ -108,11 +112,15 @@ def salient_candidates(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]
 def segment_candidate(
     segment: Callable[[TargetPrompt], Segmentation], candidate: Candidate, *, by_box: bool = False
 ) -> tuple[Outline, float, dict[str, float]]:
-    """Measure a candidate's outline again up close: outline, confidence and the cues it is made of.
+    """Measure a candidate's outline again up close.
 
-    The segmenter is pointed at the candidate's outline, or only its box. Where it finds something
-    else, the candidate stays as it was found; its confidence is half how far the two agree, half
-    how clearly it stands out.
+    The segmenter is prompted with the candidate's outline, or with its box alone; its confidence
+    is capped by how far the two agree. If it finds something else, the candidate's own outline
+    stays, with the mean of that overlap and the candidate's salience as confidence.
+
+    Returns:
+        The outline, its confidence and the cues that it is made of; confidence 0 where the
+        segmenter's mask has no outline.
     """
     outline = candidate.outline
     rough = {"box": outline.bounds} if by_box else {"outline": _rough_outline(outline.filled)}
@@ -139,7 +147,7 @@ def _rough_outline(polygon: Polygon) -> tuple[tuple[float, float], ...]:
 
 
 class Thing(NamedTuple):
-    """A region with its holes (where the ground shows), what is left without them, and a score.
+    """A region, its holes (where the ground shows through), the rest without them, and a score.
 
     Masks are (h, w), in the region's box.
     """
@@ -151,7 +159,7 @@ class Thing(NamedTuple):
 
 
 def _shows_ground(region: Region, features: Bytes) -> bool:
-    """Whether a region has the ground's colour: that of most of the picture, also just beyond.
+    """Return whether a region has the ground's colour: found across the picture and nearby too.
 
     Bays between lines, squares of a tablecloth and the holes of rings are such regions.
     """
@@ -170,13 +178,13 @@ def _shows_ground(region: Region, features: Bytes) -> bool:
     at = np.rint(points).astype(np.int64).clip(0, far)
     met = np.asarray(features[at[..., 1], at[..., 0]], dtype=np.float64)
     again = np.linalg.norm(met - own, axis=2).min(axis=0) < ALIKE
-    # What lies beyond the picture may be the same colour or not: it does not count.
+    # What lies beyond the picture may have any colour, so it does not count.
     seen = np.asarray(((points[-1] >= 0) & (points[-1] <= far)).all(axis=1))
     return bool(seen.any()) and float(np.mean(np.asarray(again)[seen])) > AGAIN
 
 
 def _distinct_regions(regions: Sequence[Region], features: Bytes) -> list[Region]:
-    """The best of all that show the same, with the gaps any of them shows; none that is ground."""
+    """Keep the best of the regions that show the same thing, with all their gaps; drop ground."""
     chosen: list[Region] = []
     for region in regions:
         shared = [region.overlap(other) for other in chosen]
@@ -192,15 +200,15 @@ def _distinct_regions(regions: Sequence[Region], features: Bytes) -> list[Region
 
 
 def _nested(one: Region, other: Region) -> bool:
-    """Whether one of two regions lies in the other."""
+    """Return whether one of two regions lies in the other."""
     return one.shared(other) >= NESTED * min(one.area, other.area)
 
 
 def _whole_objects(regions: Sequence[Region], features: Bytes) -> list[Thing]:
-    """The regions that are neither parts of others nor several things run together."""
+    """Return the regions that are neither parts of others nor several things merged into one."""
     things: list[Thing] = []
     for region in regions:
-        if not _run_together(region, regions):
+        if not _is_merged(region, regions):
             holes = _ground_holes(region, features)
             solid = region.proposal.mask.copy()
             for hole in holes:
@@ -215,7 +223,7 @@ def _whole_objects(regions: Sequence[Region], features: Bytes) -> list[Thing]:
 
 
 def _repetition_factor(thing: Thing, things: Sequence[Thing], features: Bytes) -> float:
-    """REPEATED where two others or more have its size, proportions and colour, else 1."""
+    """Return REPEATED if two or more others have its size, proportions and colour, else 1."""
     area, colour = np.count_nonzero(thing.solid), _median_colour(thing, features)
     height, width = thing.solid.shape
     alike = 0
@@ -229,7 +237,7 @@ def _repetition_factor(thing: Thing, things: Sequence[Thing], features: Bytes) -
 
 
 def _median_colour(thing: Thing, features: Bytes) -> Floats:
-    """The median colour of a thing, in features."""
+    """Return the median colour (3,) of a thing, in features."""
     x, y = thing.region.proposal.origin
     height, width = thing.solid.shape
     inside = features[y : y + height, x : x + width][thing.solid]
@@ -237,8 +245,8 @@ def _median_colour(thing: Thing, features: Bytes) -> Floats:
 
 
 def _is_hole(thing: Thing, other: Thing) -> bool:
-    """Whether a thing is as good as a hole of another one."""
-    if thing is other:  # a hole may be nearly all that there is of a wire frame
+    """Return whether a thing is in fact a hole of another one."""
+    if thing is other:  # a wire frame may be nearly all hole
         return False
     return any(
         _lies_within(thing.region, other.region, hole)
@@ -248,7 +256,7 @@ def _is_hole(thing: Thing, other: Thing) -> bool:
 
 
 def _is_part(part: Thing, whole: Thing) -> bool:
-    """Whether a thing lies in the body of another that looks as good or nearly so."""
+    """Return whether a thing lies in the body of a larger one with as good a score, or nearly."""
     if PART * whole.score < part.score or part.region.area >= whole.region.area:
         return False
     return _lies_within(part.region, whole.region, whole.solid)
@@ -258,8 +266,8 @@ def _lies_within(part: Region, whole: Region, body: Mask) -> bool:
     return part.shared(whole, body) >= WITHIN * part.area
 
 
-def _run_together(whole: Region, regions: Sequence[Region]) -> bool:
-    """Whether a region is several things that each stand on the ground themselves."""
+def _is_merged(whole: Region, regions: Sequence[Region]) -> bool:
+    """Return whether a region is several things, each with ground of its own around it."""
     parts: list[Region] = []
     for region in sorted(regions, key=lambda r: -r.area):
         smaller = region.area < whole.area
@@ -274,19 +282,19 @@ def _run_together(whole: Region, regions: Sequence[Region]) -> bool:
 
 
 def _own_ground(part: Region, whole: Region) -> float:
-    """The share of a part's surroundings that does not belong to the whole."""
+    """Return the share of a part's surroundings that does not belong to the whole."""
     return 1 - float(np.mean(whole.holds(part.points + GROUND * part.normals)))
 
 
 def _thing_outline(thing: Thing, window: Window) -> Outline | None:
-    """The thing's outline in image px, holes kept; None for a speck."""
+    """Return the thing's outline in image px, with its holes; None for a speck."""
     margin = 2
     padded = np.pad(thing.solid, margin).astype(np.float32)
     fine = cv2.resize(padded, None, fx=FINER, fy=FINER, interpolation=cv2.INTER_LINEAR)
     smooth = np.asarray(cv2.GaussianBlur(fine, (0, 0), 0.8 * FINER)) > 0.5
     contours, _ = cv2.findContours(smooth.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
-    # A smoothed picture's pixel centres lie between those it was made of; a contour runs through
-    # the outermost centres, half a fine pixel within the edge.
+    # The fine mask's pixel centres lie between those of the original; a contour runs through the
+    # outermost centres, half a fine pixel inside the edge.
     at = thing.region.proposal.origin
     rings = [
         window.to_picture_points((c[:, 0] + 0.5) / FINER - 0.5 - margin + at) for c in contours
@@ -304,7 +312,7 @@ def _thing_outline(thing: Thing, window: Window) -> Outline | None:
 
 
 def _ground_holes(region: Region, features: Bytes) -> tuple[Mask, ...]:
-    """The holes (h, w) in a region that show the ground around it."""
+    """Return the holes, (h, w) each, in a region that show the ground around it."""
     mask, (x, y) = region.proposal.mask, region.proposal.origin
     if not region.gaps:
         return ()
@@ -320,7 +328,7 @@ def _ground_holes(region: Region, features: Bytes) -> tuple[Mask, ...]:
             hole = labels == i
             holes.append((float(np.sum(alike[hole] - SHOWN)), hole))
     kept: list[Mask] = []
-    # Of the ways to see a hole first that which shows most ground, and little else.
+    # Of alternative holes, prefer the one that shows most ground and little else.
     for evidence, hole in sorted(holes, key=lambda h: -h[0]):
         if evidence > 0 and not any((hole & other).any() for other in kept):
             kept.append(hole)

@@ -1,4 +1,4 @@
-"""Grounding DINO (Liu et al., 2023) and MM Grounding DINO: words to boxes with scores."""
+"""Grounding DINO (Liu et al., 2023) and MM Grounding DINO: boxes with scores from words."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ..segmenters.protocol import Pixels
 from ..target_prompt import MIN_SIDE
 
 SCORE, TEXT_SCORE = 0.3, 0.25
-"""The least score of a box, and of the words it is labelled with, as its authors use them."""
+"""Least scores of a box and of the words that label it, as its authors use them."""
 CLASSES = {
     "grounding-dino": "GroundingDinoForObjectDetection",
     "mm-grounding-dino": "MMGroundingDinoForObjectDetection",
@@ -18,7 +18,7 @@ CLASSES = {
 
 
 class GroundingDinoDetector:
-    """Boxes of the things that a phrase names; finds nothing without one."""
+    """Detector of the things that a phrase names, as boxes; without a phrase it finds nothing."""
 
     name = "groundingdino"
     checkpoint = "IDEA-Research/grounding-dino-tiny"
@@ -56,7 +56,7 @@ class GroundingDinoDetector:
 
 
 class MmGroundingDinoDetector(GroundingDinoDetector):
-    """The same, trained anew on more pictures."""
+    """The same detector, retrained on more pictures."""
 
     name = "mm-groundingdino"
     checkpoint = "openmmlab-community/mm_grounding_dino_tiny_o365v1_goldg_v3det"

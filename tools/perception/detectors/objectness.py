@@ -13,24 +13,24 @@ from .proposals import Proposal
 
 Coordinates = npt.NDArray[np.floating]
 
-# Points on an outline at which the colours on both sides of it are compared.
+# Number of points on an outline at which the colours on both sides of it are compared.
 STATIONS = 48
-# How far inside and outside of the outline they are taken, px.
+# How far inside and outside the outline these colours are sampled, px.
 INSIDE, OUTSIDE = 2.0, 3.0
-# A fifth of an outline may be weak: shadows and touching neighbours.
+# A fifth of an outline may have weak contrast: shadows and touching neighbours.
 WEAK = 0.2
-# The contrast, and the unevenness of the ground, that halve the score.
+# The contrast, and the unevenness of the ground, that each halve the score.
 CLEAR, UNEVEN = 15.0, 20.0
-# Another thing next to it makes a ground no more uneven than this.
+# The most that a sample counts as uneven, so that a neighbouring thing does not spoil the ground.
 UNEVEN_MOST = 60.0
-# Every border of the picture that cuts a region lowers its score by so much.
+# Factor on a region's score for every border of the picture that cuts it.
 CUT = 0.6
 # Of two equally good regions the larger is the thing and the smaller its part, by a weak power.
 SIZE_POWER = 0.1
-# Thinner regions than this, px, are lines and cracks rather than things.
+# Regions thinner than this, px, are lines and cracks rather than things.
 BROAD = 4.0
-# Different gaps that are kept, the least share of the region that is a gap, and the share by which
-# two gaps differ.
+# The most gap masks that are kept, the least share of a region that its gaps take, and the share of
+# pixels by which two gap masks differ.
 MOST_GAPS, LEAST_GAP, SAME_GAPS = 6, 0.03, 0.02
 
 
@@ -38,8 +38,8 @@ MOST_GAPS, LEAST_GAP, SAME_GAPS = 6, 0.03, 0.02
 class Region:
     """A proposal, its score, and points of its outline with outward normals, (n, 2) each.
 
-    `borders` says how many borders of the picture cut it; `gaps` are ways to see the gaps in it,
-    (h, w) each in its box.
+    `borders` is the number of the picture's borders that cut it; `gaps` are alternative masks of
+    the gaps in it, (h, w) each, in its box.
     """
 
     proposal: Proposal
@@ -51,11 +51,11 @@ class Region:
 
     @property
     def area(self) -> int:
-        """Pixels, holes filled."""
+        """Number of its pixels, holes filled."""
         return self.proposal.area
 
     def holds(self, points: Coordinates) -> npt.NDArray[np.bool_]:
-        """Which of the points (n, 2) lie in the region, holes filled."""
+        """Return a mask (n,) of the points (n, 2) that lie in the region, holes filled."""
         mask = self.proposal.mask
         x, y = (np.rint(points) - self.proposal.origin).astype(np.int64).T
         height, width = mask.shape
@@ -64,7 +64,7 @@ class Region:
         return held
 
     def shared(self, other: "Region", body: Mask | None = None) -> int:
-        """Pixels that two regions have in common; of the other only its `body` if given."""
+        """Count the pixels that two regions share; of the other, only `body` counts if given."""
         (ax, ay), (bx, by) = self.proposal.origin, other.proposal.origin
         one, two = self.proposal.mask, other.proposal.mask if body is None else body
         x0, y0 = max(ax, bx), max(ay, by)
@@ -77,12 +77,12 @@ class Region:
         return int(np.count_nonzero(first & second))
 
     def overlap(self, other: "Region") -> float:
-        """Intersection over union of two regions."""
+        """Return the intersection over union of two regions."""
         shared = self.shared(other)
         return shared / (self.area + other.area - shared)
 
     def with_gaps_of(self, other: "Region") -> "Region":
-        """This region, with the gaps that another one that shows the same has as well."""
+        """Return this region with the gaps added that another region of the same thing has."""
         if other.proposal.gap_share < LEAST_GAP or len(self.gaps) >= MOST_GAPS:
             return self
         height, width = self.proposal.mask.shape
@@ -97,8 +97,8 @@ class Region:
 
 
 def scored_regions(found: Iterable[Proposal], features: Bytes) -> list[Region]:
-    """The proposals as regions of `features` (h, w, 3), the best first."""
-    traced = [(p, t) for p in found if (t := _traced(p.ring)) is not None]
+    """Score the proposals as regions of `features` (h, w, 3), best first."""
+    traced = [(p, t) for p in found if (t := _outline_samples(p.ring)) is not None]
     if not traced:
         return []
     points = np.asarray([t[0] + p.origin for p, t in traced], dtype=np.float32)
@@ -127,8 +127,8 @@ def scored_regions(found: Iterable[Proposal], features: Bytes) -> list[Region]:
     return sorted(regions, key=lambda r: -r.score)
 
 
-def _traced(outermost: npt.NDArray[np.int32]) -> tuple[Floats, Floats] | None:
-    """Points on an outline (n, 2) with outward normals; None where it is a speck."""
+def _outline_samples(outermost: npt.NDArray[np.int32]) -> tuple[Floats, Floats] | None:
+    """Return points on an outline with outward normals, (n, 2) each; None for a speck."""
     ring = outermost.astype(np.float32)
     count = len(ring)
     if count < 8:
@@ -141,17 +141,20 @@ def _traced(outermost: npt.NDArray[np.int32]) -> tuple[Floats, Floats] | None:
     step = max(1, count // STATIONS)
     along = smooth[(at + step) % count] - smooth[at - step]
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-6)
-    # OpenCV runs anticlockwise around what it traces, as seen with y down.
+    # OpenCV traces outer contours anticlockwise, as seen with y down.
     return ring[at], np.stack([-along[:, 1], along[:, 0]], axis=1)
 
 
 def _breadth(proposal: Proposal) -> float:
-    """1, or less for what is thin as a line."""
+    """Return 1, or less for a region as thin as a line."""
     return min(1.0, 2 * proposal.area / (len(proposal.ring) * BROAD))
 
 
 def _sampled_colours(colours: Floats, points: Coordinates) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Colours (k, n, 3) at points (k, n, 2), the nearest ones beyond the picture; which are in."""
+    """Sample colours (k, n, 3) at points (k, n, 2), and return a mask (k, n) of those inside.
+
+    Points beyond the picture get the nearest pixel's colour.
+    """
     far = np.array([colours.shape[1] - 1, colours.shape[0] - 1])
     x, y = np.moveaxis(np.rint(points.clip(0, far)).astype(np.int64), 2, 0)
     seen = (points >= 0) & (points <= far)
@@ -159,7 +162,7 @@ def _sampled_colours(colours: Floats, points: Coordinates) -> tuple[Floats, npt.
 
 
 def _borders_reached(proposal: Proposal, shape: tuple[int, ...]) -> int:
-    """How many borders of the picture the region reaches."""
+    """Count the borders of the picture that the region reaches."""
     (x, y), (height, width) = proposal.origin, proposal.mask.shape
     reached = (x <= 1, y <= 1, x + width >= shape[1] - 1, y + height >= shape[0] - 1)
     return sum(reached)

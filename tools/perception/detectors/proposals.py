@@ -1,7 +1,7 @@
 """Proposes regions of a picture that may be things, from many cues and no trained weights.
 
-Every connected piece of every threshold of every cue is a proposal, as in a component tree
-(Matas et al., 2002); what is a thing among them is for `candidates` to judge.
+Every connected component at every threshold of every cue is a proposal, as in a component tree
+(Matas et al., 2002); `candidates` judges which of them are things.
 """
 
 from collections.abc import Iterator
@@ -14,22 +14,22 @@ import numpy.typing as npt
 
 from ..segmenters.grabcut import Bytes, Floats, Mask
 
-# Shares of the picture: smaller ones cannot be told from texture, larger ones are ground.
+# Shares of the picture: smaller regions cannot be told from texture, larger ones are ground.
 LEAST, MOST = 4e-4, 0.35
 LEAST_PIXELS = 20
-# Thresholds of one channel by quantile, of a distance by value, in units of the features.
+# Thresholds of a channel are quantiles, those of a distance values in units of the features.
 QUANTILES = np.linspace(0.02, 0.98, 15)
 DISTANCES = np.array((6.0, 9.0, 13.0, 18.0, 25.0, 34.0, 46.0, 60.0))
 NEARNESS = np.array((-50.0, -38.0, -28.0, -20.0, -14.0, -8.0))
-# Palettes: few colours keep things whole, more of them tell things of like colour apart.
+# Palette sizes: few colours keep things whole, more of them separate things of similar colour.
 PALETTES = (3, 6)
 SAMPLES = 5_000
-# What stands out from its surroundings, blurred by these shares of the picture's side.
+# Surroundings that things stand out from are the picture blurred by these shares of its side.
 SURROUNDINGS = (0.04, 0.12)
-# A colour is ground where it is common, along the picture's border, and all over: so many cells
-# a side, each counting when so much of it has the colour.
+# A colour is ground if it is common, along the picture's border, and all over: the picture has this
+# many cells a side, each of which counts if this share of it has the colour.
 CELLS, IN_CELL = 8, 0.15
-# Boxes that agree to this many pixels, filled to the same quarter, hold the same region.
+# Boxes that agree to this many pixels and are filled to the same quarter hold the same region.
 SAME, FILLS = 3, 4
 
 
@@ -38,8 +38,9 @@ class Proposal:
     """A region in its box at `origin` (x, y).
 
     Attributes:
-        raw: (h, w) pixels, mask: the same with holes filled.
-        ring: (n, 2) the outermost pixels in order around it, in the box.
+        raw: mask (h, w) of its pixels.
+        mask: the same with holes filled.
+        ring: its outermost pixels in order, (n, 2), in the box.
     """
 
     origin: tuple[int, int]
@@ -49,17 +50,17 @@ class Proposal:
 
     @cached_property
     def area(self) -> int:
-        """Pixels, holes filled."""
+        """Number of its pixels, holes filled."""
         return int(np.count_nonzero(self.mask))
 
     @cached_property
     def gap_share(self) -> float:
-        """Share of the filled region that is holes."""
+        """Share of the filled region that its holes take."""
         return 1 - int(np.count_nonzero(self.raw)) / self.area
 
 
 def proposals(features: Bytes) -> list[Proposal]:
-    """Different regions of `features` (h, w, 3), each once, in no order."""
+    """Propose different regions of `features` (h, w, 3), each once, in no particular order."""
     found: dict[tuple[int, ...], Proposal] = {}
     least = max(LEAST_PIXELS, LEAST * features[..., 0].size)
     most = MOST * features[..., 0].size
@@ -85,7 +86,7 @@ def _proposal_of(raw: Mask, origin: tuple[int, int]) -> Proposal:
 
 
 def _cues(colours: Floats) -> Iterator[tuple[Floats, npt.NDArray[np.floating]]]:
-    """Scalar pictures (h, w) with the thresholds to cut them at."""
+    """Yield scalar pictures (h, w) with the thresholds to cut them at."""
     for channel in np.moveaxis(colours, 2, 0):
         levels = np.unique(np.quantile(channel, QUANTILES))
         yield channel, levels
@@ -94,7 +95,7 @@ def _cues(colours: Floats) -> Iterator[tuple[Floats, npt.NDArray[np.floating]]]:
         distance = _palette_distance(colours, count)
         yield from ((-d, NEARNESS) for d in distance)
         order = np.argsort([-_groundness(d) for d in distance == distance.min(axis=0)])
-        for k in range(1, min(count, 4)):  # the likeliest ground, and the next colours with it
+        for k in range(1, min(count, 4)):  # the likeliest ground colour, then the next ones too
             yield distance[order[:k]].min(axis=0), DISTANCES
     for share in SURROUNDINGS:
         blurred = cv2.GaussianBlur(colours, (0, 0), share * max(colours.shape))
@@ -102,7 +103,7 @@ def _cues(colours: Floats) -> Iterator[tuple[Floats, npt.NDArray[np.floating]]]:
 
 
 def _palette_distance(colours: Floats, count: int) -> Floats:
-    """Distance (count, h, w) of each pixel to each of the picture's main colours."""
+    """Return the distance (count, h, w) of each pixel to each of the picture's main colours."""
     pixels = colours.reshape(-1, 3)
     sample = pixels[np.linspace(0, len(pixels) - 1, SAMPLES).astype(np.int64)]
     cv2.setRNGSeed(0)
@@ -114,7 +115,7 @@ def _palette_distance(colours: Floats, count: int) -> Floats:
 
 
 def _groundness(mine: Mask) -> float:
-    """How much a colour's pixels (h, w) look like the ground: common, at the border, everywhere."""
+    """Rate how much a colour's pixels (h, w) look like ground: common, at the border, all over."""
     rim = np.concatenate(
         [mine[:4].ravel(), mine[-4:].ravel(), mine[:, :4].ravel(), mine[:, -4:].ravel()]
     )

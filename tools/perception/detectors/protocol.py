@@ -1,4 +1,4 @@
-"""What a detector is: a picture goes in, candidates come out."""
+"""The interface of a detector: a picture goes in, candidates come out."""
 
 from typing import Protocol
 
@@ -11,14 +11,14 @@ class Detector(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is chosen by."""
+        """The name by which it is chosen."""
         ...
 
     def detect(self, picture: Picture) -> tuple[Candidate, ...]:
-        """Everything that stands out, as c1, c2, ... from the most salient one; none is no error.
+        """Find everything that stands out, as c1, c2, ... by falling salience; none is no error.
 
-        `referring.measure_attributes.candidate_of` makes a candidate of an outline. Words of
-        colour, size, place and shape are measured on it. A detector that knows nouns is a
-        `detection.Finder` as well, which is asked for them.
+        `referring.measure_attributes.candidate_of` makes a candidate from an outline. Words of
+        colour, size, place and shape are measured on it. A detector that knows nouns also
+        implements `detection.Finder`, which is then used to find them.
         """
         ...

@@ -1,4 +1,4 @@
-"""The detectors by name: those built in, and those of packages with `formup.detectors`."""
+"""The detectors by name: built-in ones, and those of packages, under `formup.detectors`."""
 
 from collections.abc import Callable
 from functools import cache
@@ -21,9 +21,9 @@ DETECTORS = Registry[Callable[..., Detector]](
 
 @cache  # a network's weights are loaded once
 def detector_named(name: str) -> Detector:
-    """The detector of a name, or NAME:CHECKPOINT.
+    """Return the detector with a name, or with NAME:CHECKPOINT.
 
     Raises:
-        InputError: there is none, or it cannot be loaded.
+        InputError: there is no such detector, or it cannot be loaded.
     """
     return built(DETECTORS, name)

@@ -1,4 +1,4 @@
-"""The name under which the model that decides is asked where things are; see `Context.asks`."""
+"""The detector whose name has the deciding model asked where things are; see `Context.asks`."""
 
 from ...errors import ToolError
 from ..detection import Detection
@@ -7,7 +7,7 @@ from ..segmenters.protocol import Pixels
 
 
 class VlmDetector:
-    """Stands for that model where it cannot be asked: outside of a turn."""
+    """Stand-in for that model where it cannot be asked: outside of a turn."""
 
     name = "vlm"
 

@@ -1,6 +1,6 @@
-"""Proposes the whole object around the part that a point hit, as what stands out from the ground.
+"""Proposes the whole object around the part that a point hit: what stands out from the ground.
 
-A click on a car's roof grows the roof. Where a region is not surrounded by one plain ground, the
+A click on a car's roof grows the roof alone. If a region is not surrounded by one plain ground, the
 piece of the picture that differs from the ground further out is proposed as the whole.
 """
 
@@ -24,10 +24,10 @@ from ..segmenters.region_growing import (
 )
 
 RIM = 0.06
-# Colours of the ground at most, and the share of the rim below which one is an accident.
+# The most colours of the ground, and the share of the rim below which a colour is an accident.
 GROUND_COLOURS, RARE = 5, 0.04
 LEAST_SPREAD = 4.0
-# How many standard deviations off the ground a pixel is no longer ground.
+# Standard deviations from the ground's colours beyond which a pixel is not ground; all are tried.
 DEVIATIONS = (2.0, 3.0, 4.5)
 # Surroundings are plain when this share of them is within this distance of their median colour.
 PLAIN_SHARE, PLAIN_DISTANCE = 0.8, 14.0
@@ -35,12 +35,15 @@ SURROUNDINGS = 0.1
 
 
 def propose_whole(pixels: Bytes, points: Sequence[Point], count: int) -> list[Region]:
-    """Up to `count` clearly different regions (H, W, 3) that hold the points and are not ground."""
+    """Propose up to `count` clearly different regions that hold the points and are not ground.
+
+    `pixels` is (H, W, 3) RGB.
+    """
     return distinct(_regions_off_ground(pixels, points), count)
 
 
 def on_plain_ground(window: Window, mask: Mask) -> bool:
-    """Whether one colour surrounds the mask (h, w): then it is a thing, not a part of one."""
+    """Return whether one colour surrounds the mask (h, w), so that it is a thing, not a part."""
     reach = max(3, round(SURROUNDINGS * float(np.sqrt(np.count_nonzero(mask)))))
     size = 2 * reach + 1
     region = mask.astype(np.uint8)
@@ -69,7 +72,10 @@ def _regions_off_ground(pixels: Bytes, points: Sequence[Point]) -> Iterator[Regi
 
 
 def _distance_from_ground(colours: Floats) -> Floats:
-    """Standard deviations (h, w) from the nearest of the colours along the window's rim."""
+    """Return each pixel's distance (h, w) from the nearest colour along the window's rim.
+
+    It is in standard deviations of that colour.
+    """
     height, width = colours.shape[:2]
     reach = max(2, round(RIM * max(height, width)))
     rim = np.ones((height, width), dtype=np.bool_)

@@ -1,1 +1,1 @@
-"""Masks that other programs made: from a file to the regions of things in a picture."""
+"""Masks made by other programs: from a file to the regions of things in a picture."""

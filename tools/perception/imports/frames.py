@@ -1,7 +1,7 @@
-"""In which frame outlines are that were drawn elsewhere: px as the picture is shown, or another.
+"""Detects outlines from other programs that are not in the frame of the picture as it is shown.
 
-Which one fits is seen in the picture: across a true outline colours differ more than across the
-same one somewhere else.
+The picture shows which frame fits: colours differ more across a true outline than across the same
+outline in another place.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,17 +17,17 @@ from ...geometry.outline import FloatArray
 from ..image import Picture
 
 BETTER = 1.6
-"""Times the contrast across outlines by which another frame fits; on photographs none had 1.2."""
+"""Ratio of contrasts beyond which another frame fits better; on photographs, none had 1.2."""
 SURE = 2.5
-"""The same where an outline may be drawn about what has no edge: of such, 1 in 30 had more."""
+"""Ratio beyond which it surely does: of outlines drawn where there is no edge, 1 in 30 had more."""
 SEEN = 0.75
-"""Least share of an outline that lies in the picture; what its border cuts may be drawn whole."""
+"""Least share of an outline inside the picture; a thing cut by the border may be drawn whole."""
 REACH = 4.0
-"""How far to either side of an outline colours are compared, px."""
+"""Distance to either side of an outline at which colours are compared, px."""
 LONG = 1500
-"""Px of a picture's longer side that are enough to see it."""
+"""Longer side to which a larger picture is about reduced before comparing, px."""
 SMALLEST = 100.0
-"""Square px of an outline that says anything of another frame."""
+"""Least area of an outline that says anything about another frame, square px."""
 FRAMES: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
     "with rows before columns": lambda p, size: p[:, ::-1],
     "in the picture turned left": lambda p, size: p[:, ::-1] * (-1, 1) + (size[0] - 1, 0),
@@ -40,14 +40,15 @@ FRAMES: dict[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
     "in a picture twice as large": lambda p, size: p / 2,
     "in a picture half as large": lambda p, size: p * 2,
 }
-"""Frames that other programs write, and what takes (n, 2) points and the picture's size to ours."""
+"""Frames that other programs write, and the maps of points (n, 2) to ours, given the size, px."""
 
 
 def likeliest_frame(picture: Picture, rings: Sequence[FloatArray]) -> tuple[str, float]:
-    """Of the other frames the one that outlines would fit best, and how many times better.
+    """Return the other frame that outlines would fit best, and how many times better than ours.
 
     Args:
-        rings: (n, 2) each, which do not cross themselves.
+        picture: the picture that the outlines are for.
+        rings: the outlines, (n, 2) each, that do not cross themselves.
     """
     step = max(max(picture.size) // LONG, 1)
     shown = Image.fromarray(np.ascontiguousarray(picture.pixels[::step, ::step]))
@@ -63,12 +64,15 @@ def likeliest_frame(picture: Picture, rings: Sequence[FloatArray]) -> tuple[str,
 
 
 def is_seen(region: BaseGeometry, size: FloatArray) -> bool:
-    """Whether a region lies in a picture of a size, but for what its border may cut."""
+    """Return whether a region lies in a picture of a size, apart from what the border may cut."""
     return region.intersection(box(0, 0, *size)).area >= SEEN * region.area
 
 
 def _contrast(pixels: NDArray[np.floating], rings: Sequence[FloatArray], smallest: float) -> float:
-    """Mean difference of colour across outlines; 0 where one is not seen, or smaller, px^2."""
+    """Return the mean colour difference across outlines.
+
+    It is 0 if one of them is not in the picture, or has less than `smallest` square px.
+    """
     size = np.array(pixels.shape[1::-1], dtype=float)
     if not all(is_seen(p, size) and p.area >= smallest for p in map(shapely.Polygon, rings)):
         return 0.0

@@ -1,6 +1,6 @@
-"""Reads a file of masks for a picture: every thing in it as one region, exact and in one piece.
+"""Reads a file of masks for a picture: each thing in it as one exact region in one piece.
 
-Whatever does not fit the picture is refused by one sentence that says what would.
+Whatever does not fit the picture is refused in one sentence that says what would fit.
 """
 
 import json
@@ -25,21 +25,21 @@ from .shapes import Pixels, Shape, Size, refusal
 from .vectors import json_shapes, yolo_shapes
 
 MOST = 100
-"""Things of one file."""
+"""The most things that one file may hold."""
 MOST_LABEL = 100
 PNG = b"\x89PNG\r\n\x1a\n"
 FIT = "give x, y in pixels of the picture as it is shown"
 
 
 class Imported(NamedTuple):
-    """A thing of a file."""
+    """A thing read from a file."""
 
     label: str
     mask: Mask
 
 
 class _Found(NamedTuple):
-    """A thing's region as the file's polygons have it, and what was done to it; else its pixels."""
+    """A thing's region from the file's polygons and what was done to it, or its pixels."""
 
     label: str
     region: BaseGeometry
@@ -52,16 +52,16 @@ Made = TypeVar("Made")
 
 
 def masks_in(data: bytes, name: str, size: Size, picture: Picture | str) -> list[Imported]:
-    """The things of a mask file for a picture, in its order.
+    """Read the things of a mask file for a picture, in the file's order.
 
     Args:
-        data: the file.
-        name: what it is called, for messages.
-        size: of the picture.
-        picture: or its name alone: then outlines may be of another frame.
+        data: the file's content.
+        name: the file's name, for messages.
+        size: width and height of the picture, px.
+        picture: the picture, or its name alone; then outlines in another frame go unnoticed.
 
     Raises:
-        InputError: it cannot be read, is empty, or does not fit the picture.
+        InputError: the file cannot be read, is empty, or does not fit the picture.
     """
     known = picture if isinstance(picture, Picture) else None
     try:
@@ -83,7 +83,7 @@ def masks_in(data: bytes, name: str, size: Size, picture: Picture | str) -> list
 
 
 def _each(things: Sequence[Thing], work: Callable[[Thing], Made]) -> list[Made]:
-    """The work on each thing; of several, an error says which one it is about."""
+    """Do the work on each thing; if there are several, an error says which one it is about."""
     made: list[Made] = []
     for number, thing in enumerate(things, start=1):
         try:
@@ -102,19 +102,19 @@ def _read_shape(shape: Shape, size: Size, place: Georeference | None) -> _Found:
     parts: list[BaseGeometry] = []
     notes: set[str] = set()
     for outer, *holes in (part for part in shape.rings if part):
-        region, done = _simple(_in_pixels(outer, size, place))
+        region, done = _simple_region(_in_pixels(outer, size, place))
         notes |= done
         for hole in holes:
-            region = region.difference(_simple(_in_pixels(hole, size, place))[0])
+            region = region.difference(_simple_region(_in_pixels(hole, size, place))[0])
         parts.append(region)
     return _Found(label, shapely.union_all(parts), "".join(f"; {note}" for note in sorted(notes)))
 
 
 def _frame_note(picture: Picture, found: Sequence[_Found]) -> str:
-    """What is to be said where polygons would fit another frame better.
+    """Return a note if the polygons would fit another frame better, else an empty one.
 
     Raises:
-        InputError: where they surely would.
+        InputError: they surely would.
     """
     parts = [p for f in found if f.pixels is None and (p := largest_part(f.region))]
     rings = [shapely.get_coordinates(part.exterior) for part in parts]
@@ -125,12 +125,16 @@ def _frame_note(picture: Picture, found: Sequence[_Found]) -> str:
 
 
 def _region_seen(thing: _Found, size: Size) -> Polygon:
-    """The region in the picture, in one piece."""
+    """Return the part of a thing's region inside the picture, in one piece.
+
+    Raises:
+        InputError: it lies outside the picture, is too small, or is in pieces.
+    """
     if thing.pixels is not None:
         return outline_of_mask(thing.pixels()).polygon
     region = thing.region
     if region.area < MIN_AREA or not is_seen(region, np.asarray(size, dtype=float)):
-        raise _elsewhere(region)
+        raise _placement_error(region)
     frame = shapely.box(-0.5, -0.5, size[0] - 0.5, size[1] - 0.5)
     return outline_of(in_one_piece(region.intersection(frame))).polygon
 
@@ -158,8 +162,8 @@ def _no_number(text: str) -> NoReturn:
     raise refusal(f"it holds {text}, which is no place", "export it again")
 
 
-def _elsewhere(region: BaseGeometry) -> InputError:
-    """What is wrong with a region that is nowhere in the picture, or has no size there."""
+def _placement_error(region: BaseGeometry) -> InputError:
+    """Return the error for a region that lies outside the picture or is too small."""
     if region.is_empty:
         return refusal("it has no polygon", "draw one around it")
     places = shapely.get_coordinates(region) + 0.5
@@ -176,7 +180,10 @@ def _elsewhere(region: BaseGeometry) -> InputError:
 
 
 def _in_pixels(ring: FloatArray, size: Size, place: Georeference | None) -> FloatArray:
-    """A ring with pixel centres at whole numbers; from places on the picture's map, if it is so."""
+    """Convert a ring to pixels with centres at integers.
+
+    If it makes sense as places on the picture's map, it is converted from these.
+    """
     if place is not None:
         mapped = place.to_pixels(ring)
         if ((mapped.max(axis=0) > 0) & (mapped.min(axis=0) < size)).all():
@@ -184,7 +191,7 @@ def _in_pixels(ring: FloatArray, size: Size, place: Georeference | None) -> Floa
     return ring - 0.5
 
 
-def _simple(ring: FloatArray) -> tuple[BaseGeometry, set[str]]:
+def _simple_region(ring: FloatArray) -> tuple[BaseGeometry, set[str]]:
     region = Polygon(ring)
     if region.is_valid or region.convex_hull.area < MIN_AREA:
         return region if region.is_valid else region.convex_hull, set()

@@ -1,6 +1,6 @@
-"""Masks as pixels: images whose values number the things, and COCO's run lengths.
+"""Reads masks stored as pixels: images whose values number the things, and COCO's run lengths.
 
-Sizes are held against the picture's before anything is decoded, so that a hostile file costs
+Sizes are compared with the picture's before anything is decoded, so that a hostile file costs
 nothing.
 """
 
@@ -15,20 +15,20 @@ from PIL import Image
 from .shapes import Shape, Size, check_size, fields, items, refusal
 
 VOID = 255
-"""The value by which palette images mark borders between things (Pascal VOC)."""
+"""The value with which palette images mark borders between things (Pascal VOC)."""
 SOFT_LEVELS, SOFT_SHARE = 16, 0.3
-"""More values between black and white, on so small a part of the thing, are its smooth edge."""
+"""More grey levels than this, on less than this share of the thing, are its smooth edge."""
 MOST_RUNS = 4 << 20
-"""Characters of a mask's runs: more than a picture of 50 megapixels has pixels in its edges."""
+"""The most characters of a mask's run lengths, more than a 50-megapixel picture has edge pixels."""
 
 
 def label_image(data: bytes, size: Size) -> list[Shape]:
-    """The things of a PNG: every value but 0 is one.
+    """Read the things of a PNG: every value except 0 is one.
 
     Raises:
-        InputError: another size, damaged, empty, or a photograph.
+        InputError: it has another size, is damaged, or is a colour picture.
     """
-    check_size(tuple(int.from_bytes(data[i : i + 4]) for i in (16, 20)), size)  # in its header
+    check_size(tuple(int.from_bytes(data[i : i + 4]) for i in (16, 20)), size)  # from the header
     try:
         with Image.open(io.BytesIO(data), formats=("PNG",)) as opened:
             opened.load()
@@ -45,13 +45,13 @@ def label_image(data: bytes, size: Size) -> list[Shape]:
 
 
 def _values(image: Image.Image) -> NDArray[np.integer]:
-    """(H, W), 0 where there is nothing."""
+    """Return the image's values (H, W), 0 where there is nothing."""
     if image.mode == "1":
         return np.asarray(image).astype(np.uint8)
     if image.mode in ("L", "P", "I;16", "I"):
         return np.asarray(image).astype(np.int64 if image.mode == "I" else np.uint16)
     if "A" in image.getbands() and image.getchannel("A").getextrema()[0] == 0:
-        return np.asarray(image.getchannel("A"))  # a thing cut out of its picture
+        return np.asarray(image.getchannel("A"))  # a cut-out with a transparent background
     channels = [np.asarray(c) for c in image.convert("RGB").split()]
     if any((c != channels[0]).any() for c in channels[1:]):
         raise refusal("it is a colour picture, no mask", "save it as grey or palette values")
@@ -59,16 +59,16 @@ def _values(image: Image.Image) -> NDArray[np.integer]:
 
 
 def _is_soft(values: NDArray[np.integer], levels: int) -> bool:
-    """Whether grey values are the smooth edge of one white thing."""
+    """Return whether the grey values are just the smooth edge of one white thing."""
     between = int(np.count_nonzero((values > 0) & (values < VOID)))
     return levels > SOFT_LEVELS and between < SOFT_SHARE * int(np.count_nonzero(values))
 
 
 def run_lengths(found: Any, size: Size) -> NDArray[np.bool_]:
-    """The mask (H, W) of COCO's run lengths, compressed or not: down the columns, 0 first.
+    """Decode the mask (H, W) from COCO's run lengths, compressed or not: column-major, 0 first.
 
     Raises:
-        InputError: another size, or runs that do not fill it.
+        InputError: the size is missing or another one, or the runs do not fill it.
     """
     given = items(fields(found).get("size"))
     if len(given) != 2:
@@ -86,7 +86,10 @@ def run_lengths(found: Any, size: Size) -> NDArray[np.bool_]:
 
 
 def _decompressed(text: str) -> list[int]:
-    """Runs from COCO's text: 5 bits a character, lowest first, each less the run two before it."""
+    """Decode COCO's compressed run lengths.
+
+    Each character holds 5 bits, lowest first; each run is stored less the run two before it.
+    """
     runs: list[int] = []
     value = shift = 0
     for character in text.encode() if len(text) <= MOST_RUNS else b"\0":

@@ -1,4 +1,4 @@
-"""What the readers of mask files find, and the errors they have in common."""
+"""What the readers of mask files return, and the errors they share."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, cast
@@ -12,17 +12,17 @@ from ...geometry.outline import FARTHEST, FloatArray
 Size = tuple[int, int]
 """Width and height, px."""
 Pixels = Callable[[], NDArray[np.bool_]]
-"""Makes a mask, (H, W): of a hundred things in a large picture only one is held at a time."""
+"""Makes a mask (H, W) on demand: of a hundred in a large picture, one is in memory at a time."""
 
 
 class Shape(NamedTuple):
-    """A thing as a file has it.
+    """A thing as a file describes it.
 
     Attributes:
-        label: what the file calls it; often nothing.
-        pixels: where the file says which pixels are the thing's.
-        rings: else its parts, (n, 2) each, px, x right, y down, from the picture's upper left
-            corner; the holes of a part follow it in its tuple.
+        label: what the file calls it; often empty.
+        pixels: makes its mask, if the file gives its pixels.
+        rings: its parts otherwise, rings (n, 2), px, x right, y down, from the picture's upper left
+            corner; each part is a sequence of its outer ring and its holes.
     """
 
     label: str
@@ -31,15 +31,18 @@ class Shape(NamedTuple):
 
 
 def refusal(what: str, remedy: str) -> InputError:
-    """What is wrong with a file, for who names it to begin with its name, and what to do."""
+    """Return the error that says what is wrong with a file and what to do.
+
+    The caller prepends the file's name.
+    """
     return InputError(f"{what}; {remedy}.")
 
 
 def ring_of(points: Any) -> FloatArray:
-    """The (n, 2) places that a list of numbers or pairs holds.
+    """Return the points (n, 2) that a list of numbers or pairs holds.
 
     Raises:
-        InputError: it holds something else, or fewer than three.
+        InputError: it holds something else, fewer than three points, or numbers out of range.
     """
     try:
         ring = np.asarray(points, dtype=float).reshape(-1, 2)
@@ -54,7 +57,7 @@ def ring_of(points: Any) -> FloatArray:
 
 
 def check_size(given: Any, size: Size) -> None:
-    """Hold the size that a file says its picture has against the picture's; nothing is any.
+    """Compare the picture size that a file states, if it does, with the picture's.
 
     Raises:
         InputError: they differ.
@@ -70,10 +73,10 @@ def check_size(given: Any, size: Size) -> None:
 
 
 def fields(value: Any) -> Mapping[str, Any]:
-    """A JSON object; nothing of what is none."""
+    """Return the fields of a JSON object; none if the value is not an object."""
     return cast("Mapping[str, Any]", value) if isinstance(value, dict) else {}
 
 
 def items(value: Any) -> list[Any]:
-    """A JSON list; nothing of what is none."""
+    """Return the items of a JSON list; none if the value is not a list."""
     return cast("list[Any]", value) if isinstance(value, list) else []

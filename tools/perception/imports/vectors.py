@@ -1,4 +1,4 @@
-"""Masks as polygons: COCO, LabelMe, GeoJSON and YOLO, as these programs write them."""
+"""Reads masks stored as polygons: COCO, LabelMe, GeoJSON and YOLO, as these programs write them."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -12,18 +12,19 @@ from .rasters import run_lengths
 from .shapes import Shape, Size, check_size, fields, items, refusal, ring_of
 
 ROUND = 64
-"""Vertices of a circle."""
+"""Number of vertices that a circle is given."""
 
 
 def json_shapes(content: Any, size: Size, picture: str) -> list[Shape]:
-    """The things of a JSON file, whichever program's it is.
+    """Read the things of a JSON file of any of these programs.
 
     Args:
-        content: of the file.
-        picture: its name, where a file is about several.
+        content: the file's decoded JSON.
+        size: width and height of the picture, px.
+        picture: the picture's name, for files about several pictures.
 
     Raises:
-        InputError: it is none that is known, or of another picture.
+        InputError: the file's format is unknown, or it is about another picture.
     """
     whole = fields(content)
     if "shapes" in whole:
@@ -106,8 +107,8 @@ def _geojson(whole: Mapping[str, Any]) -> list[Shape]:
             raise refusal(
                 f"a geometry in it is a {str(kind)[:40]!r}", "give polygons or multipolygons"
             )
-        told = fields(feature.get("properties"))
-        label = next((told[k] for k in ("name", "label", "class") if told.get(k)), "")
+        properties = fields(feature.get("properties"))
+        label = next((properties[k] for k in ("name", "label", "class") if properties.get(k)), "")
         polygons = [parts] if kind == "Polygon" else parts
         rings = [[_flat(ring) for ring in items(polygon)] for polygon in polygons]
         found.append(Shape(str(label), rings=rings))
@@ -115,15 +116,15 @@ def _geojson(whole: Mapping[str, Any]) -> list[Shape]:
 
 
 def _flat(ring: Any) -> FloatArray:
-    """A ring of GeoJSON without its heights."""
+    """Return a GeoJSON ring (n, 2) without its heights."""
     return ring_of([items(place)[:2] for place in items(ring)])
 
 
 def yolo_shapes(text: str, size: Size) -> list[Shape]:
-    """The things of a YOLO file: a line each, its class and x, y from 0 to 1.
+    """Read the things of a YOLO file: a line each, with a class and x, y from 0 to 1.
 
     Raises:
-        InputError: something else, such as boxes, or pixels.
+        InputError: the file holds something else, such as boxes or pixels.
     """
     found: list[Shape] = []
     for line in filter(None, map(str.split, text.splitlines())):

@@ -1,6 +1,6 @@
-"""Finds a checkpoint's folder: one on this machine, or one downloaded from Hugging Face and kept.
+"""Finds a checkpoint's folder: a local one, or one downloaded from Hugging Face and cached.
 
-Only configurations, vocabularies and safetensors are fetched: nothing in them is code.
+Only configurations, vocabularies and safetensors are fetched: none of them contains code.
 """
 
 import re
@@ -21,13 +21,13 @@ OFFLINE = (
 
 
 def checkpoint_folder(name: str) -> Path:
-    """The folder of a checkpoint; the first use of one that is not here downloads it.
+    """Return the folder of a checkpoint, downloading it if it is not on this machine.
 
     Args:
         name: a folder, or OWNER/NAME or OWNER/NAME@REVISION on Hugging Face.
 
     Raises:
-        InputError: there is none of that name, or it cannot be had.
+        InputError: there is no such checkpoint, or it cannot be downloaded.
     """
     folder = Path(name).expanduser()
     if folder.is_dir():
@@ -63,7 +63,7 @@ def _from_hub(repository: str, revision: str | None) -> Path:
         about = hub.HfApi().model_info(repository, revision=revision)
         sys.stderr.write(_notice(repository, files, about, hub.constants.ENDPOINT))
         return Path(hub.snapshot_download(repository, **wanted))
-    except Exception as error:  # of the hub's client, of HTTP, of the disk: the person has to act
+    except Exception as error:  # the hub's client, HTTP or the disk failed: the person has to act
         why = (str(error).strip() or type(error).__name__).splitlines()[0].rstrip(".")
         raise InputError(
             f"The checkpoint {repository} is not on this machine and cannot be downloaded "
@@ -72,7 +72,7 @@ def _from_hub(repository: str, revision: str | None) -> Path:
 
 
 def _notice(repository: str, files: Any, about: Any, host: str) -> str:
-    """What is about to be downloaded, for a person."""
+    """Return the notice of what is about to be downloaded, for a person."""
     size = sum(file.file_size for file in files if file.will_download) / 1e6
     licence = getattr(about.card_data, "license", None) or "not stated"
     return f"Downloading {repository} once: {size:,.0f} MB from {host}, licence: {licence}.\n"

@@ -1,6 +1,6 @@
-"""The one module that runs torch and transformers, which have no types; all else sees arrays.
+"""The only module that uses torch and transformers, which are untyped; all others see arrays.
 
-Where and how exactly networks run is the machine's matter: see `settings`.
+Device and precision depend on the machine: see `settings`.
 """
 
 import hashlib
@@ -24,22 +24,22 @@ from .settings import DEVICE, device_name, dtype_name
 
 Floats = NDArray[np.float32]
 MISSING = 0.05
-"""The share of a network's weights that a checkpoint may lack: names change between releases."""
+"""Greatest share of a network's weights that a checkpoint may lack: names change over releases."""
 NAMED = 5
-"""Weights that are named where they are missing."""
+"""The most missing weights that are named."""
 LOG = logging.getLogger(__name__)
 REMEMBERED = 4
-"""Pictures whose embeddings are kept: one takes some MB, on a GPU of its memory."""
+"""Number of pictures whose embeddings are cached: each takes a few MB, on a GPU of its memory."""
 
 
 @dataclass
 class Network:
-    """A network with its weights, ready to be asked.
+    """A network with its weights, ready to run.
 
     Attributes:
-        model, processor: of transformers; the processor is None where none is used.
-        device, dtype: where and how exactly it computes.
-        memory: what it made of the last pictures, by their content.
+        model, processor: objects of transformers; the processor is None if none is used.
+        device, dtype: where and with what precision it computes.
+        memory: cached embeddings of the last pictures, by hash of their content.
     """
 
     model: Any
@@ -53,12 +53,12 @@ class Network:
         """Call a method of the model on arrays or tensors, without gradients.
 
         Raises:
-            InputError: it does not fit in the device's memory.
+            InputError: the network does not fit in the device's memory.
         """
         torch = _torch()
         with self._turn, torch.inference_mode():
             try:
-                return method(**{name: self._placed(value) for name, value in inputs.items()})
+                return method(**{name: self._to_device(value) for name, value in inputs.items()})
             except torch.OutOfMemoryError:
                 raise InputError(
                     f"The network does not fit in the memory of {self.device}: set "
@@ -66,7 +66,7 @@ class Network:
                 ) from None
 
     def remembered(self, pixels: NDArray[np.uint8], make: Callable[[], Any]) -> Any:
-        """What was made of a picture, by its content; made where it is not remembered."""
+        """Return what is cached for a picture's content, making it first if it is not cached."""
         key = hashlib.sha256(pixels.tobytes()).hexdigest() + str(pixels.shape)
         if key not in self.memory:
             self.memory[key] = make()
@@ -74,7 +74,7 @@ class Network:
                 self.memory.pop(old, None)
         return self.memory[key]
 
-    def _placed(self, value: Any) -> Any:
+    def _to_device(self, value: Any) -> Any:
         torch = _torch()
         value = torch.from_numpy(value) if isinstance(value, np.ndarray) else value
         if not isinstance(value, torch.Tensor):
@@ -84,15 +84,16 @@ class Network:
 
 
 def load_network(name: str, classes: Mapping[str, str], *, processor: bool) -> Network:
-    """A network from its checkpoint.
+    """Load a network from its checkpoint.
 
     Args:
-        name: of the checkpoint, see `checkpoint_folder`.
-        classes: of transformers, by the kinds of model (`model_type`) that each can be.
-        processor: whether it has one, which turns words and pictures into its inputs.
+        name: name of the checkpoint, see `checkpoint_folder`.
+        classes: names of transformers' classes by the kind of model (`model_type`) they load.
+        processor: whether to load its processor, which turns words and pictures into its inputs.
 
     Raises:
-        InputError: torch or the checkpoint is missing, or it is of another kind.
+        InputError: torch or the checkpoint is missing, or the checkpoint is broken or of another
+            kind.
     """
     needs_torch()
     device, dtype = _device(), getattr(_torch(), dtype_name())
@@ -104,7 +105,7 @@ def load_network(name: str, classes: Mapping[str, str], *, processor: bool) -> N
             f"The checkpoint {name} holds a network of the kind {_kind(folder)!r}, not {kinds}."
         )
     transformers: Any = import_module("transformers")
-    import_module("transformers.utils.logging").disable_progress_bar()  # of what is on this disk
+    import_module("transformers.utils.logging").disable_progress_bar()  # the files are local
     options = {"local_files_only": True, "use_safetensors": True, "dtype": dtype}
     try:
         model, report = getattr(transformers, made).from_pretrained(
@@ -112,7 +113,7 @@ def load_network(name: str, classes: Mapping[str, str], *, processor: bool) -> N
         )
         words = transformers.AutoProcessor.from_pretrained(folder) if processor else None
         model = model.to(device).eval()
-    except Exception as error:  # a broken file shows in many ways, all of them the person's to mend
+    except Exception as error:  # a broken file fails in many ways, all for the person to mend
         why = (str(error).strip() or type(error).__name__).splitlines()[0].rstrip(".")
         raise InputError(f"The checkpoint {name} cannot be loaded: {why}.") from None
     if len(report["missing_keys"]) > MISSING * len(model.state_dict()):
@@ -124,7 +125,7 @@ def load_network(name: str, classes: Mapping[str, str], *, processor: bool) -> N
 
 
 def needs_torch() -> None:
-    """Refuse where networks cannot be run.
+    """Check that networks can be run.
 
     Raises:
         InputError: the extra is not installed.
@@ -134,7 +135,7 @@ def needs_torch() -> None:
 
 
 def resized(values: Any, size: tuple[int, int]) -> Any:
-    """Pictures (..., h, w) of an array or tensor at another height and width, as a tensor."""
+    """Resize pictures (..., h, w), an array or tensor, to a height and width; return a tensor."""
     torch = _torch()
     values = torch.from_numpy(values) if isinstance(values, np.ndarray) else values
     flat = values.reshape(1, -1, *values.shape[-2:]).float()
@@ -145,7 +146,7 @@ def resized(values: Any, size: tuple[int, int]) -> Any:
 
 
 def array(values: Any) -> Floats:
-    """A tensor as an array."""
+    """Convert a tensor to an array."""
     return np.asarray(values.detach().float().cpu().numpy(), dtype=np.float32)
 
 
@@ -161,7 +162,11 @@ def _kind(folder: Path) -> str:
 
 
 def _device() -> str:
-    """The device asked for, else a GPU where there is one."""
+    """Return the device that is set, else a GPU if there is one, else the CPU.
+
+    Raises:
+        InputError: the device that is set cannot be used.
+    """
     torch = _torch()
     chosen = device_name("cuda" if torch.cuda.is_available() else "cpu")
     try:

@@ -1,4 +1,4 @@
-"""Settings of networks that are a machine's rather than an instruction's: from the environment."""
+"""Settings of networks that belong to a machine, not to an instruction: environment variables."""
 
 import os
 
@@ -9,12 +9,12 @@ DTYPES = ("float32", "float16", "bfloat16")
 
 
 def device_name(usual: str) -> str:
-    """The device that networks run on, as torch calls it."""
+    """Return torch's name of the device to run networks on: the one set, or the usual one."""
     return os.environ.get(DEVICE) or usual
 
 
 def dtype_name() -> str:
-    """How exactly networks compute.
+    """Return the name of the data type that networks compute in.
 
     Raises:
         InputError: FORMUP_DTYPE is none of DTYPES.
@@ -26,16 +26,16 @@ def dtype_name() -> str:
 
 
 def detection_threshold(usual: float) -> float:
-    """The least score of what is found by words.
+    """Return the least score of things found by words: the one set, or the usual one.
 
     Raises:
         InputError: FORMUP_DETECTION_THRESHOLD is no score.
     """
-    said = os.environ.get(SCORE)
+    setting = os.environ.get(SCORE)
     try:
-        value = float(said) if said else usual
+        value = float(setting) if setting else usual
     except ValueError:
         value = -1.0
     if not 0 <= value < 1:
-        raise InputError(f"{SCORE}={said!r} is no score: give a number from 0 up to 1.")
+        raise InputError(f"{SCORE}={setting!r} is no score: give a number from 0 up to 1.")
     return value

@@ -1,1 +1,1 @@
-"""Words for a thing, decided on what is measured of it: attributes, relations, ranks."""
+"""Resolves words for a thing by what is measured of it: attributes, relations, ranks."""

@@ -1,6 +1,6 @@
 """Measured attributes of a thing, whatever it is: colour, size, place, shape.
 
-Words such as "red", "round" or "the largest" are decided on these numbers alone.
+Words such as "red", "round" or "the largest" are resolved by these numbers alone.
 """
 
 from collections.abc import Mapping
@@ -52,15 +52,15 @@ class Attributes:
     Attributes:
         colours: share of its pixels by colour name, largest first; they add up to 1.
         lab: mean CIE L*, a*, b* (L* 0 to 100).
-        area: square px, holes left out.
+        area: square px, without holes.
         centre: x, y of the centroid.
         orientation: of the long side of its minimum-area rectangle, degrees in [0, 180) from
             the x axis towards the y axis (clockwise as seen).
         elongation: long over short side of that rectangle, 1 or more.
         roundness: 4 pi area over perimeter squared, holes filled; 1 for a disc.
         shapes: how well each shape class fits, 0 to 1, best first.
-        hole: share of the filled area that is holes.
-        touches_border: whether the picture cuts it.
+        hole: share of the filled area that its holes take.
+        touches_border: whether the picture's border cuts it.
     """
 
     colours: tuple[tuple[ColourName, float], ...]
@@ -76,7 +76,7 @@ class Attributes:
 
     @property
     def colour(self) -> ColourName:
-        """The commonest colour name."""
+        """The name of its commonest colour."""
         return self.colours[0][0]
 
     @property
@@ -87,11 +87,11 @@ class Attributes:
 
 @dataclass(frozen=True)
 class Naming:
-    """That a network found a thing by a noun phrase; the two scores say different things.
+    """The fact that a network found a thing by a noun phrase, with two unrelated scores.
 
     Attributes:
-        score: the detector's: that it is such a thing.
-        outline, confidence, parts: of the mask, as of any other.
+        score: the detector's score that it is such a thing.
+        outline, confidence, parts: those of the mask, as for any other mask.
     """
 
     phrase: str
@@ -119,12 +119,12 @@ class Candidate:
     named: tuple[Naming, ...] = ()
 
     def as_named(self, phrase: str) -> Naming | None:
-        """How it was found by a phrase, if it was."""
+        """Return how it was found by a phrase, or None if it was not."""
         return next((n for n in self.named if n.phrase == phrase), None)
 
     @property
     def label(self) -> str:
-        """What it is called, else what it looks like: "car", "red circle", "grey thing"."""
+        """Its name if it has one, else its looks: "car", "red circle", "grey thing"."""
         if self.named:
             return self.named[0].phrase
         shape = self.attributes.shape

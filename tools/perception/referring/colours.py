@@ -1,4 +1,4 @@
-"""Names pixels by the eleven basic colour terms, shared out where two of them meet.
+"""Names pixels by the eleven basic colour terms, with shares where two of them meet.
 
 A pixel is named by the exemplars nearest to it in CIE Lab: a colour between red and orange counts
 as partly both. The exemplars, sRGB in hexadecimal digits, are in `colours.json`.
@@ -16,13 +16,13 @@ from ..segmenters.grabcut import Bytes, Floats
 from .attributes import ColourName
 
 NAMES: tuple[ColourName, ...] = get_args(ColourName)
-# How far, in Lab, an exemplar's name reaches: about the step people call another shade.
+# How far, in Lab, an exemplar's name reaches: about the step that people call another shade.
 REACH = 6.0
 BITS = 5
 
 
 def colour_shares(rgb: Bytes) -> tuple[tuple[ColourName, float], ...]:
-    """Colour names of pixels (n, 3) with their shares, the largest first."""
+    """Return the colour names of sRGB pixels (n, 3) with their shares, the largest first."""
     levels = (rgb >> (8 - BITS)).astype(np.int64)
     index = (levels[:, 0] << 2 * BITS) | (levels[:, 1] << BITS) | levels[:, 2]
     shares = _name_table()[index].mean(axis=0)
@@ -31,14 +31,14 @@ def colour_shares(rgb: Bytes) -> tuple[tuple[ColourName, float], ...]:
 
 
 def lab_of(rgb: Bytes) -> Floats:
-    """CIE Lab (n, 3) of sRGB pixels (n, 3); L* 0 to 100."""
+    """Convert sRGB pixels (n, 3) to CIE Lab (n, 3); L* is 0 to 100."""
     scaled = rgb.astype(np.float32)[None] / 255
     return np.asarray(cv2.cvtColor(scaled, cv2.COLOR_RGB2LAB), dtype=np.float32)[0]
 
 
 @cache
 def _name_table() -> Floats:
-    """The share of each name (8 ** BITS, names) for every coarse RGB colour."""
+    """Return the share of each name for every coarse RGB colour, (8 ** BITS, names)."""
     step = 2 ** (8 - BITS)
     axis = np.arange(2**BITS) * step + step // 2
     cube = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)

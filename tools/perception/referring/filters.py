@@ -1,6 +1,7 @@
-"""Which things fit a description, in three values: sure, possible, no.
+"""Judges which things fit a description, in three values: sure, possible, no.
 
-What is neither clearly so nor clearly not stays possible, so that guesses are not reported.
+What is neither clearly so nor clearly not stays possible, so that guesses are not reported. Pairs
+of limits are for sure and for possible.
 """
 
 from collections import Counter
@@ -22,29 +23,29 @@ IntArray = NDArray[np.int64]
 NO, POSSIBLE, SURE = 0, 1, 2
 
 COLOUR = (0.55, 0.25)
-"""Share of pixels: more than half names a thing, below a quarter it is a pattern on it."""
+"""Share of pixels: more than half names a thing, less than a quarter is a pattern on it."""
 DARK, LIGHT = (45.0, 60.0), (60.0, 45.0)
-"""L*: mid grey is 53; what lies between 45 and 60 is called either."""
+"""L*: mid grey is 53, and anything from 45 to 60 may be called either."""
 SHAPE_FIT, SHAPE_LEAD = (0.8, 0.7), (0.03, -0.05)
-"""Overlap with a drawn shape, and its lead over the next; noise moves an overlap by 0.03."""
+"""Overlap with a shape's template, and its lead over the next; noise shifts an overlap by 0.03."""
 UNNAMED = "irregular"
-"""No shape to mistake another for: it only says that none fits well."""
+"""Not a rival of other shapes: it only means that none fits well."""
 MAIN, MAIN_LEAD = 0.4, 2.0
-"""A colour of fewer pixels still names a thing where no other has half as many."""
+"""A colour of at least this share also names a thing if no other has more than half as many."""
 ROUNDNESS = (0.85, 0.8)
 """A traced disc has 0.91, a square 0.79 or less."""
 ROUND_ELONGATION = (1.25, 1.45)
-"""An oval of 1.2 is still called round, one of 1.5 is not."""
+"""An oval of 1.2 is still called round, one of 1.5 no longer."""
 ANGULAR = (0.02, 0.045)
 """Lead of the best angular shape over the best round one: a hexagon's is 0.06, an oval's none."""
 LONG = (1.7, 1.4)
-"""Long over short side: a car from above has about 2.2, a hatchback drawn roughly 1.7."""
+"""Long over short side: a car from above has about 2.2, a roughly drawn hatchback 1.7."""
 SOLID = (0.9, 0.8)
 """Share of the convex hull: a disc or a square has 1, a star 0.5, a crescent 0.8 or less."""
 HOLLOW = (0.1, 0.03)
-"""Share of holes: less than a thirtieth is a flaw of the outline."""
+"""Share of holes: less than three hundredths is a flaw of the outline."""
 SIMPLER = 0.0005
-"""Outlines are thinned by this share of the picture's longer side before distances are taken."""
+"""Outlines are simplified by this share of the picture's longer side before measuring distances."""
 ROUND_SHAPES: tuple[ShapeName, ...] = ("circle", "oval", "ring")
 ANGULAR_SHAPES: tuple[ShapeName, ...] = (
     "square",
@@ -68,33 +69,33 @@ class Things:
     height: int
 
     def each(self, measured: Callable[[Attributes], float]) -> FloatArray:
-        """A number of every thing, (n,)."""
+        """Return a number for every thing, (n,)."""
         return np.array([measured(c.attributes) for c in self.candidates], dtype=float)
 
     @cached_property
     def centres(self) -> FloatArray:
-        """(n, 2), px."""
+        """Centroids, (n, 2), px."""
         rows = [c.attributes.centre for c in self.candidates]
         return np.array(rows, dtype=float).reshape(-1, 2)
 
     @cached_property
     def boxes(self) -> FloatArray:
-        """x0, y0, x1, y1, (n, 4), px."""
+        """Bounding boxes x0, y0, x1, y1, (n, 4), px."""
         return np.array([c.outline.bounds for c in self.candidates], dtype=float).reshape(-1, 4)
 
     @cached_property
     def areas(self) -> FloatArray:
-        """(n,), square px."""
+        """Areas without holes, (n,), square px."""
         return self.each(lambda a: a.area)
 
     @cached_property
     def labs(self) -> FloatArray:
-        """CIE L*, a*, b*, (n, 3)."""
+        """Mean CIE L*, a*, b*, (n, 3)."""
         return np.array([c.attributes.lab for c in self.candidates], dtype=float).reshape(-1, 3)
 
     @cached_property
     def regions(self) -> NDArray[np.object_]:
-        """The polygons, thinned where that leaves them whole, (n,)."""
+        """The polygons, (n,), simplified where that leaves them valid."""
         polygons = [c.outline.polygon for c in self.candidates]
         far = SIMPLER * max(self.width, self.height)
         exact: NDArray[np.object_] = np.array(polygons, dtype=object)
@@ -107,23 +108,23 @@ class Things:
         return {}
 
     def gaps(self, index: int) -> FloatArray:
-        """Edge-to-edge distance of one thing to every thing, (n,), px; 0 where they overlap."""
+        """Return the edge-to-edge distance of one thing to every thing, (n,), px; 0 on overlap."""
         if index not in self._gaps:
             found = shapely.distance(self.regions[index], self.regions)
             self._gaps[index] = np.asarray(found, dtype=float)
         return self._gaps[index]
 
     def gap(self, one: int, other: int) -> float:
-        """Edge-to-edge distance of two things, px; 0 where they overlap."""
+        """Return the edge-to-edge distance of two things, px; 0 if they overlap."""
         first: Polygon = self.regions[one]
         second: Polygon = self.regions[other]
         return first.distance(second)
 
     def index(self, name: str) -> int:
-        """Where a candidate id stands.
+        """Return the index of a candidate id.
 
         Raises:
-            ToolError: there is no such candidate; says which there are.
+            ToolError: there is no such candidate; the message lists those there are.
         """
         ids = [c.id for c in self.candidates]
         if name not in ids:
@@ -134,13 +135,13 @@ class Things:
 
 @dataclass(frozen=True)
 class Filter:
-    """One demand on things, judged.
+    """One condition on things, and how well each of them meets it.
 
     Attributes:
-        word: what is demanded: "red", "left of c4".
-        degrees: NO, POSSIBLE or SURE of every thing, (n,).
-        explain: the number behind the degree of a thing, as a short sentence; empty if none.
-        summary: what there is instead, where it is nowhere possible.
+        word: the condition: "red", "left of c4".
+        degrees: NO, POSSIBLE or SURE for every thing, (n,).
+        explain: returns the number behind a thing's degree as a short sentence; empty if none.
+        summary: what there is instead, if no thing can meet it.
     """
 
     word: str
@@ -150,14 +151,17 @@ class Filter:
 
 
 def listed(candidates: tuple[Candidate, ...], members: range | IntArray, most: int = 5) -> str:
-    """Their ids in a sentence: "c1, c2 and 3 more"."""
+    """List the members' ids as in a sentence: "c1, c2 and 3 more"."""
     ids = [candidates[int(i)].id for i in members]
     rest = len(ids) - most
     return ", ".join(ids) if rest <= 0 else f"{', '.join(ids[:most])} and {rest} more"
 
 
 def graded(values: FloatArray, limits: tuple[float, float]) -> IntArray:
-    """Degrees by the limits for sure and for possible; where they rise, small is surer."""
+    """Grade values (n,) by the limits for sure and for possible.
+
+    If the limit for sure is the smaller one, small values are surer.
+    """
     sure, possible = limits
     signed, at, least = (
         (values, sure, possible) if sure >= possible else (-values, -sure, -possible)
@@ -166,7 +170,7 @@ def graded(values: FloatArray, limits: tuple[float, float]) -> IntArray:
 
 
 def attribute_filters(things: Things, description: Description) -> list[Filter]:
-    """What a description demands of the looks of things."""
+    """Return the filters for what a description says about a thing's looks and noun."""
     found: list[Filter] = []
     if description.noun:
         found.append(_noun_filter(things, description.noun))
@@ -180,7 +184,7 @@ def attribute_filters(things: Things, description: Description) -> list[Filter]:
 
 
 def lacking(things: Things, filters: list[Filter]) -> str:
-    """Why nothing fits all the filters, and what there is instead."""
+    """Say why nothing fits all the filters, and what there is instead."""
     count = len(things.candidates)
     if not count:
         return "no things were found in the picture"
@@ -282,7 +286,7 @@ def _trait_filter(things: Things, trait: Trait) -> Filter:
 
 
 def _best_fit(attributes: Attributes, names: tuple[ShapeName, ...]) -> float:
-    """How well the best of some shapes fits, 0 to 1."""
+    """Return how well the best of some shapes fits, 0 to 1."""
     return max((fit for name, fit in attributes.shapes if name in names), default=0.0)
 
 

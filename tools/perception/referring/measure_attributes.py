@@ -1,4 +1,4 @@
-"""Measures a thing's attributes: its colours on the picture, its shape on the outline."""
+"""Measures a thing's attributes: its colours in the picture, its shape on the outline."""
 
 import cv2
 import numpy as np
@@ -14,9 +14,9 @@ from .colours import colour_shares, lab_of
 from .shape_classes import shape_fits
 
 SIDE = 384
-"""The longer side of the picture that colours are measured on, px."""
+"""Longer side of the reduced picture in which colours are measured, px."""
 SMOOTHING = 0.7
-"""What of an outline is stairs of pixels, in pixels at that scale."""
+"""Simplification that removes an outline's pixel staircase, px at that scale."""
 
 
 def measure_attributes(
@@ -27,14 +27,14 @@ def measure_attributes(
     area: int,
     touches_border: bool,
 ) -> Attributes:
-    """The attributes of a thing.
+    """Measure the attributes of a thing.
 
     Args:
         outline: image px.
         patch: (h, w, 3) RGB, a part of the picture at any scale.
-        mask: (h, w) the thing's pixels in it, one at least.
+        mask: (h, w), the thing's pixels in the patch, at least one.
         area: pixels of the thing at that scale, holes filled.
-        touches_border: whether the picture cuts it.
+        touches_border: whether the picture's border cuts it.
     """
     core = np.asarray(cv2.erode(mask.astype(np.uint8), np.ones((3, 3)), borderValue=(0,))) > 0
     pixels = patch[core if core.any() else mask]
@@ -57,11 +57,12 @@ def measure_attributes(
 
 
 def candidate_of(name: str, outline: Outline, picture: Picture, salience: float) -> Candidate:
-    """A candidate from its outline alone, for detectors that find boxes or masks.
+    """Make a candidate from its outline alone, for detectors that find boxes or masks.
 
     Args:
-        name: c1, c2, ...
+        name: its id: c1, c2, ...
         outline: image px.
+        picture: the picture it is in.
         salience: 0 to 1.
     """
     scale = min(1.0, SIDE / max(picture.size))

@@ -1,4 +1,4 @@
-"""The odd one out: what differs in one way from things that are alike in the others.
+"""Finds the odd one out: what differs in one way from things that are alike in the others.
 
 The picture may hold other things as well, so each thing is compared with those it resembles; an
 odd one must lie well outside the spread of its group.
@@ -22,12 +22,12 @@ Aspect = Literal["colour", "size", "shape", "orientation"]
 
 @dataclass(frozen=True)
 class Limits:
-    """When things count as different in an aspect, in its unit.
+    """When things count as different in an aspect, in the aspect's unit.
 
     Attributes:
         differs: least distance that is a difference at all.
-        spreads: and how many times the group's own spread it must be.
-        spread: a group spreads no farther than this from its most typical member.
+        spreads: least ratio of that distance to the group's own spread.
+        spread: greatest distance of a group's members from its most typical one.
     """
 
     differs: float
@@ -42,34 +42,45 @@ LIMITS: dict[Aspect, Limits] = {
     "orientation": Limits(12.0, 3.0, 15.0),  # degrees; things set down by hand differ by a few
 }
 ALIKE_SIZE = float(np.log(1.7))
-"""Things alike may be nearer to or farther from the camera."""
+"""Log ratio of areas up to which things are alike, as some are farther from the camera."""
 UNITS = {"roundness": 0.12, "elongation": float(np.log(1.3)), "fits": 0.12, "hole": 0.12}
-"""What alone makes another shape; a disc and a hexagon differ by half of each."""
+"""Differences that each alone make another shape; a disc and a hexagon differ by half of each."""
 OTHER_SHAPE, SHAPE_LEAD = 0.5, 0.03
-"""Added where both fit their own best shape better than the other's by more than noise."""
+"""Distance added if both fit their own best shape better than the other's by more than noise."""
 ROUND, ROUND_ELONGATION = 0.88, 1.15
-"""What is as round as this has no orientation."""
+"""Something as round as this has no orientation."""
 ELONGATED = 1.25
-"""Below this the long side of the rectangle may be any of its sides."""
+"""Elongation below which any side of the rectangle may be its long one."""
 TURNS: dict[ShapeName, float] = {"triangle": 60.0, "hexagon": 60.0, "pentagon": 36.0, "star": 36.0}
-"""Degrees after which the rectangle around a regular one may look the same; else 90."""
+"""Degrees after which the rectangle around a regular shape may look the same; 90 for others."""
 SURE_GROUP, LEAST_GROUP = 3, 2
-"""With two others, either may be the odd one."""
+"""Least size of a group for a sure and a possible odd one: with two others, either may be odd."""
 SURE_SHARE = 0.2
-"""Of many things of every kind some are alike by chance: a group is at least this share of them."""
+"""Least share of all things in a group that is sure: among many, some are alike by chance."""
 GAP = 1.25
-"""Between its group and the odd one others leave a gap down to its distance over this."""
+"""The gap between the group and the odd one reaches up to the odd one's distance over this."""
 BLURRED = (0.05, 0.25)
-"""Others in the gap, as a share of the group: sure up to the first, possible to the second."""
+"""Others in that gap, as a share of the group: sure up to the first, possible to the second."""
 KIND = 4
-"""Two or more others like it are a kind of their own, unless the group is so many times larger."""
+"""With two or more others like it, a thing is of a kind of its own, unless the group is more than
+this many times larger."""
 SIMILAR = 1.5
-"""Groups whose sizes have a smaller ratio give no preference."""
+"""Groups whose sizes differ by a smaller ratio are not preferred to each other."""
 
 
 @dataclass(frozen=True)
 class Odd:
-    """One thing that stands out from a group: by how much, and whether that is sure."""
+    """A thing that stands out from a group.
+
+    Attributes:
+        index: its index among the members that are compared.
+        aspect: what it differs in.
+        group: size of the group.
+        distance: its distance from the group's typical member, in the aspect's unit.
+        spread: greatest distance of the group's members from the typical one.
+        sure: whether it surely stands out.
+        typical: index of the typical member.
+    """
 
     index: int
     aspect: Aspect
@@ -81,7 +92,7 @@ class Odd:
 
 
 def odd_one_out(things: Things, members: IntArray, by: Oddness) -> Ranked:
-    """The thing that differs from those like it, in one aspect or (odd) in any of the four."""
+    """Find the thing that differs from those like it, in one aspect or (odd) in any of the four."""
     kinds: dict[Oddness, tuple[Aspect, ...]] = {
         "odd": ("colour", "size", "shape", "orientation"),
         "odd_colour": ("colour",),
@@ -148,7 +159,10 @@ def _oddity_reason(things: Things, members: IntArray, odd: Odd) -> str:
 
 
 def _comparable(apart: dict[Aspect, FloatArray], aspect: Aspect) -> list[BoolArray]:
-    """Which pairs may be compared in an aspect as they agree in others; one matrix per reading."""
+    """Return which pairs may be compared in an aspect, as they agree in others.
+
+    There is one matrix (m, m) for each way to read that.
+    """
     colour = apart["colour"] < LIMITS["colour"].differs
     size = apart["size"] <= ALIKE_SIZE
     shape = apart["shape"] < LIMITS["shape"].differs
@@ -156,7 +170,7 @@ def _comparable(apart: dict[Aspect, FloatArray], aspect: Aspect) -> list[BoolArr
         "colour": [size & shape],
         "size": [shape, shape & colour],
         "shape": [size, size & colour],
-        # What has no orientation is at no distance from anything.
+        # A thing without an orientation has no finite distance to any other.
         "orientation": [size & shape & np.isfinite(apart["orientation"])],
     }
     for alike in ways[aspect]:
@@ -165,13 +179,13 @@ def _comparable(apart: dict[Aspect, FloatArray], aspect: Aspect) -> list[BoolArr
 
 
 def _outliers(apart: FloatArray, alike: BoolArray, aspect: Aspect) -> list[Odd]:
-    """All that lie well outside the largest group of those alike to them."""
+    """Return all things that lie well outside the largest group of those like them."""
     limits = LIMITS[aspect]
     found: list[Odd] = []
     for index in range(len(apart)):
         others = np.flatnonzero(alike[index])
         away = apart[index, others]
-        # No group reaches so near to it: these are its own kind, whatever the group.
+        # No group can reach this near to it: these are its own kind, whatever the group.
         kind = int((away < limits.differs * (1 - 1 / limits.spreads) - 1e-9).sum())
         crowded = kind > 1 and kind * KIND >= len(others) - kind
         if crowded or (away >= limits.differs - 1e-9).sum() < LEAST_GROUP:
@@ -193,11 +207,15 @@ def _outliers(apart: FloatArray, alike: BoolArray, aspect: Aspect) -> list[Odd]:
 def _against_groups(
     apart: FloatArray, away: FloatArray, limits: Limits
 ) -> tuple[int, BoolArray, int, float] | None:
-    """The group it differs from most plainly: typical member, members, others in the gap, spread.
+    """Return the group that a thing differs from most plainly, None if there is none.
 
     Args:
-        apart: distances of those alike to it, (m, m).
+        apart: distances between the things like it, (m, m).
         away: its distances to them, (m,).
+
+    Returns:
+        Index of the typical member, mask (m,) of the members, number of others in the gap between
+        the group and the thing, and the group's spread.
     """
     seeds = np.flatnonzero(away >= limits.differs - 1e-9)
     reach = np.minimum(away[seeds] / limits.spreads, limits.spread)[:, None]
@@ -212,7 +230,7 @@ def _against_groups(
 
 
 def _aspect_distances(things: Things, members: IntArray) -> dict[Aspect, FloatArray]:
-    """Distances of all pairs of members in each aspect, (m, m)."""
+    """Return the distances of all pairs of members in each aspect, (m, m) each."""
     attributes = [things.candidates[int(i)].attributes for i in members]
     labs, sizes = things.labs[members], np.log(things.areas[members])
     return {
@@ -224,7 +242,7 @@ def _aspect_distances(things: Things, members: IntArray) -> dict[Aspect, FloatAr
 
 
 def _shape_distances(attributes: list[Attributes]) -> FloatArray:
-    """1 and more where two are of different shape."""
+    """Return the distances of all pairs in shape, (m, m); 1 or more means different shapes."""
     roundness = np.array([a.roundness for a in attributes], dtype=float)
     elongation = np.log([a.elongation for a in attributes])
     hole = np.array([a.hole for a in attributes], dtype=float)
@@ -242,7 +260,7 @@ def _shape_distances(attributes: list[Attributes]) -> FloatArray:
 
 
 def _orientation_differences(attributes: list[Attributes]) -> FloatArray:
-    """Degrees between orientations; infinite where one of the two has none."""
+    """Return the degrees between all pairs of orientations, (m, m); infinite if one has none."""
     angles = np.array([a.orientation for a in attributes], dtype=float)
     period = np.array([_period(a) for a in attributes], dtype=float)
     shared = np.minimum(period[:, None], period[None])
@@ -253,7 +271,7 @@ def _orientation_differences(attributes: list[Attributes]) -> FloatArray:
 
 
 def _period(attributes: Attributes) -> float:
-    """Degrees after which it looks as if it had not been turned; 0 for what has no orientation."""
+    """Return the degrees after which a turned thing looks the same; 0 if it has no orientation."""
     if attributes.elongation >= ELONGATED:
         return 180.0
     round_enough = attributes.roundness > ROUND or attributes.shape == "circle"

@@ -1,6 +1,6 @@
 """The query language in which a language model describes the thing it means.
 
-It has enumerations and numbers only, so that every word has one meaning, decided on measures.
+Apart from nouns, it has only enumerations and numbers, so that every word has one measured meaning.
 """
 
 from collections.abc import Callable
@@ -31,9 +31,9 @@ Ranking = Literal[
     "farthest_from_border",
     "nearest_to_border",
 ]
-"""Picks that put things in an order, so that there is a second and a third."""
+"""Picks that order things, so that there is a second and a third."""
 Oddness = Literal["odd", "odd_colour", "odd_size", "odd_shape", "askew"]
-"""Picks of the one that differs from things that are alike."""
+"""Picks of the one thing that differs from others that are alike."""
 RelationKind = Literal[
     "left_of", "right_of", "above", "below", "nearest", "inside", "between", "beside"
 ]
@@ -41,7 +41,7 @@ CandidateId = Annotated[
     str, Field(pattern=r"^c[0-9]{1,4}$", description="Id of a candidate that was shown: c4")
 ]
 SINGLE: tuple[str, ...] = ("alone", "odd", "odd_colour", "odd_size", "odd_shape", "askew")
-"""Picks that at most one thing can win: they have no second place."""
+"""Picks that at most one thing can win, so that there is no second place."""
 
 
 class Pick(BaseModel):
@@ -129,12 +129,12 @@ class Query(Description):
 
     @property
     def nouns(self) -> tuple[str, ...]:
-        """Every noun in it, of other things too."""
+        """Every noun in it, including those of other things, once each."""
         others = (t for r in self.relations for t in r.things if isinstance(t, Description))
         return tuple(dict.fromkeys(t.noun for t in (self, *others) if t.noun))
 
     def with_nouns(self, change: Callable[[str], str]) -> "Query":
-        """The same with every noun as `change` makes it."""
+        """Return the query with every noun replaced by what `change` makes of it."""
         relations = tuple(
             r.model_copy(update={"things": tuple(_with_noun(t, change) for t in r.things)})
             for r in self.relations
@@ -152,7 +152,7 @@ def _with_noun(thing: T, change: Callable[[str], str]) -> T:
 
 
 def wording(description: Description) -> str:
-    """The description in words, for a sentence about it: "the largest dark red one"."""
+    """Return the description in words, for use in a sentence: "the largest dark red one"."""
     picks = [
         f"{p.by} (place {p.place})" if p.place > 1 else p.by.replace("_", " ")
         for p in description.picks

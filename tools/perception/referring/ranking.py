@@ -1,4 +1,4 @@
-"""Ranks things by a superlative: the winner, the numbers, and those too close to call."""
+"""Ranks things by a superlative: the winner, the numbers behind it, and those too close to call."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,29 +13,30 @@ from .query import Pick
 BoolArray = NDArray[np.bool_]
 
 AREA_RATIO = 1.15
-"""Outlines of equal things differ by a tenth in area."""
+"""Least ratio of areas that counts: outlines of equal things differ by a tenth in area."""
 LENGTH_RATIO = 1.15
-"""As for areas; and a part of a stick is easily hidden."""
+"""Least ratio of lengths that counts, as for areas; and part of a stick is easily hidden."""
 LONGISH, LONGER_BUILT = 1.5, 1.5
-"""What is no stick (below the first) loses the name of the longest to what is built longer."""
+"""A thing less elongated than LONGISH is not clearly longer than one that is LONGER_BUILT times as
+elongated."""
 ROUNDER = 0.05
-"""Roundness of a traced disc varies by this."""
+"""Least difference in roundness that counts: that of a traced disc varies by as much."""
 LIGHTER = 8.0
-"""L*: a step that people see in things that are not side by side."""
+"""Least difference in L* that counts: people see it in things that are not side by side."""
 APART = 0.02
-"""Share of the picture's width or height between two places that people tell apart."""
+"""Least distance of two places that people tell apart, as a share of the width or height."""
 EDGE_APART = 0.01
-"""The same for edges: the winner must also be ahead by its outline, not by its centre alone."""
+"""The same for edges: the winner's outline must be ahead too, not its centre alone."""
 CORNER_APART = 0.04
-"""Share of the diagonal: distances to a corner or to the centre are judged more loosely."""
+"""The same as a share of the diagonal: people judge distances to a corner or centre loosely."""
 MIDDLE_REACH = 0.1
-"""Share of the diagonal within which a thing is in the picture's middle whatever else is."""
+"""Share of the diagonal within which a thing is in the picture's middle wherever others are."""
 NEARER = 1.2
-"""Ratio of two distances that people tell apart."""
+"""Least ratio of two distances that people tell apart."""
 ALONE = (1.6, 1.25)
-"""Ratio of the distances to the nearest neighbour: clearly alone; below the second nobody is."""
+"""Ratios of distances to the nearest neighbour: clearly alone, and below which nothing is alone."""
 GAP_NOISE = 0.003
-"""Share of the picture's longer side by which distances of outlines are off."""
+"""Error of distances between outlines, as a share of the picture's longer side."""
 
 CORNERS = {
     "upper_left": (0, 0),
@@ -51,10 +52,10 @@ class Ranked:
     """The outcome of a pick.
 
     Attributes:
-        contenders: indices of things, the winner first, then all not clearly behind or ahead of
-            it; empty where nothing qualifies.
-        reasons: the numbers of each contender, as a short sentence.
-        doubt: why the winner does not win clearly; empty where it does.
+        contenders: indices of things, the winner first, then all that are not clearly behind or
+            ahead of it; empty if nothing qualifies.
+        reasons: each contender's numbers, as a short sentence.
+        doubt: why the winner does not win clearly; empty if it does.
     """
 
     contenders: tuple[int, ...]
@@ -67,11 +68,11 @@ class Measure:
     """Numbers of m things on one scale.
 
     Attributes:
-        values: larger ranks first, (m,).
-        ahead: whether the one of the row is clearly ahead of the one of the column, (m, m).
+        values: (m,), larger ranks first.
+        ahead: (m, m), whether the row's thing is clearly ahead of the column's.
         noun: what is measured: "area".
-        adjective: for "almost equally ...".
-        shown: the numbers with their unit.
+        adjective: the word for "almost equally ...".
+        shown: the numbers with their units.
     """
 
     values: FloatArray
@@ -82,12 +83,12 @@ class Measure:
 
 
 def rank(things: Things, members: IntArray, pick: Pick) -> Ranked:
-    """Decide a pick among things (indices in ascending order); oddness is decided elsewhere."""
+    """Decide a pick among members (ascending indices of things), except for oddness."""
     return _ranked_at(things, members, _measure(things, members, pick.by), pick.place)
 
 
 def rank_nearest(things: Things, members: IntArray, other: int) -> Ranked:
-    """Decide which thing is nearest to another by the distance of their edges."""
+    """Decide which member is nearest to another thing, by the distance of their edges."""
     gaps, name = things.gaps(other)[members], things.candidates[other].id
     ahead = _clearly_nearer(gaps, _distance_noise(things), NEARER)
     measure = Measure(-gaps, ahead, f"distance to {name}", f"near to {name}", _pixels(gaps))
@@ -151,7 +152,7 @@ def _measure(things: Things, members: IntArray, by: str) -> Measure:
 
 
 def _ahead_by(values: FloatArray, margin: float) -> BoolArray:
-    """Whether the row is ahead of the column by a margin, give or take rounding."""
+    """Return whether each row is ahead of each column by a margin, up to rounding, (m, m)."""
     return values[:, None] - values[None] >= margin - 1e-9
 
 
@@ -164,7 +165,7 @@ def _distance_noise(things: Things) -> float:
 
 
 def _clearly_nearer(gaps: FloatArray, noise: float, ratio: float) -> BoolArray:
-    """Whether the row's distance is clearly the smaller one."""
+    """Return whether each row's distance is clearly less than each column's, (m, m)."""
     return (gaps[None] >= ratio * gaps[:, None] - 1e-9) & (gaps[None] - gaps[:, None] >= noise)
 
 
@@ -178,7 +179,7 @@ def _length_measure(things: Things, members: IntArray) -> Measure:
     lengths = np.array([things.candidates[int(i)].outline.long_axis[1] for i in members])
     built = things.each(lambda a: a.elongation)[members]
     ahead = _ahead_by(np.log(lengths), np.log(LENGTH_RATIO))
-    # A plate is longer than a pencil, yet the pencil may be meant.
+    # A plate may be longer than a pencil, yet the pencil be meant.
     ahead &= (built[:, None] >= LONGISH) | (built[None] < LONGER_BUILT * built[:, None])
     return Measure(lengths, ahead, "length", "long", _pixels(lengths))
 
@@ -250,7 +251,7 @@ def _isolation(things: Things, members: IntArray) -> Measure:
 
 
 def _neighbour_distance(things: Things, members: IntArray, index: int) -> float:
-    """Edge-to-edge distance to the nearest member, px; the diagonal where there is none."""
+    """Return the edge-to-edge distance to the nearest other member, px; the diagonal if none."""
     others = members[members != index]
     box, boxes = things.boxes[index], things.boxes[others]
     apart = np.maximum(0, np.maximum(boxes[:, :2] - box[2:], box[:2] - boxes[:, 2:]))

@@ -1,7 +1,7 @@
 """Resolves a description to the candidate it means, or says why it is ambiguous.
 
-An answer is settled only where every doubtful measure, read either way, gives the same thing;
-else a person is to choose from the matches.
+An answer is settled only if every doubtful measure, read either way, gives the same thing;
+otherwise a person is to choose from the matches.
 """
 
 import itertools
@@ -33,15 +33,15 @@ from .spatial import ground_filter, relation_filter
 __all__ = ["Description", "Match", "Pick", "Query", "Relation", "Selection", "select"]
 
 MOST_READINGS = 64
-"""Combinations of what the other things may be that are tried; beyond, a person is asked first."""
+"""The most combinations of what other things may be that are tried; if more, a person is asked."""
 
 Others = tuple[tuple[int, ...], ...]
-"""For each relation the indices of its other things, in one reading."""
+"""One reading of a query: for each relation, the indices of its other things."""
 
 
 @dataclass(frozen=True)
 class Match:
-    """A candidate that may be meant, and the numbers that say so, a short sentence each."""
+    """A candidate that may be meant, and the numbers that support it, a short sentence each."""
 
     id: str
     reasons: tuple[str, ...]
@@ -52,10 +52,10 @@ class Selection:
     """What a description may mean.
 
     Attributes:
-        matches: what to choose from, the best first.
-        settled: exactly one match, and nothing near the decision.
-        doubt: why it is not settled, one sentence; empty where it is.
-        lacking: where nothing looks like the description: what there is instead; else empty.
+        matches: the candidates to choose from, the best first.
+        settled: whether there is exactly one match, and the decision is not a close one.
+        doubt: why it is not settled, one sentence; empty if it is.
+        lacking: what there is instead, if nothing looks like the description; else empty.
     """
 
     matches: tuple[Match, ...]
@@ -65,7 +65,7 @@ class Selection:
 
 
 class _Step(NamedTuple):
-    """A superlative: what the winner is called, and how it is found among things."""
+    """A superlative: the word for its winner, and how to find that among things."""
 
     word: str
     decide: Callable[[IntArray], Ranked]
@@ -73,10 +73,13 @@ class _Step(NamedTuple):
 
 @dataclass(frozen=True)
 class _Answer:
-    """What is left of a set of things, the best first, and why it is not one clear thing.
+    """What is left of a set of things.
 
     Attributes:
-        number: why not as many fit as were said to; empty where they do.
+        indices: the things, the best first.
+        reasons: why, by index, short sentences.
+        doubt: why it is not one clear thing; empty if it is.
+        number: why the count of things that fit is not the stated one; empty if it is.
     """
 
     indices: tuple[int, ...]
@@ -87,7 +90,7 @@ class _Answer:
 
 @dataclass(frozen=True)
 class _Other:
-    """What another thing may be; covered: whether one of these it must be."""
+    """What another thing in a relation may be; `covered`: whether it must be one of `indices`."""
 
     indices: tuple[int, ...]
     settled: bool
@@ -101,11 +104,11 @@ def select(
     """Find which of the candidates a description means, in a picture of width x height px.
 
     Args:
-        candidates: in any order; their ids differ.
+        candidates: in any order, with different ids.
         query: a description, or a query with relations to other things.
 
     Raises:
-        ToolError: a relation names a candidate that is not there, or one thing twice.
+        ToolError: a relation names a candidate that does not exist, or one thing twice.
     """
     ordered = sorted(candidates, key=lambda c: (len(c.id), c.id))
     return _select(Things(tuple(ordered), width, height), query)
@@ -148,7 +151,10 @@ def _other_thing(things: Things, thing: str | Description) -> _Other:
 
 
 def _readings(others: list[list[_Other]]) -> list[Others]:
-    """Every way to read what the other things are, none of them twice in one relation."""
+    """Return the readings of what the other things are, MOST_READINGS at most.
+
+    None has a thing twice in one relation.
+    """
     per_relation = [itertools.product(*(o.indices for o in found)) for found in others]
     ways = [[way for way in ways if len(set(way)) == len(way)] for ways in per_relation]
     return list(itertools.islice(itertools.product(*ways), MOST_READINGS))
@@ -160,7 +166,7 @@ def _capped(others: list[list[_Other]]) -> bool:
 
 
 def _merged(things: Things, answers: list[_Answer], others: list[_Other], capped: bool) -> _Answer:
-    """One answer of all readings: doubtful unless they agree and none is doubtful itself."""
+    """Merge the answers of all readings; doubtful unless they agree and none is doubtful itself."""
     first, unsettled = answers[0], [o for o in others if not o.settled]
     if not unsettled:
         return first
@@ -181,7 +187,7 @@ def _degrees(things: Things, filters: Sequence[Filter]) -> IntArray:
 
 
 def _answer_in(things: Things, query: Description, looks: list[Filter], others: Others) -> _Answer:
-    """The answer where it is known what the other things are."""
+    """Return the answer in one reading, in which the other things are known."""
     relations = query.relations if isinstance(query, Query) else ()
     where = [
         relation_filter(things, r.kind, other) for r, other in zip(relations, others, strict=True)
@@ -207,12 +213,12 @@ def _answer_in(things: Things, query: Description, looks: list[Filter], others: 
 
 
 def _combined(surely: _Answer, possibly: _Answer, perhaps: str) -> _Answer:
-    """One answer of those among what surely fits and among all that possibly does.
+    """Combine the answers among the things that surely fit and among all that possibly do.
 
     Args:
-        surely: without indices where nothing surely fits.
-        possibly: what the doubtful ones change.
-        perhaps: the doubt about those; empty where there are none.
+        surely: the first answer; without indices if nothing surely fits.
+        possibly: the second answer, which includes doubtful things.
+        perhaps: the doubt about those things; empty if there are none.
     """
     indices = tuple(dict.fromkeys((*surely.indices, *possibly.indices)))
     reasons = possibly.reasons | surely.reasons
@@ -226,7 +232,7 @@ def _combined(surely: _Answer, possibly: _Answer, perhaps: str) -> _Answer:
 def _doubt_about(
     things: Things, filters: list[Filter], degrees: IntArray, answer: tuple[int, ...]
 ) -> str:
-    """What of the answer only possibly fits, and by what; else anything that does."""
+    """Say which thing only possibly fits, and why: one of the answer, else any; empty if none."""
     doubtful = [int(i) for i in np.flatnonzero(degrees == POSSIBLE)]
     if not doubtful:
         return ""
@@ -239,7 +245,7 @@ def _doubt_about(
 def _empty_relation(
     things: Things, looks: list[Filter], where: list[Filter], others: Others
 ) -> str:
-    """Which relation left nothing."""
+    """Say which relation left nothing."""
     kept = list(looks)
     for found, other in zip(where, others, strict=True):
         fitting = set(np.flatnonzero(_degrees(things, kept) > NO).tolist()) - set(other)
@@ -255,7 +261,7 @@ def _empty_relation(
 
 
 def _ordering_steps(things: Things, query: Description, others: Others) -> list[_Step]:
-    """What orders the things that fit: nearness, then the picks, or else the shade."""
+    """Return what orders the things that fit: nearness, then the picks, or else the shade."""
     relations = query.relations if isinstance(query, Query) else ()
     steps = [
         _Step(
@@ -280,7 +286,7 @@ def _pick(things: Things, pick: Pick) -> Callable[[IntArray], Ranked]:
 
 
 def _picked(things: Things, query: Description, steps: list[_Step], members: IntArray) -> _Answer:
-    """Which of some things the picks leave."""
+    """Return which of the members the steps leave."""
     if not len(members):
         return _Answer((), {}, "")
     members, number = _matching_count(things, query, members)
@@ -294,7 +300,7 @@ def _picked(things: Things, query: Description, steps: list[_Step], members: Int
 
 
 def _first_step_winner(things: Things, steps: list[_Step], members: IntArray) -> _Answer:
-    """The winner of the first step, which none of the others may contradict."""
+    """Return the winner of the first step; it is doubtful if another step contradicts it."""
     ranked = [step.decide(members) for step in steps]
     first, later = ranked[0], ranked[1:]
     agreeing = [i for i in first.contenders if all(i in r.contenders for r in later)]
@@ -313,7 +319,10 @@ def _first_step_winner(things: Things, steps: list[_Step], members: IntArray) ->
 
 
 def _matching_count(things: Things, query: Description, members: IntArray) -> tuple[IntArray, str]:
-    """The things that are meant where their number was said; and why the number is another."""
+    """Reduce the members to those meant if their number was stated, and say why it does not match.
+
+    If just the things that the picture's border does not cut make up that number, these are meant.
+    """
     count = query.count if isinstance(query, Query) else None
     if count is None or len(members) == count:
         return members, ""

@@ -1,4 +1,4 @@
-"""Shape classes by overlap with drawn ones, whatever the size and turn.
+"""Classifies shapes by their overlap with templates, at any size and turn.
 
 A mask and each template are sampled on the same polar grid around their centroids, scaled to
 equal area; the overlap at every turn is then one circular correlation.
@@ -19,18 +19,19 @@ from ...geometry.outline import FloatArray
 from .attributes import ShapeName
 
 TURNS, RINGS = 96, 28
-# In units of the square root of the area: beyond the tips of slender stars and long rectangles.
+# Radius of the grid over the square root of the area: beyond the tips of slender stars and long
+# rectangles.
 REACH = 1.7
-# Worse overlaps than this are no shape that has a name.
+# With overlaps worse than this, a shape has no name.
 IRREGULAR = 0.82
-# Sides of holes in rings and frames: wider steps leave thin ones between two of them unnamed.
+# Sizes of holes in rings and frames: wider steps would leave thin ones between two unnamed.
 HOLES = (0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85)
 
 Spectrum = NDArray[np.complex64]
 
 
 class Template(NamedTuple):
-    """A drawn shape on the polar grid: Fourier transform (turns, rings) and weighted area."""
+    """A template on the polar grid: its Fourier transform along the turns, and weighted area."""
 
     name: ShapeName
     spectrum: Spectrum
@@ -38,29 +39,32 @@ class Template(NamedTuple):
 
 
 def shape_fits(polygon: Polygon) -> tuple[tuple[ShapeName, float], ...]:
-    """Overlap (intersection over union) of a polygon with each shape class, the best first.
+    """Return the overlap (intersection over union) of a polygon with each shape class, best first.
 
-    "irregular" stands where the overlap is no better than that of most blobs.
+    "irregular" is given the overlap that most blobs reach.
     """
     grid, area = _polar_grid(polygon)
     spectrum = np.fft.rfft(grid, axis=0)
     best: dict[ShapeName, float] = {"irregular": IRREGULAR}
     for template in _templates():
         shared = np.fft.irfft((spectrum * np.conj(template.spectrum)).sum(axis=1), TURNS).max()
-        overlap = min(float(shared / (area + template.area - shared)), 1.0)  # but for rounding
+        overlap = min(float(shared / (area + template.area - shared)), 1.0)  # rounding may exceed 1
         best[template.name] = max(best.get(template.name, 0.0), overlap)
     return tuple(sorted(best.items(), key=lambda item: -item[1]))
 
 
 def _polar_grid(shape: BaseGeometry) -> tuple[FloatArray, float]:
-    """The shape on the polar grid (turns, rings), each cell weighted by its share of area."""
+    """Sample a shape on the polar grid (turns, rings), and return that and its weighted area.
+
+    Each cell is weighted by the square root of its share of the area.
+    """
     centre = shape.centroid
     radius = (np.arange(RINGS) + 0.5) * REACH * np.sqrt(shape.area) / RINGS
     angle = 2 * np.pi * np.arange(TURNS) / TURNS
     x = centre.x + np.cos(angle)[:, None] * radius
     y = centre.y + np.sin(angle)[:, None] * radius
     shapely.prepare(shape)
-    weight = np.sqrt(radius / radius.sum())  # the product of two grids then weighs by area
+    weight = np.sqrt(radius / radius.sum())  # so that the product of two grids is weighted by area
     grid = np.asarray(shapely.contains_xy(shape, x, y), dtype=np.float64) * weight
     return grid, float((grid**2).sum())
 
@@ -75,13 +79,13 @@ def _templates() -> tuple[Template, ...]:
 
 
 def _drawn_shapes() -> Iterator[tuple[ShapeName, BaseGeometry]]:
-    """Every class in the forms it comes in."""
-    yield from _round_ones()
+    """Yield every class in the forms it comes in."""
+    yield from _round_shapes()
     yield from _polygons()
-    yield from _concave_ones()
+    yield from _concave_shapes()
 
 
-def _round_ones() -> Iterator[tuple[ShapeName, BaseGeometry]]:
+def _round_shapes() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     disc = Polygon(_regular(64))
     yield "circle", disc
     for long in (1.35, 1.7, 2.2, 3.0):
@@ -109,9 +113,9 @@ def _polygons() -> Iterator[tuple[ShapeName, BaseGeometry]]:
             yield "frame", _stretched(square.difference(inner), long)
 
 
-def _concave_ones() -> Iterator[tuple[ShapeName, BaseGeometry]]:
+def _concave_shapes() -> Iterator[tuple[ShapeName, BaseGeometry]]:
     for points in (4, 5, 6, 8):
-        for inner in (0.38, 0.5) if points == 4 else (0.38, 0.5, 0.62):  # a third makes a square
+        for inner in (0.38, 0.5) if points == 4 else (0.38, 0.5, 0.62):  # 0.62 looks square
             yield "star", Polygon(_star(points, inner))
     for arm in (0.25, 0.33, 0.42):
         yield "cross", shapely.box(-arm, -1, arm, 1).union(shapely.box(-1, -arm, 1, arm))
@@ -151,7 +155,7 @@ def _flipped(shape: BaseGeometry) -> BaseGeometry:
 
 
 def _heart() -> FloatArray:
-    """A common heart curve: two sines of the angle against four cosines."""
+    """Return points (64, 2) on a common heart curve: a cubed sine against four cosines."""
     t = 2 * np.pi * np.arange(64) / 64
     x = 16 * np.sin(t) ** 3
     y = 13 * np.cos(t) - 5 * np.cos(2 * t) - 2 * np.cos(3 * t) - np.cos(4 * t)

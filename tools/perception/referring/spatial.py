@@ -1,6 +1,7 @@
-"""Where things are, seen from other things: left of, inside, between, beside.
+"""Judges where things are, seen from other things: left of, inside, between, beside.
 
-Judged on outlines and centres in image pixels (x right, y down), in three values.
+It uses outlines and centres in image pixels (x right, y down), and three values: sure, possible,
+no. Pairs of limits are for sure and for possible.
 """
 
 import numpy as np
@@ -12,23 +13,24 @@ from .filters import NO, POSSIBLE, SURE, Filter, IntArray, Things, graded
 from .query import RelationKind
 
 APART = 0.02
-"""Share of the picture's width or height below which two centres are level."""
+"""Share of the picture's width or height below which two centres count as level."""
 INSIDE = (0.9, 0.5)
-"""Share of a thing's area in the other; outlines are off by a tenth at most."""
+"""Share of a thing's area inside the other; outlines are off by a tenth at most."""
 ON_MATERIAL = 0.1
-"""Share of a thing on a ring's own material from which it is on the ring rather than in it."""
+"""Share of a thing on a ring's own material above which it is on the ring rather than in it."""
 RING = 0.1
 """Share of holes from which a thing is a ring; smaller holes are gaps in an outline."""
 AS_LARGE = 0.9
-"""What is as large as the other is the other seen twice, or its frame."""
+"""A thing larger than this share of the other is the other seen twice, or its frame."""
 HELD = 2
-"""What lies around so many of the others may be the ground they are on; one may be a part."""
+"""A thing around this many of the others may be the ground they lie on; one may be its part."""
 BESIDE = (1.0, 1.5)
-"""Gap in sizes (root of the area) of the other."""
+"""Gap in multiples of the other's size (root of its area)."""
 ANGLE = (110.0, 90.0)
-"""Degrees at which the two others are seen: off the line by 0.35 of its length, by half of it."""
+"""Angle between the two others as seen from a thing, degrees: it is off the line between them by
+0.35 of the line's length, and by half of it."""
 MIDDLE = 0.1
-"""At either end of the gap this share of it is beside an end rather than between."""
+"""Share of the gap at either end that is beside that end rather than between."""
 
 AXIS: dict[RelationKind, tuple[int, float, str]] = {
     "left_of": (0, -1.0, "left of"),
@@ -36,13 +38,13 @@ AXIS: dict[RelationKind, tuple[int, float, str]] = {
     "above": (1, -1.0, "above"),
     "below": (1, 1.0, "below"),
 }
-"""Axis of the picture, direction along it, words."""
+"""By relation: axis of the picture, direction along it, words."""
 
 
 def relation_filter(things: Things, kind: RelationKind, others: tuple[int, ...]) -> Filter:
-    """Which things are in this relation to the others (indices); the others themselves never are.
+    """Judge which things are in a relation to the others (indices).
 
-    Of nearest, which is a ranking, it only leaves out the other.
+    The others themselves never are. For nearest, which is a ranking, only they are excluded.
     """
     names = " and ".join(things.candidates[i].id for i in others)
     if kind in AXIS:
@@ -61,7 +63,7 @@ def relation_filter(things: Things, kind: RelationKind, others: tuple[int, ...])
 
 
 def ground_filter(things: Things, members: IntArray) -> Filter:
-    """Whether a thing is one among some things (indices) rather than what they lie on.
+    """Judge whether each thing is one among the members (indices) rather than what they lie on.
 
     The largest or the middle one of them may or may not be the tray that holds them.
     """
@@ -149,7 +151,7 @@ def _between_filter(things: Things, others: tuple[int, ...], names: str) -> Filt
 
 
 def _nearest_offsets(points: NDArray[np.object_], region: shapely.Polygon) -> FloatArray:
-    """From each of (n,) points to the nearest point of a region, (n, 2); 0 inside it."""
+    """Return the vectors (n, 2) from points (n,) to the nearest point of a region; 0 inside it."""
     lines = shapely.shortest_line(points, region)
     ends = shapely.get_coordinates(lines).reshape(-1, 2, 2)
     return ends[:, 1] - ends[:, 0]

@@ -1,1 +1,1 @@
-"""A prompt and a picture to a mask with its confidence."""
+"""Segmenters: from a picture and a prompt to a mask with its confidence."""

@@ -1,4 +1,4 @@
-"""Leaves the shadow that a thing casts out of its mask.
+"""Removes the shadow that a thing casts from its mask.
 
 A shadow differs from the ground as much as the thing does, so colour models take both. But it is
 dark, hardly coloured, lies along one side of the thing, and reaches out of the box around it.
@@ -23,29 +23,30 @@ from .region_growing import box_iou, filled
 # A shadow is darker than the ground and than the thing by this much lightness (CIE L*), and has
 # no more chroma than this.
 DARKER_THAN_GROUND, DARKER_THAN_THING, CHROMA = 12.0, 20.0, 14.0
-# Its share of a mask that holds both.
+# The shadow's share of a mask that holds both.
 LEAST_SHARE, MOST_SHARE = 0.06, 0.55
-# How much of its rim lies beside the thing, and how much on the outside.
+# Least shares of its rim beside the thing and on the outside.
 BESIDE, OUTSIDE = 0.35, 0.12
-# Without it the box fits as well and the colours stand out as clearly, but for so little.
+# Without it, the box fits and the colours stand out as well as before, up to this much.
 FIT_SLACK, SEPARATION_SLACK = 0.003, 0.02
-# Colours need not stand out as clearly where ground lies between thing and shadow by this much L*.
+# Colours need not stand out as clearly if the ground's L* is between those of thing and shadow, and
+# this far from each.
 ON_EACH_SIDE = 15.0
-# What is left without it is one thing: its largest piece holds this share.
+# What is left without it is one thing: its largest piece holds at least this share.
 IN_ONE_PIECE = 0.9
 NEXT = np.ones((3, 3), np.uint8)
 NEAR = np.ones((5, 5), np.uint8)
 
 
 def without_cast_shadow(image: Bytes, mask: Mask, box: Points, ground: Mask, keep: Points) -> Mask:
-    """The mask (h, w) without the part that is most likely its shadow, or as it is.
+    """Return the mask (h, w) without the part that is most likely a shadow, or unchanged.
 
     Args:
-        image: (h, w, 3) features of the window.
-        mask: of the thing, perhaps with its shadow; not empty.
-        box: (4,) that was drawn around the thing, px of the window.
-        ground: (h, w), surely not the thing.
-        keep: (n, 2) points that are surely on the thing.
+        image: (h, w, 3), features of the window.
+        mask: (h, w), the thing, perhaps with its shadow; not empty.
+        box: (4,), drawn around the thing, px of the window.
+        ground: (h, w), pixels that are surely not the thing.
+        keep: (n, 2), points that are surely on the thing.
     """
     lightness, chroma = lightness_and_chroma(image)
     lit = float(np.median(lightness[ground if ground.any() else ~mask]))
@@ -66,7 +67,10 @@ def without_cast_shadow(image: Bytes, mask: Mask, box: Points, ground: Mask, kee
 
 
 def _dark_parts(mask: Mask, lightness: Floats, lit: float) -> list[Mask]:
-    """The larger parts of a mask that are darker than the rest and the ground, and all of them."""
+    """Return the larger parts of a mask that are darker than the rest and the ground.
+
+    If there are several, all of them together are another one.
+    """
     levels = np.rint(2.55 * lightness[mask]).clip(0, 255).astype(np.uint8)
     split, _ = cv2.threshold(levels[:, None], 0, 255, cv2.THRESH_OTSU)
     dark = mask & (lightness <= min(split / 2.55, lit - DARKER_THAN_GROUND))
@@ -79,9 +83,9 @@ def _dark_parts(mask: Mask, lightness: Floats, lit: float) -> list[Mask]:
 
 
 def _thing_beside(mask: Mask, shadow: Mask, keep: Points) -> Mask | None:
-    """What is left of a mask without a dark part; None where the part lies otherwise than a shadow.
+    """Return a mask without a dark part; None if the part does not lie as a shadow does.
 
-    A windscreen has the thing all round or parts it; a shadow lies between the thing and the
+    A windscreen has the thing all round it or divides it; a shadow lies between the thing and the
     outside.
     """
     without = mask & ~_spread(shadow, NEXT)

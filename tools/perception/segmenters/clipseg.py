@@ -1,6 +1,6 @@
-"""CLIPSeg (Lueddecke and Ecker, 2022): words to a soft mask, whose separate pieces are things.
+"""CLIPSeg (Lueddecke and Ecker, 2022): from words to a soft mask, whose separate pieces are things.
 
-It sees the picture squashed to a small square: outlines are soft, things that touch are one.
+It sees the picture squashed to a small square: outlines are soft, and things that touch are merged.
 """
 
 from collections.abc import Mapping
@@ -13,18 +13,18 @@ from ..networks.runtime import Floats, array, load_network, resized
 from ..networks.settings import detection_threshold
 from ..target_prompt import TargetPrompt
 from .grabcut import bounding_box, pieces
-from .mask_scores import rated
+from .mask_scores import rate_mask
 from .protocol import Pixels, PromptKind, Segmentation
 
 CHECKPOINT = "CIDAS/clipseg-rd64-refined"
 LEVEL, STEP = 0.4, 0.1
-"""The probability a mask begins at, and by how much that is moved to see if the mask holds."""
+"""Threshold on a mask's probability, and by how much it is shifted to test the mask's stability."""
 LEAST = 4e-4
-"""Smaller pieces, as a share of the picture, are specks."""
+"""Least share of the picture in a piece; smaller ones are specks."""
 
 
 class ClipSegSegmenter:
-    """Masks from words alone."""
+    """Segmenter that takes words alone."""
 
     name = "clipseg"
     takes: frozenset[PromptKind] = frozenset({"text"})
@@ -48,7 +48,7 @@ class ClipSegSegmenter:
                 "probability": float(chance[piece].mean()),
                 "stability": tight / int(loose_areas[loose[piece][0]]),
             }
-            mask = rated(pixels, piece, parts)
+            mask = rate_mask(pixels, piece, parts)
             if mask.confidence > 0:
                 found.append(Detection(bounding_box(piece), float(chance[piece].max()), mask))
         return tuple(sorted(found, key=lambda d: -d.score))
@@ -60,7 +60,7 @@ class ClipSegSegmenter:
         return mask or Segmentation(np.zeros(pixels.shape[:2], dtype=np.bool_), 0.0, {})
 
     def _probabilities(self, pixels: Pixels, phrase: str) -> Floats:
-        """(H, W)."""
+        """Return each pixel's probability (H, W) of belonging to what the phrase names."""
         network = self._network
         inputs = network.processor(
             text=[phrase],

@@ -1,4 +1,4 @@
-"""What a mask's cues come to: the share of such masks that were right where the truth was known.
+"""Combines a mask's cues into the share of such masks that were right where the truth is known.
 
 The weights are fitted on photographs by `python -m formup.evals.perception.fit`.
 """
@@ -13,19 +13,21 @@ from typing import Literal
 Way = Literal["point", "box", "outline"]
 """How a thing was pointed at."""
 RIGHT = 0.8
-"""A mask is right whose overlap with the thing, intersection over union, is at least this."""
+"""Least overlap (intersection over union) with the thing for a mask to be right."""
 EDGES = "edge_support"
-"""Photographs hold too few masks that end where there is no edge to fit what that means."""
+"""Cue with a fixed effect: too few masks on photographs end where there is no edge to fit one."""
 EDGE_POWER = 2
 
 
 def fitted_confidence(way: Way, cues: Mapping[str, float]) -> float:
-    """How likely a mask is right, 0 to 1: logistic regression on its cues, and edges to it.
+    """Return how likely a mask is right, 0 to 1.
+
+    This is a logistic regression on its cues, times a power of its edge support, except for
+    outlines: somebody who draws one may mean an edge that the picture does not show.
 
     Args:
-        way: the thing was pointed at, each with weights of its own. Who draws an outline may mean
-            an edge that the picture does not show.
-        cues: in [0, 1] by name; one that is absent counts as 1, that nothing speaks against it.
+        way: how the thing was pointed at; each way has weights of its own.
+        cues: in [0, 1] by name; an absent one counts as 1, as nothing speaks against the mask.
     """
     weights = fitted_weights()[way]
     total = sum(w * cues.get(name, 1.0) for name, w in weights.items() if name != "constant")
@@ -35,5 +37,5 @@ def fitted_confidence(way: Way, cues: Mapping[str, float]) -> float:
 
 @cache
 def fitted_weights() -> dict[str, dict[str, float]]:
-    """The weight of each cue, and the constant, by way of pointing."""
+    """Return the weight of each cue, and the constant, by way of pointing."""
     return json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))

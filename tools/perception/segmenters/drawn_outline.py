@@ -1,6 +1,6 @@
 """Combines a drawn outline with the measured one where the drawing is known to be right.
 
-That is beside points that say so, and along the sides of a thing with straight sides.
+That is so near points that confirm it, and along the sides of a thing with straight sides.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,17 +24,17 @@ from .protocol import Segmentation
 from .segment import BESIDE, discs, segment_outline
 
 STRAY = 0.1
-"""Measured edges further than this from a drawn side, as a share of the size, are not its."""
+"""Greatest distance of measured edges from the drawn side they belong to, over the size."""
 ENDS = 0.08
-"""Share of a side at each end that is not measured: corners come out rounded."""
+"""Share of a side at each end that is ignored, because measured corners come out rounded."""
 LEAST = 0.5
-"""Where less than this share of a side was measured, the drawn one stays."""
+"""Least share of a side that must be measured; otherwise the drawn side stays."""
 DRAWN = 0.5
-"""How much the drawn side counts beside the measured one."""
+"""Weight of the drawn side against the measured one."""
 AGREED = 0.5
-"""Least overlap (intersection over union) of the polygon and what was measured."""
+"""Least overlap (intersection over union) of the polygon and the measured outline."""
 SAMPLES = 120
-"""Places of a side that are measured."""
+"""Number of samples of the measured edge per side."""
 
 
 def segment_corrected(
@@ -44,11 +44,11 @@ def segment_corrected(
     positive: Iterable[Point] = (),
     negative: Iterable[Point] = (),
 ) -> Segmentation:
-    """As `segment_outline`; near points that the outline agrees with, it is what was drawn.
+    """Segment as `segment_outline` does, but as drawn near points that agree with the outline.
 
-    Points on the thing that lie in the outline say that nothing drawn is to be left out beside
-    them, negative ones outside of it that nothing beyond it is kept. Only points against the
-    outline have the thing cut out anew.
+    Near a point on the thing inside the outline, nothing drawn is left out; near a negative point
+    outside it, nothing beyond the outline is kept. Only points that contradict the outline affect
+    the segmentation itself.
     """
     shape = (pixels.shape[0], pixels.shape[1])
     drawn = gc.polygon_region(np.asarray(vertices, dtype=float), shape)
@@ -66,19 +66,19 @@ def segment_corrected(
 
 
 def with_straight_sides(outline: Outline, vertices: Sequence[Point]) -> Outline:
-    """The polygon of a drawn one's sides, each midway between it and the measured edge beside it.
+    """Move each side of a drawn polygon midway to the measured edge beside it.
 
-    The measured edge is taken as its Theil-Sen line (Sen 1968), which up to 29 % of it do not
-    move: who draws errs by reading, the mask by colour, and the mean of both by less than either.
-    Where little was measured beside a side, the drawn one stays.
+    The measured edge is taken as its Theil-Sen line (Sen 1968), which outliers of up to 29 % do not
+    affect: a person errs in reading, the mask in colour, and their mean by less than either. If
+    little was measured beside a side, the drawn side stays.
 
     Args:
-        outline: as measured.
-        vertices: three or more (x, y), px, of a polygon with straight sides.
+        outline: the measured outline.
+        vertices: three or more (x, y), px, of the drawn polygon with straight sides.
 
     Returns:
-        With as many corners, or `outline` itself where those lines make no polygon or one that is
-        another thing.
+        A polygon with as many corners as the drawn one; `outline` itself if the sides make no valid
+        polygon, or one that overlaps too little with it.
     """
     drawn = np.asarray(shapely.get_coordinates(shapely.normalize(Polygon(vertices))))[:-1]
     edge = outline.filled.exterior
@@ -100,7 +100,7 @@ def with_straight_sides(outline: Outline, vertices: Sequence[Point]) -> Outline:
 
 
 def clipped_to_picture(outline: Outline, width: int, height: int) -> Outline:
-    """What lies in the picture of an outline whose sides were laid out past its border."""
+    """Return the part inside the picture of an outline that may reach beyond its border."""
     seen = largest_part(outline.polygon.intersection(box(-0.5, -0.5, width - 0.5, height - 0.5)))
     return outline if seen is None or seen.equals(outline.polygon) else outline_of(seen)
 
@@ -111,7 +111,7 @@ def _contains_point(region: Mask, point: Point) -> bool:
 
 
 def _fitted_side(side: FloatArray, places: FloatArray) -> FloatArray:
-    """A drawn side, (2, 2), moved and turned towards the line of places measured beside it."""
+    """Move and turn a drawn side (2, 2) halfway to the line of the places measured beside it."""
     way = side[1] - side[0]
     length = float(np.hypot(*way))
     normal = np.array([-way[1], way[0]]) / length
@@ -128,7 +128,7 @@ def _fitted_side(side: FloatArray, places: FloatArray) -> FloatArray:
 
 
 def _side_crossing(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Where two sides meet that follow each other; nearly in line, midway between their ends."""
+    """Return where two successive sides meet; if nearly in line, midway between their ends."""
     a, b = before[1] - before[0], after[1] - after[0]
     cross = float(a[0] * b[1] - a[1] * b[0])
     if abs(cross) < 0.2 * float(np.hypot(*a) * np.hypot(*b)):

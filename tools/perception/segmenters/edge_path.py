@@ -1,7 +1,7 @@
-"""The edge of a thing in a narrow band along a drawn outline.
+"""Finds the edge of a thing in a narrow band along a drawn outline.
 
-Who draws knows what belongs to the thing but is off by a few per cent; the picture's own edge
-beside what was drawn is exact. The closed path of least cost keeps near both.
+A person who draws knows what belongs to the thing but is off by a few per cent; the picture's own
+edge next to the drawn line is exact. The closed path of least cost stays near both.
 """
 
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ Reals = npt.NDArray[np.float64]
 Columns = npt.NDArray[np.int64]
 
 # Lengths are shares of the thing's size, the square root of its area, unless they are in px.
-# How far the edge may lie from what was drawn, and in how many steps a side it is looked for.
+# How far the edge may lie from the drawn line, and the number of steps searched on each side.
 REACH, STEPS = 0.055, 24
-# Thin parts: inwards no further than this share of the local half-width.
+# In thin parts the edge lies inwards by no more than this share of the local half-width.
 THIN = 0.7
-# Stations along the outline, px apart, and how many at least and at most.
+# Spacing of stations along the outline, px, and their least and greatest number.
 SPACING, FEWEST, MOST = 1.5, 120, 900
-# How far positions and tangents are smoothed, and colours along the outline.
+# Sigmas by which positions, tangents, and colours along the outline are smoothed.
 SMOOTH_POSITIONS, SMOOTH_TANGENTS, SMOOTH_COLOURS = 0.006, 0.025, 0.015
-# Width of the strips just inside and outside whose mean colours are compared.
+# Width of the strips just inside and outside the edge whose mean colours are compared.
 STRIP = 0.02
-# Colour differences that texture makes: so many times the median gradient, and at least so much.
+# Colour differences due to texture: this many times the median gradient, plus this much.
 TEXTURE, LEAST_NOISE = 6.0, 12.0
-# Cost of lying a whole reach from what was drawn, and of steps in or out between stations.
+# Cost of lying a whole REACH from the drawn line, and of steps in or out between stations.
 PULL, BEND = 0.4, 2.5
 NEVER = 1e3
 
@@ -38,10 +38,10 @@ class Band:
     """The strip along an outline, unwrapped: stations along it, offsets across it.
 
     Attributes:
-        stations: (m, 2) on the outline, px.
-        normals: (m, 2) of unit length, pointing outwards.
-        spacing, step: px between stations and between offsets.
-        colours: (m, k, c) of the picture at each station and offset.
+        stations: (m, 2), points on the outline, px.
+        normals: (m, 2), of unit length, pointing outwards.
+        spacing, step: distance between stations and between offsets, px.
+        colours: (m, k, c), the picture at each station and offset.
     """
 
     stations: Points
@@ -52,15 +52,15 @@ class Band:
 
 
 def edge_path(image: Bytes, outline: Points, region: Mask) -> Points:
-    """The closed path (m, 2) px of least cost along the picture's edges beside an outline.
+    """Find the closed path (m, 2), px, of least cost along the picture's edges beside an outline.
 
     Dynamic programming over offsets along the normals (Amini, Weymouth and Jain 1990), run twice
     to close it: the second time from the opposite station, fixed where the first run passed it.
 
     Args:
         image: (h, w, c), smoothed.
-        outline: (n, 2) px, as drawn.
-        region: (h, w), the pixels in it.
+        outline: (n, 2), px, as drawn.
+        region: (h, w), the pixels inside it.
     """
     size = float(np.sqrt(np.count_nonzero(region)))
     strip = max(1, round(STRIP / REACH * STEPS))
@@ -73,11 +73,11 @@ def edge_path(image: Bytes, outline: Points, region: Mask) -> Points:
 
 
 def closed_path(cost: Reals, bend: float) -> Columns:
-    """The column taken in each row (m,) of the cheapest path that ends where it began.
+    """Return the columns (m,), one per row, of the cheapest path that ends where it began.
 
     Args:
-        cost: (m, k) of taking a column in a row.
-        bend: cost of a step of one column between rows; it grows with the square.
+        cost: (m, k), cost of taking a column in a row.
+        bend: cost of a step of one column between rows; it grows with the square of the step.
     """
     half = len(cost) // 2
     start = int(_open_path(cost, bend)[half])
@@ -128,7 +128,7 @@ def _unwrapped(image: Bytes, outline: Points, size: float, strip: int) -> Band:
 
 
 def _edge_evidence(image: Bytes, band: Band, strip: int) -> Reals:
-    """How clearly the colours just inside and outside differ, 0 to 1, at each offset (m, k)."""
+    """Rate how clearly colours just inside and outside differ, 0 to 1, at each offset, (m, k)."""
     summed = np.cumsum(np.pad(band.colours, ((0, 0), (1, 0), (0, 0))), axis=1)
     at: Columns = np.arange(strip, summed.shape[1] - strip - 1, dtype=np.int64)
     inside = summed[:, at] - summed[:, at - strip]
@@ -140,7 +140,7 @@ def _edge_evidence(image: Bytes, band: Band, strip: int) -> Reals:
 
 
 def _half_width(region: Mask, band: Band, size: float) -> Floats:
-    """The half-width (m,) of the region near each station, px."""
+    """Return the half-width (m,) of the region near each station, px."""
     side = 2 * int(np.ceil(2 * REACH * size)) + 1
     grown = cv2.dilate(distance_inside(region), np.ones((side, side), np.uint8))
     widest = np.asarray(grown, dtype=np.float32)
@@ -150,7 +150,7 @@ def _half_width(region: Mask, band: Band, size: float) -> Floats:
 
 
 def _resampled(ring: Points, count: int) -> Points:
-    """Points (count, 2) at equal arc lengths along a closed ring (n, 2)."""
+    """Return points (count, 2) at equal arc lengths along a closed ring (n, 2)."""
     closed = np.vstack([ring, ring[:1]])
     arc: Reals = np.r_[0, np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))]
     at: Reals = np.linspace(0, float(arc[-1]), count, endpoint=False)

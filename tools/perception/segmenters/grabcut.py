@@ -1,6 +1,6 @@
 """GrabCut on a small window around the prompt: the engine behind every pointing prompt.
 
-A window of fixed size keeps the cost of a 50-megapixel picture that of a thumbnail, and gives
+A window of fixed size makes a 50-megapixel picture cost no more than a thumbnail, and gives
 smoothing, rings and clean-up one scale to be tuned at.
 """
 
@@ -24,22 +24,23 @@ Point = tuple[float, float]
 WORK_SIDE = 160
 # Small things need pixels for the smoothing to act on, but hold no more detail than this.
 MAX_UPSCALE = 3.0
-# Surroundings seen beyond the prompt, in its own size: enough to learn the background's colours.
+# Margin around the prompt as a share of its size: enough to learn the background's colours.
 MARGIN = 0.3
-# Averaging so many samples a side for one working pixel is plenty; more cost seconds at 50 MP.
+# Averaging this many samples a side for one working pixel is plenty; more cost seconds at 50 MP.
 SAMPLES = 4
 # Even a prompt of one pixel needs some surroundings.
 MIN_MARGIN_PX = 3.0
-# A fifth iteration changed no measured mask for the better.
+# A fifth iteration improved no measured mask.
 ITERATIONS = 4
 # Lightness counts half and chroma one and a half: a shadow changes lightness much more than hue.
 LAB_WEIGHTS = (0.5, 1.5, 1.5)
-# A prompt that leaves less surroundings than this share of the window takes its rim as a sample.
+# If a prompt leaves less background than this share of the window, the window's rim, this share of
+# its side wide, serves as a sample.
 MIN_BACKGROUND = 0.05
 RIM = 0.04
-# Pieces smaller than this share of the largest are noise; the object may be cut in two by a band.
+# Pieces smaller than this share of the largest are noise; a band may cut the object in two.
 MIN_PIECE = 0.15
-# Smaller holes than this share of the mask are highlights and labels more often than openings.
+# Holes smaller than this share of the mask are highlights and labels more often than openings.
 MIN_HOLE = 0.03
 
 
@@ -68,20 +69,20 @@ class Window:
         return np.array([width / self.extent[0], height / self.extent[1]])
 
     def to_work(self, points: npt.ArrayLike) -> Points:
-        """Picture coordinates (n, 2) at the working scale; pixel centres stay at .0."""
+        """Convert picture coordinates (n, 2) to the working scale; pixel centres stay at .0."""
         shifted = np.asarray(points, dtype=np.float64).reshape(-1, 2) - self.origin + 0.5
         return shifted * self.scale - 0.5
 
     def to_picture_points(self, points: npt.ArrayLike) -> Points:
-        """Working coordinates (n, 2) in the picture, the inverse of `to_work`."""
+        """Convert working coordinates (n, 2) to the picture, the inverse of `to_work`."""
         return (np.asarray(points) + 0.5) / self.scale - 0.5 + self.origin
 
     def picture_area(self, mask: Mask) -> float:
-        """Area of a mask at the working scale, in picture pixels."""
+        """Return the area of a mask at the working scale, in picture pixels."""
         return float(np.count_nonzero(mask) / np.prod(self.scale))
 
     def transfer(self, mask: Mask, other: Window) -> Mask:
-        """The part of a mask in this window that lies in the other one, at the other's scale."""
+        """Resample a mask of this window to another window, (h, w) of the other."""
         corners = np.array(((0, 0), (1, 0), (0, 1)), dtype=np.float64)
         here = self.to_work(other.to_picture_points(corners)).astype(np.float32)
         mapping = cv2.getAffineTransform(corners.astype(np.float32), here)
@@ -91,7 +92,7 @@ class Window:
         return np.asarray(moved) > 0.5
 
     def to_picture(self, mask: Mask) -> Mask:
-        """The mask at the picture's size; interpolating a soft edge keeps outlines smooth."""
+        """Resize the mask to the picture; interpolating a soft edge keeps outlines smooth."""
         soft = cv2.GaussianBlur(mask.astype(np.uint8) * 255, (0, 0), 0.8)
         x0, y0 = self.origin
         width, height = self.extent
@@ -102,14 +103,14 @@ class Window:
 
 
 def window_around(pixels: Bytes, box: Box, side: int = WORK_SIDE) -> Window:
-    """The window of `pixels` (H, W, 3) RGB around `box` and a margin, ready to segment."""
+    """Open the window of `pixels` (H, W, 3) RGB around `box` and a margin, ready to segment."""
     mx = MARGIN * (box[2] - box[0]) + MIN_MARGIN_PX
     my = MARGIN * (box[3] - box[1]) + MIN_MARGIN_PX
     return open_window(pixels, (box[0] - mx, box[1] - my, box[2] + mx, box[3] + my), side)
 
 
 def open_window(pixels: Bytes, box: Box, side: int) -> Window:
-    """The window of `pixels` (H, W, 3) RGB on `box`, its longer side at most `side` pixels."""
+    """Open the window of `pixels` (H, W, 3) RGB on `box`, its longer side at most `side` px."""
     height, width = pixels.shape[:2]
     x0, x1 = max(0, int(box[0])), min(width, int(np.ceil(box[2])) + 1)
     y0, y1 = max(0, int(box[1])), min(height, int(np.ceil(box[3])) + 1)
@@ -120,7 +121,7 @@ def open_window(pixels: Bytes, box: Box, side: int) -> Window:
 
 
 def resampled(pixels: Bytes, size: tuple[int, int]) -> Bytes:
-    """`pixels` (H, W, 3) at another size (width, height); only some are read of very many."""
+    """Resize `pixels` (H, W, 3) to (width, height); of a very large picture, read only some."""
     scale = size[0] / pixels.shape[1]
     how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
     step = max(1, min(int(1 / (scale * SAMPLES)), *pixels.shape[:2]))  # a picture may be a sliver
@@ -130,7 +131,7 @@ def resampled(pixels: Bytes, size: tuple[int, int]) -> Bytes:
 
 
 def features(rgb: npt.ArrayLike) -> Bytes:
-    """Smoothed, weighted CIE Lab (h, w, 3) of an RGB picture; GrabCut takes 8-bit only."""
+    """Return smoothed, weighted CIE Lab (h, w, 3) of an RGB picture, 8-bit as GrabCut needs it."""
     smooth = cv2.bilateralFilter(np.asarray(rgb, dtype=np.uint8), 7, 40, 5)
     lab = np.asarray(cv2.cvtColor(smooth.astype(np.float32) / 255, cv2.COLOR_RGB2LAB))
     scaled = lab * np.multiply(LAB_WEIGHTS, (2.55, 1, 1)) + (0, 128, 128)
@@ -138,14 +139,14 @@ def features(rgb: npt.ArrayLike) -> Bytes:
 
 
 def lightness_and_chroma(image: Bytes) -> tuple[Floats, Floats]:
-    """CIE lightness L* and chroma, (h, w) each, of features."""
+    """Return CIE lightness L* and chroma, (h, w) each, from features (h, w, 3)."""
     weights = np.multiply(LAB_WEIGHTS, (2.55, 1, 1)).astype(np.float32)
     lab: Floats = (image.astype(np.float32) - np.array((0, 128, 128), np.float32)) / weights
     return lab[..., 0], np.linalg.norm(lab[..., 1:], axis=2).astype(np.float32)
 
 
 def box_region(shape: tuple[int, int], box: npt.ArrayLike) -> Mask:
-    """Pixels (h, w) whose centres lie in the box; the nearest one if there is none."""
+    """Return a mask (h, w) of the pixels with centres in the box, or of the nearest if none."""
     x0, y0, x1, y1 = np.asarray(box, dtype=np.float64)
     y, x = np.ogrid[: shape[0], : shape[1]]
     inside = (x >= x0) & (x <= x1) & (y >= y0) & (y <= y1)
@@ -153,7 +154,7 @@ def box_region(shape: tuple[int, int], box: npt.ArrayLike) -> Mask:
 
 
 def polygon_region(vertices: Points, shape: tuple[int, int]) -> Mask:
-    """Pixels (h, w) in the polygon `vertices` (n, 2)."""
+    """Return a mask (h, w) of the pixels in the polygon `vertices` (n, 2), or of one if none."""
     region = np.zeros(shape, dtype=np.uint8)
     cv2.fillPoly(region, [np.round(vertices * 16).astype(np.int32)], (1,), shift=4)
     inside = region.astype(np.bool_)
@@ -167,10 +168,10 @@ def _nearest_pixel(shape: tuple[int, int], x: float, y: float) -> Mask:
 
 
 def trimap(inside: Mask, near: Mask, core: Mask | None = None) -> Bytes:
-    """GrabCut labels (h, w): `core` is sure object, beyond `near` is sure background.
+    """Return GrabCut labels (h, w): `core` is sure object, all beyond `near` is sure background.
 
     A prompt that fills the window leaves no background to learn from: then the window's rim is
-    taken as probably background, for things rarely fill a picture to its edges.
+    labelled probable background, as things rarely fill a picture to its edges.
     """
     labels = np.full(inside.shape, cv2.GC_BGD, dtype=np.uint8)
     labels[near] = cv2.GC_PR_BGD
@@ -186,10 +187,10 @@ def trimap(inside: Mask, near: Mask, core: Mask | None = None) -> Bytes:
 
 
 def grabcut(image: Bytes, labels: Bytes) -> Mask:
-    """Object pixels (h, w) by iterated graph cuts (Rother, Kolmogorov and Blake, 2004).
+    """Find the object's pixels (h, w) by iterated graph cuts (Rother, Kolmogorov and Blake, 2004).
 
-    Empty where there is one colour only, or no object or no background to learn from, which
-    OpenCV refuses.
+    The mask is empty if there is only one colour, or no object or no background to learn from,
+    which OpenCV refuses.
     """
     probable = _is_object(labels)
     plain = not np.ptp(image, axis=(0, 1)).any()
@@ -210,7 +211,7 @@ def _is_object(labels: Bytes) -> Mask:
 
 
 def clean(mask: Mask, keep: Points) -> Mask:
-    """The mask without specks and small holes; pieces that hold a `keep` point stay."""
+    """Return the mask without specks and small holes; pieces that hold a `keep` point stay."""
     width = 2 * max(1, round(0.01 * np.sqrt(np.count_nonzero(mask)))) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
     opened = np.asarray(cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel)) > 0
@@ -233,14 +234,14 @@ def _close_small_holes(mask: Mask) -> Mask:
 
 
 def pieces(mask: Mask, connectivity: int) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int64]]:
-    """Connected components: labels (h, w), 0 outside the mask, and the area of each label."""
+    """Label connected components: labels (h, w), 0 outside the mask, and the area of each label."""
     found = cv2.connectedComponents(mask.astype(np.uint8), connectivity=connectivity)[1]
     labels = np.asarray(found, dtype=np.int32)
     return labels, np.bincount(labels.ravel())
 
 
 def watershed(image: Bytes, core: Mask, labels: Bytes) -> Mask:
-    """An independent second opinion (h, w): flooding from the core and the sure background."""
+    """Segment by flooding from the core and the sure background, as a second opinion (h, w)."""
     markers = np.zeros(labels.shape, dtype=np.int32)
     markers[labels == cv2.GC_BGD] = 1
     markers[core] = 2
@@ -248,7 +249,10 @@ def watershed(image: Bytes, core: Mask, labels: Bytes) -> Mask:
 
 
 def colour_separation(image: Bytes, mask: Mask) -> float:
-    """1 minus the Bhattacharyya coefficient of the colours inside and close around the mask."""
+    """Return 1 minus the Bhattacharyya coefficient of colours inside and close around the mask.
+
+    It is 0 if there is nothing inside or around it.
+    """
     width = 2 * max(2, round(0.08 * np.sqrt(np.count_nonzero(mask)))) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
     around = np.asarray(cv2.dilate(mask.astype(np.uint8), kernel)).astype(np.bool_) & ~mask
@@ -264,19 +268,19 @@ def _histogram(colours: Bytes) -> npt.NDArray[np.float64]:
 
 
 def iou(one: Mask, other: Mask) -> float:
-    """Intersection over union; 0 when both are empty."""
+    """Return the intersection over union of two masks; 0 if both are empty."""
     union = np.count_nonzero(one | other)
     return np.count_nonzero(one & other) / union if union else 0.0
 
 
 def distance_inside(mask: Mask) -> npt.NDArray[np.float32]:
-    """Distance (h, w) of each pixel of the mask to the nearest pixel outside it or the window."""
+    """Return each pixel's distance (h, w) to the nearest one outside the mask or the window."""
     padded = np.pad(mask, 1).astype(np.uint8)
     return np.asarray(cv2.distanceTransform(padded, cv2.DIST_L2, 5), np.float32)[1:-1, 1:-1]
 
 
 def signed_distance(mask: Mask) -> Floats:
-    """Distance (h, w) to the mask's edge, px, positive inside."""
+    """Return each pixel's distance (h, w) to the mask's edge, px, positive inside."""
     inside, outside = (
         np.asarray(cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5), np.float32)
         for part in (mask, ~mask)
@@ -285,11 +289,11 @@ def signed_distance(mask: Mask) -> Floats:
 
 
 def bounding_box(mask: Mask) -> Box:
-    """The outermost pixel centres x0, y0, x1, y1 of a mask that is not empty."""
+    """Return the outermost pixel centres x0, y0, x1, y1 of a mask that is not empty."""
     y, x = np.nonzero(mask)
     return float(x.min()), float(y.min()), float(x.max()), float(y.max())
 
 
 def majority(masks: Iterable[Mask]) -> Mask:
-    """Pixels in more than half of the masks."""
+    """Return the pixels that are in more than half of the masks."""
     return np.mean(list(masks), axis=0) > 0.5

@@ -11,12 +11,13 @@ from .drawn_outline import segment_corrected
 from .protocol import Pixels, PromptKind, Segmentation
 from .segment import segment_box, segment_points
 
-# Below these most formations were wrong on the photographs; a yes to what is shown uses any other.
+# Below these, most formations on the photographs were wrong; a person who sees a mask below them
+# may still accept it.
 THRESHOLDS = MappingProxyType({"point": 0.55, "box": 0.35, "outline": 0.35, "candidate": 0.5})
 
 
 class GrabCutSegmenter:
-    """Masks from a box, points or an outline; points correct the other two."""
+    """Segmenter that takes a box, points or an outline; points correct the other two."""
 
     name = "grabcut"
     takes: frozenset[PromptKind] = frozenset({"box", "points", "outline"})
@@ -37,8 +38,8 @@ class GrabCutSegmenter:
 
 
 def visible_vertices(outline: Sequence[Point], width: int, height: int) -> list[Point]:
-    """The vertices of what lies in the picture of an outline that was drawn."""
+    """Return the vertices of the part of a drawn outline that lies in the picture."""
     frame = Polygon([(0, 0), (width - 1, 0), (width - 1, height - 1), (0, height - 1)])
     visible = largest_part(Polygon(outline).intersection(frame))
-    assert visible is not None  # TargetPrompt.problems was asked before
+    assert visible is not None  # TargetPrompt.problems has been checked
     return [(float(x), float(y)) for x, y in visible.exterior.coords[:-1]]

@@ -1,4 +1,4 @@
-"""The pair that the ZeroCAP paper uses: Grounding DINO finds by words, SAM makes the masks."""
+"""The pair that the ZeroCAP paper uses: Grounding DINO finds things by words, SAM makes masks."""
 
 from dataclasses import replace
 
@@ -10,10 +10,10 @@ from .sam import SamSegmenter
 
 
 class LangSamSegmenter(SamSegmenter):
-    """Masks from words, points, boxes and outlines.
+    """Segmenter that takes words, points, boxes and outlines.
 
     Args:
-        checkpoints: of the detector and of SAM, with a comma between them.
+        checkpoints: those of the detector and of SAM, separated by a comma.
     """
 
     name = "langsam"

@@ -1,7 +1,7 @@
-"""Openings in a mask: the ground seen through finger loops, rings and handles.
+"""Cuts openings out of a mask: the ground seen through finger loops, rings and handles.
 
-GrabCut learns the ground inside a loop as one of the thing's own colours. On plain ground it can
-be told apart; on a patterned one a window or a marking looks just the same, and stays.
+GrabCut learns the ground inside a loop as one of the thing's own colours. Plain ground can be told
+apart; on patterned ground a window or a marking looks just the same, and stays.
 """
 
 import cv2
@@ -9,17 +9,18 @@ import numpy as np
 
 from .grabcut import MIN_HOLE, Bytes, Floats, Mask, Points, pieces
 
-# The ground is plain if its typical deviation from one even gradient is less, in features.
+# The ground is plain if its median deviation from one even gradient is less than this, in features.
 PLAIN = 4.0
-# An opening shows the ground: it is this much nearer to the ground than the thing's own colours
-# are. Openings measured .11 to .16 and windows, shades and lettering .5 and more.
+# An opening shows the ground: its distance from the ground's colour is less than this share of the
+# distance of the thing's own colours. Openings measured .11 to .16, and windows, shades and
+# lettering .5 or more.
 LIKENESS = 0.35
 # Fewer ground pixels than this are no sample.
 MIN_GROUND = 100
 
 
 def cut_openings(image: Bytes, mask: Mask, keep: Points) -> Mask:
-    """The mask without enclosed parts that show plain ground; parts with a `keep` point stay."""
+    """Return the mask without enclosed parts that show plain ground, except at `keep` points."""
     ground = np.asarray(cv2.erode((~mask).astype(np.uint8), np.ones((7, 7)), borderValue=(1,))) > 0
     if np.count_nonzero(ground) < MIN_GROUND or not mask.any():
         return mask
@@ -35,7 +36,7 @@ def cut_openings(image: Bytes, mask: Mask, keep: Points) -> Mask:
 
 
 def _distance_from(image: Bytes, ground: Mask) -> Floats:
-    """Distance (h, w) of each pixel's colour from the plane fitted to the ground's colours."""
+    """Return each pixel's colour distance (h, w) from the plane fitted to the ground's colours."""
     y, x = np.indices(ground.shape)
     places = np.stack([np.ones_like(x), x, y], axis=-1).astype(np.float64)
     plane = np.linalg.lstsq(places[ground], image[ground].astype(np.float64), rcond=None)[0]
@@ -43,7 +44,10 @@ def _distance_from(image: Bytes, ground: Mask) -> Floats:
 
 
 def _openings(mask: Mask, distance: Floats, split: float, alike: float, keep: Points) -> Mask:
-    """Enclosed pieces (h, w) of the mask below the split that are like the ground as a whole."""
+    """Return the enclosed pieces (h, w) of the mask below the split that look like the ground.
+
+    A piece does if its median distance from the ground is less than `alike`.
+    """
     low = (mask & (distance <= split)).astype(np.uint8)
     labels, areas = pieces(
         np.asarray(cv2.morphologyEx(low, cv2.MORPH_OPEN, np.ones((3, 3)))) > 0, 4

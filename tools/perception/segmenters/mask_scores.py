@@ -1,4 +1,4 @@
-"""What masks of networks are rated by: confidence alpha as the geometric mean of its parts."""
+"""Rates masks of networks: the confidence alpha is the geometric mean of its parts."""
 
 from collections.abc import Mapping
 
@@ -9,15 +9,16 @@ from .grabcut import Bytes, Mask, bounding_box, clean, colour_separation, window
 from .protocol import Segmentation
 
 MOST = 0.9
-"""What covers more of the picture is no thing in it."""
+"""Greatest share of the picture that a thing in it may cover."""
 
 
-def rated(pixels: Bytes, mask: Mask, parts: Mapping[str, float]) -> Segmentation:
-    """A mask (H, W) with its confidence; empty, with confidence 0, where it is no thing.
+def rate_mask(pixels: Bytes, mask: Mask, parts: Mapping[str, float]) -> Segmentation:
+    """Clean a mask (H, W) and rate it; it becomes empty, with confidence 0, if it is no thing.
 
     Args:
         pixels: (H, W, 3) RGB.
-        parts: the network's own scores, in [0, 1]; how far the mask stands out in colour is added.
+        mask: (H, W).
+        parts: the network's own scores in [0, 1]; how far the mask stands out in colour is added.
     """
     mask = clean(mask, np.empty((0, 2))) if mask.any() else mask
     if not mask.any() or float(np.mean(mask)) > MOST:

@@ -1,4 +1,4 @@
-"""What a segmenter is: a picture and a prompt go in, a mask and its confidence come out."""
+"""The interface of a segmenter: a picture and a prompt go in, a mask with confidence comes out."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class Segmentation:
     """A mask of the thing pointed at, and how far it can be trusted.
 
     Attributes:
-        mask: (H, W) of the whole picture.
+        mask: (H, W), over the whole picture.
         confidence: in [0, 1], compared with the threshold t; what it is made of is the
             segmenter's choice, but never a claim about accuracy.
         parts: the cues in [0, 1] that the confidence combines, by name.
@@ -34,14 +34,14 @@ class Segmenter(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is chosen by."""
+        """The name by which it is chosen."""
         ...
 
     @property
     def takes(self) -> frozenset[PromptKind]:
-        """The kinds of prompt it can be pointed with; points also correct the other ones.
+        """The kinds of prompt that it takes; points also correct the other ones.
 
-        One that takes text is a `detection.Finder` as well.
+        A segmenter that takes text also implements `detection.Finder`.
         """
         ...
 
@@ -49,17 +49,17 @@ class Segmenter(Protocol):
     def thresholds(self) -> Mapping[str, float]:
         """The confidence below which a mask is refused (t in the paper), by way of pointing.
 
-        `point`, `box` and `outline` as far as it takes these, and `candidate` where it takes a
-        box, an outline or text.
+        These are `point`, `box` and `outline` as far as it takes them, and `candidate` if it takes
+        a box, an outline or text.
         """
         ...
 
     def segment(self, pixels: Pixels, prompt: TargetPrompt) -> Segmentation:
-        """The mask of the thing pointed at; empty, with confidence 0, where nothing is found.
+        """Return the mask of the thing pointed at; empty, with confidence 0, if nothing is found.
 
         Args:
             pixels: (H, W, 3) RGB.
-            prompt: of a kind it takes and checked on this picture; coordinates in px, x right,
+            prompt: of a kind that it takes, checked on this picture; coordinates in px, x right,
                 y down, pixel centres at .0. Boxes and outlines may reach beyond the picture.
         """
         ...

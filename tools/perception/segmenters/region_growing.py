@@ -1,7 +1,7 @@
 """Proposes regions that a point may mean, grown by colour at many tolerances and scales.
 
 A click says where a thing is but not how large it is. The few regions with contrast all along
-their edge are the proposals that the segmentation proper then has to confirm.
+their edge are proposals that the actual segmentation then has to confirm.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,15 +26,15 @@ from .grabcut import (
 
 # Proposals need less detail than masks.
 SIDE = 128
-# From the whole picture down to windows of a sixteenth of its side, by halves.
+# Number of window sizes: from the whole picture down to a sixteenth of its side, by halves.
 ZOOMS = 5
 MIN_WINDOW_PX = 40
 # Distances in the window's colour features: from noise to the difference of strong colours.
 TOLERANCES = (7, 10, 14, 19, 25, 33, 42, 54, 70)
-# More than half the picture is its background, fewer pixels are no shape.
+# A region of more than half the picture is its background, one of fewer pixels has no shape.
 MAX_SHARE = 0.5
 MIN_PIXELS = 12
-# The contrast that is half as good as any: a clear edge, in units of the features.
+# The contrast that scores half as much as an infinite one: a clear edge, in units of the features.
 CLEAR_CONTRAST = 22.0
 # Colours this near to each other show no edge between them.
 NO_EDGE = 8.0
@@ -46,15 +46,15 @@ BORDER_DISCOUNT = 0.7
 SIZE_PREFERENCE = 0.15
 # Proposals whose boxes overlap more than this are the same.
 SAME_BOX = 0.75
-# A pinned point holds a disc of this share of the window's side, and speaks for the connected
-# pixels whose colour is as close as this.
+# A pinned point fixes a disc with a radius of this share of the window's side, and speaks for the
+# connected pixels whose colour is within this distance.
 PIN_RADIUS = 0.02
 PIN_TOLERANCE = 25
 
 
 @dataclass(frozen=True)
 class Region:
-    """A grown region `mask` (h, w) in its window, and how much it looks like a thing."""
+    """A grown region's `mask` (h, w) in its window, and how much it looks like a thing."""
 
     window: Window
     mask: Mask
@@ -69,15 +69,15 @@ class Region:
 
 
 def propose(pixels: Bytes, points: Sequence[Point], count: int) -> list[Region]:
-    """Up to `count` clearly different regions of `pixels` (H, W, 3) that hold the points.
+    """Propose up to `count` clearly different regions of `pixels` (H, W, 3) that hold the points.
 
-    Best first; empty where nothing with an edge around the points fits in the picture.
+    Best first; empty if nothing with an edge around the points fits in the picture.
     """
     return distinct(_grown(pixels, points), count)
 
 
 def distinct(regions: Iterable[Region], count: int) -> list[Region]:
-    """The best `count` regions whose boxes differ, best first."""
+    """Return the best `count` regions with different boxes, best first."""
     chosen: list[Region] = []
     for region in sorted(regions, key=lambda r: r.score, reverse=True):
         if all(box_iou(region.box, other.box) < SAME_BOX for other in chosen):
@@ -88,10 +88,10 @@ def distinct(regions: Iterable[Region], count: int) -> list[Region]:
 
 
 def pin(image: Bytes, labels: Bytes, positive: Points, negative: Points) -> Bytes:
-    """GrabCut labels (h, w) with discs around the points forced to be the thing or background.
+    """Return GrabCut labels (h, w) with discs around the points forced to thing or background.
 
-    A disc alone is too few pixels to change a colour model, so the connected pixels of like colour
-    become probably what the point is, wherever the labels are not surely otherwise.
+    A disc alone is too few pixels to change a colour model, so connected pixels of similar colour
+    become probably what the point is, unless their labels are sure.
     """
     height, width = labels.shape
     radius = max(1, round(PIN_RADIUS * max(height, width)))
@@ -110,12 +110,12 @@ def pin(image: Bytes, labels: Bytes, positive: Points, negative: Points) -> Byte
 
 
 def _like_coloured(image: Bytes, seed: npt.NDArray[np.int64]) -> Mask:
-    """The connected pixels (h, w) of the seed's colour."""
+    """Return the connected pixels (h, w) of the seed's colour."""
     return _pieces_at(_colour_distance(image, seed[None]) <= PIN_TOLERANCE, seed[None])
 
 
 def box_iou(one: Box, other: Box) -> float:
-    """Intersection over union of two boxes of pixel centres."""
+    """Return the intersection over union of two boxes of pixel centres."""
     width = min(one[2], other[2]) - max(one[0], other[0]) + 1
     height = min(one[3], other[3]) - max(one[1], other[1]) + 1
     shared = max(0.0, width) * max(0.0, height)
@@ -134,14 +134,14 @@ def _grown(pixels: Bytes, points: Sequence[Point]) -> Iterator[Region]:
 
 
 def seeds_of(window: Window, points: Sequence[Point]) -> npt.NDArray[np.int64]:
-    """The pixels (n, 2) of the window under the points."""
+    """Return the window's pixels (n, 2), as x and y, under the points."""
     height, width = window.shape
     seeds = np.round(window.to_work(points)).astype(np.int64)
     return seeds.clip(0, (width - 1, height - 1))
 
 
 def windows(pixels: Bytes, points: Sequence[Point]) -> Iterator[Window]:
-    """Windows around the points, from the whole picture down by halves."""
+    """Yield windows around the points, from the whole picture down by halves."""
     height, width = pixels.shape[:2]
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     smallest = max(MIN_WINDOW_PX, 2 * float(np.max(high - low)))
@@ -154,7 +154,7 @@ def windows(pixels: Bytes, points: Sequence[Point]) -> Iterator[Window]:
 
 
 def _colour_distance(image: Bytes, seeds: npt.NDArray[np.int64]) -> Floats:
-    """Distance (h, w) of each pixel's colour to that of the nearest-coloured seed."""
+    """Return the distance (h, w) of each pixel's colour to that of the nearest-coloured seed."""
     colours = image.astype(np.float32)
     distance = np.full(image.shape[:2], np.inf, dtype=np.float32)
     patches = [(slice(max(0, y - 1), y + 2), slice(max(0, x - 1), x + 2)) for x, y in seeds]
@@ -167,7 +167,7 @@ def _colour_distance(image: Bytes, seeds: npt.NDArray[np.int64]) -> Floats:
 
 
 def pieces_grown(near: Mask, seeds: npt.NDArray[np.int64]) -> Mask:
-    """The pieces of `near` at the seeds, holes filled and hair-thin leaks cut off."""
+    """Return the pieces of `near` at the seeds, holes filled and hair-thin leaks cut off."""
     solid = filled(_pieces_at(near, seeds)).astype(np.uint8)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
     return _pieces_at(np.asarray(cv2.morphologyEx(solid, cv2.MORPH_OPEN, kernel)) > 0, seeds)
@@ -180,19 +180,22 @@ def _pieces_at(mask: Mask, seeds: npt.NDArray[np.int64]) -> Mask:
 
 
 def filled(mask: Mask) -> Mask:
-    """The mask (h, w) with its holes filled."""
+    """Return the mask (h, w) with its holes filled."""
     outside = np.pad(~mask, 1, constant_values=True).astype(np.uint8)
     cv2.floodFill(outside, None, (0, 0), (2,))
     return outside[1:-1, 1:-1] != 2
 
 
 def touches_border(mask: Mask) -> npt.NDArray[np.bool_]:
-    """Whether the mask touches the left, right, top and bottom side of its window."""
+    """Return whether the mask touches the left, right, top and bottom side of its window, (4,)."""
     return np.array([side.any() for side in (mask[:, 0], mask[:, -1], mask[0], mask[-1])])
 
 
 def ends_inside(mask: Mask, window: Window) -> bool:
-    """Whether the region ends within its window, or at a border of the picture."""
+    """Return whether the region ends within its window, or at a border of the picture.
+
+    A region of more than half the picture, or one that touches more than two sides, does not.
+    """
     (x0, y0), (width, height) = window.origin, window.extent
     rows, columns = window.picture
     open_sides = np.array((x0 > 0, x0 + width < columns, y0 > 0, y0 + height < rows))
@@ -202,7 +205,7 @@ def ends_inside(mask: Mask, window: Window) -> bool:
 
 
 def region_score(mask: Mask, window: Window) -> float:
-    """How much a region looks like a thing: edge contrast, compactness and, weakly, size."""
+    """Rate how much a region looks like a thing: edge contrast, compactness and, weakly, size."""
     contrast = _edge_contrast(window.features.astype(np.float32), mask)
     compact = mask_solidity(mask)
     inside = BORDER_DISCOUNT ** int(touches_border(mask).sum())
@@ -211,16 +214,16 @@ def region_score(mask: Mask, window: Window) -> float:
 
 
 def mask_solidity(mask: Mask) -> float:
-    """Share of its convex hull that a mask fills."""
+    """Return the share of its convex hull that a mask fills."""
     return solidity(np.argwhere(mask), int(np.count_nonzero(mask)))
 
 
 def solidity(pixels: npt.NDArray[np.integer], area: int) -> float:
-    """Share of its convex hull that a region fills.
+    """Return the share of its convex hull that a region fills.
 
     Args:
-        pixels: (n, 2), all or the outermost ones.
-        area: how many there are.
+        pixels: (n, 2), all of its pixels or the outermost ones.
+        area: the number of all its pixels.
     """
     hull = cv2.convexHull(pixels.astype(np.int32))
     # Pixels reach half a pixel beyond their centres.
@@ -228,13 +231,13 @@ def solidity(pixels: npt.NDArray[np.integer], area: int) -> float:
 
 
 def _edge_contrast(colours: Floats, mask: Mask) -> float:
-    """The contrast that all but the weakest tenth of the region's edge exceeds."""
+    """Return the contrast that all but the weakest tenth of the region's edge exceeds."""
     contrast = _contrast_along_edge(colours, mask)
     return float(np.quantile(contrast, 0.1)) if len(contrast) else 0.0
 
 
 def edge_support(image: Bytes, mask: Mask) -> float:
-    """Share of the mask's (h, w) edge along which the picture has an edge too.
+    """Return the share of the mask's (h, w) edge along which the picture has an edge too.
 
     Masks of small things overshoot, so the best of the mask and slightly smaller ones counts.
     """
@@ -249,7 +252,7 @@ def edge_support(image: Bytes, mask: Mask) -> float:
 
 
 def _contrast_along_edge(colours: Floats, mask: Mask) -> Floats:
-    """Colour distance (n,) from the pixels just outside the edge to the region nearby."""
+    """Return the colour distance (n,) of pixels just outside the edge from the region nearby."""
     region = mask.astype(np.uint8)
     inner, outer = np.ones((3, 3), np.uint8), np.ones((5, 5), np.uint8)
     core = np.asarray(cv2.erode(region, inner, borderValue=(1,)), dtype=np.float32)

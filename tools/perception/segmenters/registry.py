@@ -1,4 +1,4 @@
-"""The segmenters by name: those built in, and those of packages with `formup.segmenters`."""
+"""The segmenters by name: built-in ones, and those of packages, under `formup.segmenters`."""
 
 from collections.abc import Callable
 from functools import cache
@@ -22,9 +22,9 @@ SEGMENTERS = Registry[Callable[..., Segmenter]](
 
 @cache  # a network's weights are loaded once
 def segmenter_named(name: str) -> Segmenter:
-    """The segmenter of a name, or NAME:CHECKPOINT.
+    """Return the segmenter with a name, or with NAME:CHECKPOINT.
 
     Raises:
-        InputError: there is none, or it cannot be loaded.
+        InputError: there is no such segmenter, or it cannot be loaded.
     """
     return built(SEGMENTERS, name)

@@ -1,6 +1,6 @@
-"""Segment Anything (Kirillov et al., 2023) and SAM 2 (Ravi et al., 2024): boxes to masks.
+"""Segment Anything (Kirillov et al., 2023) and SAM 2 (Ravi et al., 2024): from prompts to masks.
 
-Pictures are prepared here, as both were trained, so that SAM 2 does not need torchvision.
+Pictures are prepared here as in the training of both, so that SAM 2 does not need torchvision.
 """
 
 from collections.abc import Mapping
@@ -15,14 +15,14 @@ from ..networks.runtime import Floats, array, load_network, resized
 from ..target_prompt import Point, TargetPrompt
 from .grabcut import Mask, bounding_box, iou, polygon_region
 from .grabcut_segmenter import visible_vertices
-from .mask_scores import rated
+from .mask_scores import rate_mask
 from .protocol import Pixels, PromptKind, Segmentation
 from .region_growing import box_iou
 
-# Of ImageNet, for pixels from 0 to 255.
+# ImageNet's statistics, for pixels from 0 to 255.
 MEAN, DEVIATION = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
 STEP = 1.0
-"""By how much the cut through a mask's logits is moved to see if the mask holds."""
+"""By how much the threshold on a mask's logits is shifted to test the mask's stability."""
 THRESHOLDS = MappingProxyType({"point": 0.7, "box": 0.6, "outline": 0.6, "candidate": 0.6})
 
 
@@ -31,8 +31,9 @@ class _Frame:
     """How a picture lies in the square that the network sees.
 
     Attributes:
-        side: of the square, px.
-        size: height and width of the picture in its upper left.
+        side: side of the square, px.
+        size: height and width of the resized picture, in the square's upper left, px.
+        picture: height and width of the picture itself, px.
     """
 
     side: int
@@ -40,22 +41,22 @@ class _Frame:
     picture: tuple[int, int]
 
     def points(self, points: Any) -> Floats:
-        """Points (n, 2) of the picture in the square."""
+        """Convert points (n, 2) of the picture to the square."""
         (height, width), (tall, wide) = self.picture, self.size
         scale = (wide / width, tall / height)
         return np.asarray(points, dtype=np.float32).reshape(-1, 2) * np.asarray(scale, np.float32)
 
     def logits(self, masks: Any) -> Floats:
-        """Masks (n, h, w) of the square at the picture's size."""
+        """Resize mask logits (n, h, w) of the square to the picture's size."""
         square = resized(masks, (self.side, self.side))
         return array(resized(square[..., : self.size[0], : self.size[1]], self.picture))
 
 
 class SamSegmenter:
-    """Masks from points, boxes and outlines, by SAM.
+    """Segmenter that takes points, boxes and outlines, with SAM.
 
     Attributes:
-        network: remembers what it made of the last pictures.
+        network: SAM; it caches the embeddings of the last pictures.
     """
 
     name = "sam"
@@ -64,7 +65,7 @@ class SamSegmenter:
     checkpoint = "facebook/sam-vit-base"
     classes: Mapping[str, str] = MappingProxyType({"sam": "SamModel"})
     squashes = False
-    """Whether the picture fills the square, or keeps its proportions."""
+    """Whether the picture is stretched to fill the square; otherwise it keeps its proportions."""
 
     def __init__(self, checkpoint: str = "") -> None:
         self.network = load_network(checkpoint or self.checkpoint, self.classes, processor=False)
@@ -74,7 +75,7 @@ class SamSegmenter:
         height, width = pixels.shape[:2]
         frame = self._frame((height, width))
         embedding = self.network.remembered(pixels, lambda: self._embedding(pixels, frame))
-        box, on, drawn = _pointed(prompt, width, height)
+        box, on, drawn = _sam_prompt(prompt, width, height)
         inputs: dict[str, Any] = {"image_embeddings": embedding, "multimask_output": True}
         if box is not None:
             inputs["input_boxes"] = frame.points(box).reshape(1, 1, 4)
@@ -91,7 +92,7 @@ class SamSegmenter:
             "stability": _stability(logits),
             **_prompt_fit(logits > 0, box, drawn),
         }
-        return rated(pixels, logits > 0, parts)
+        return rate_mask(pixels, logits > 0, parts)
 
     def _frame(self, picture: tuple[int, int]) -> _Frame:
         side = int(self.network.model.config.prompt_encoder_config.image_size)
@@ -112,7 +113,7 @@ class SamSegmenter:
 
 
 class Sam2Segmenter(SamSegmenter):
-    """Masks from points, boxes and outlines, by SAM 2.1."""
+    """Segmenter that takes points, boxes and outlines, with SAM 2.1."""
 
     name = "sam2.1"
     checkpoint = "facebook/sam2.1-hiera-small"
@@ -123,17 +124,18 @@ class Sam2Segmenter(SamSegmenter):
 
 
 def _stability(logits: Floats) -> float:
-    """How little a mask depends on where its logits are cut: the overlap of two cuts."""
+    """Rate how little a mask depends on the threshold of its logits: the overlap of two masks."""
     loose = int(np.count_nonzero(logits > -STEP))
     return int(np.count_nonzero(logits > STEP)) / loose if loose else 0.0
 
 
-def _pointed(
+def _sam_prompt(
     prompt: TargetPrompt, width: int, height: int
 ) -> tuple[tuple[float, ...] | None, list[Point], Mask | None]:
-    """A prompt as SAM takes it: a box, points on the thing, and the outline's pixels.
+    """Convert a prompt to what SAM takes: a box and points on the thing.
 
-    An outline is its box with a point well inside.
+    An outline becomes its box and a point well inside. The third value is a mask of the outline's
+    pixels, None without an outline.
     """
     on = list(prompt.points or ())
     if prompt.outline is None:
@@ -149,7 +151,7 @@ def _pointed(
 
 
 def _prompt_fit(mask: Mask, box: tuple[float, ...] | None, drawn: Mask | None) -> dict[str, float]:
-    """How far a mask is what was pointed at; nothing where that was by points alone."""
+    """Return how far a mask agrees with a box or outline; empty for points alone."""
     if drawn is not None:
         return {"prompt_fit": iou(mask, drawn)}
     if box is None or not mask.any():

@@ -1,7 +1,7 @@
-"""Segments the thing a person points at, without trained weights.
+"""Segments the thing that a person points at, without trained weights.
 
-Pointing with a box, points or a rough outline is enough for classical segmentation to work on
-real photographs, so formup runs with no download and no GPU.
+A box, points or a rough outline are enough for classical segmentation to work on real photographs,
+so formup runs with no download and no GPU.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -20,11 +20,11 @@ from .mask_openings import cut_openings
 from .protocol import Segmentation
 from .region_growing import Region, box_iou, edge_support, filled, mask_solidity, pin, propose
 
-# The ring around a box in which the thing may still reach, in box sizes: boxes are drawn tight.
+# The ring around a box into which the thing may reach, in box sizes: boxes are drawn tight.
 RING = 0.1
 # How far the sides of perturbed boxes move, in box sizes: about the error of a drawn box.
 BOX_SHIFT = 0.06
-# Larger boxes, smaller ones, wider ones and taller ones.
+# A larger box, a smaller one, a wider one and a taller one.
 BOX_MOVES = ((-1, -1, 1, 1), (1, 1, -1, -1), (-1, 1, 1, -1), (1, -1, -1, 1))
 # The middle of a box that the second opinion floods from, as a share of the box.
 CORE = 0.35
@@ -36,20 +36,22 @@ OUTLINE_ERROR = 0.05
 OUTLINE_REACH = 0.06
 # Outlines keep more detail than boxes: GrabCut runs once, on a larger window.
 OUTLINE_SIDE = 320
-# Around a point against the outline, as a share of the size, colours alone say where the edge is.
+# Around a point that contradicts the outline, within this share of the size, colours alone decide
+# where the edge is.
 BESIDE = 0.2
 # Eroding by no more than this share of the local half-width keeps thin parts.
 THIN = 0.5
-# Different regions a point may mean that are tried; a fourth was right now and then.
+# Number of different regions tried that a point may mean; a fourth was right now and then.
 PROPOSALS = 4
 # A whole holds this share of its part, is this many times as large (a thing with its shadow is
-# less) and stands out this much of it; it is taken for a thing when it fills its hull this far.
+# not) and stands out this share as much; it is a thing if it fills this share of its hull.
 HELD, MUCH_LARGER, RIVAL, SOLID = 0.85, 2.2, 0.6, 0.88
 # A mask that runs along the sure background for this many times its size was cut short; the box
-# is widened by this share a side, so often at most.
+# is widened by this share on each side, at most this often.
 CUT_SHORT, WIDER, WIDENINGS = 0.05, 0.15, 3
 NEXT_TO = np.ones((3, 3), np.uint8)
-# Other points of a mask that should lead back to it, and how deep inside it they lie at least.
+# Number of other points of a mask that should lead back to it, and how deep inside it they lie, as
+# a share of the greatest depth.
 REPROPOSALS = 4
 DEPTH = 0.35
 
@@ -61,7 +63,8 @@ class _Prompt:
     """A prompt at the working scale.
 
     `trimaps` are GrabCut labels, first for the prompt as given and then for perturbed ones;
-    `extent` is what the prompt says the thing covers, `core` what is most surely the thing.
+    `extent` is the area that the prompt says the thing covers, `core` the part that is most surely
+    the thing.
     """
 
     window: Window
@@ -80,8 +83,8 @@ def segment_box(
 
     `pixels` is (H, W, 3) uint8 RGB; the box and the points that are surely on the thing
     (`positive`) or surely not (`negative`) are in pixels, x right, y down, pixel centres at .0.
-    The thing may reach a little beyond the box. Where nothing can be told from its surroundings
-    the mask is empty and the confidence 0.
+    The thing may reach a little beyond the box. If nothing stands out from its surroundings, the
+    mask is empty and the confidence 0.
     """
     window = gc.window_around(pixels, box)
     drawn = window.to_work((box[:2], box[2:])).ravel()
@@ -108,8 +111,8 @@ def segment_outline(
 ) -> Segmentation:
     """Segment the thing in a rough outline of 3 or more vertices (x, y), as `segment_box` does.
 
-    Well inside the outline is surely the thing and well outside surely not, so four vertices make
-    a rotated box, and more of them settle what a box leaves open.
+    Well inside the outline is surely the thing and well outside surely not, so four vertices act as
+    a rotated box, and more of them decide what a box leaves open.
     """
     box = _bounding_box(vertices)
     window = gc.window_around(pixels, box, OUTLINE_SIDE)
@@ -129,7 +132,7 @@ def segment_outline(
 
 
 def _combined(cut: Mask, path: Mask) -> Mask:
-    """The mask midway between what colours and edges say; the holes are those of the colours."""
+    """Return the mask midway between the cut by colour and the path; its holes are the cut's."""
     whole = filled(cut)
     return (gc.signed_distance(whole) + gc.signed_distance(path) > 0) & ~(whole & ~cut)
 
@@ -139,9 +142,10 @@ def segment_points(
 ) -> Segmentation:
     """Segment the thing under one or more points (x, y), as `segment_box` does.
 
-    Of the regions that grow from the points, the one whose segmentation agrees with it best and
-    stands out most in colour is taken. Its stability is whether other points of the mask lead
-    back to it. A thing of several colours needs points on each, or a box.
+    Of the regions that grow from the points, the one is taken whose segmentation agrees with it
+    best and stands out most in colour; if that is only a part of a larger thing that stands out
+    too, the whole is taken. Its stability is how far other points of the mask lead back to it. A
+    thing of several colours needs points on each, or a box.
     """
     off = list(negative)
     parts = _tried_regions(pixels, propose(pixels, points, PROPOSALS), points, off)
@@ -164,7 +168,7 @@ def segment_points(
 
 
 def _object_mask(prompt: _Prompt, trimap: Bytes) -> Mask:
-    """The mask from one trimap; if it collapses, what is not surely background starts as object.
+    """Segment from one trimap; if the mask collapses, try again with the ring as probable object.
 
     A box drawn inside the thing puts its colours into the ring and so into the background.
     """
@@ -177,9 +181,9 @@ def _object_mask(prompt: _Prompt, trimap: Bytes) -> Mask:
 
 
 def _rated(prompt: _Prompt, mask: Mask, stable: dict[str, float]) -> Segmentation:
-    """The mask in the picture, with the cues to how far it can be trusted and what they come to.
+    """Return the mask in the picture, with its confidence and the cues that make it up.
 
-    `stable` says how far other ways to the mask have led to the same.
+    `stable` has the cues on how far other ways to the mask lead to the same result.
     """
     window = prompt.window
     if not mask.any() or mask.all():
@@ -201,12 +205,12 @@ def _empty_segmentation(picture: tuple[int, int]) -> Segmentation:
 
 
 def _prompt_fit(prompt: _Prompt, mask: Mask) -> float:
-    """Overlap of the bounding boxes of the mask and of what the prompt says the thing covers."""
+    """Return the overlap of the bounding boxes of the mask and of the prompt's extent."""
     return box_iou(gc.bounding_box(mask), gc.bounding_box(prompt.extent)) if mask.any() else 0.0
 
 
 def _compactness(mask: Mask) -> float:
-    """Share of its bounding box that a mask fills: thin things go wrong more easily."""
+    """Return the share of its bounding box that a mask fills: thin things go wrong more easily."""
     x0, y0, x1, y1 = gc.bounding_box(mask)
     return np.count_nonzero(mask) / ((x1 - x0 + 1) * (y1 - y0 + 1))
 
@@ -237,7 +241,7 @@ def _eroded(region: Mask) -> Mask:
 
 
 def discs(shape: tuple[int, int], centres: Iterable[Point], radius: float) -> Mask:
-    """Pixels (h, w) within a radius of any of the centres."""
+    """Return a mask (h, w) of the pixels within a radius of any of the centres."""
     y, x = np.ogrid[: shape[0], : shape[1]]
     region = np.zeros(shape, dtype=np.bool_)
     for cx, cy in centres:
@@ -253,7 +257,7 @@ def _dilated(region: Mask) -> Mask:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A proposal, the mask GrabCut made of it, and how much that stands out."""
+    """A proposed region as a prompt, the mask GrabCut made of it, and how much that stands out."""
 
     prompt: _Prompt
     mask: Mask
@@ -282,7 +286,7 @@ def _tried_regions(
 
 
 def _is_whole_of(outer: _Trial, part: _Trial) -> bool:
-    """Whether a mask holds another, is much larger (not just its shadow), and stands out too."""
+    """Return whether a mask holds another, is much larger (not just by a shadow) and distinct."""
     shared = part.prompt.window.transfer(part.mask, outer.prompt.window)
     held = int(np.count_nonzero(shared & outer.mask)) >= HELD * int(np.count_nonzero(shared))
     larger = outer.area >= MUCH_LARGER * part.area
@@ -290,7 +294,7 @@ def _is_whole_of(outer: _Trial, part: _Trial) -> bool:
 
 
 def _cut_short(prompt: _Prompt, mask: Mask) -> bool:
-    """Whether a mask runs along the sure background, which then cut it off."""
+    """Return whether a mask runs along the sure background, which then cut it off."""
     touching = np.asarray(cv2.dilate((prompt.trimaps[0] == cv2.GC_BGD).astype(np.uint8), NEXT_TO))
     return int(np.count_nonzero(mask & (touching > 0))) > CUT_SHORT * np.sqrt(
         np.count_nonzero(mask)
@@ -306,7 +310,7 @@ def _widened(box: Box) -> Box:
 def _region_prompt(
     pixels: Bytes, region: Region, box: Box, points: Sequence[Point], negative: Sequence[Point]
 ) -> _Prompt:
-    """A box around a grown region, with the region's inside as sure object."""
+    """Return a box prompt around a grown region, with the region's inside as sure object."""
     window = gc.window_around(pixels, box)
     on, off = window.to_work(points), window.to_work(negative)
     drawn = window.to_work((box[:2], box[2:])).ravel()
@@ -322,7 +326,10 @@ def _distinctness(prompt: _Prompt, mask: Mask) -> float:
 
 
 def _reproposal_stability(pixels: Bytes, tried: _Trial, proposer: Proposer) -> dict[str, float]:
-    """Mean overlap of the mask with the likest region proposed from other points well inside."""
+    """Return the cue `stability`: how far other points well inside lead back to the mask.
+
+    It is the mean over these points of the greatest overlap of a proposed region with the mask.
+    """
     window, mask = tried.prompt.window, tried.mask
     overlaps: list[float] = []
     for point in _far_inside(mask, tried.prompt.positive):
@@ -334,7 +341,7 @@ def _reproposal_stability(pixels: Bytes, tried: _Trial, proposer: Proposer) -> d
 
 
 def _far_inside(mask: Mask, points: Points) -> Points:
-    """Points (n, 2) well inside the mask, each the farthest from the ones before it."""
+    """Return points (n, 2) well inside the mask, each the farthest from all before it."""
     depth = gc.distance_inside(mask)
     inside = np.argwhere(depth >= DEPTH * depth.max())[:, ::-1].astype(np.float64)
     chosen = list(points)

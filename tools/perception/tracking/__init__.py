@@ -1,1 +1,1 @@
-"""Where a thing that was measured once is by now, from frame to frame of a fixed camera."""
+"""Tracks a thing that was measured once, from frame to frame of a fixed camera."""

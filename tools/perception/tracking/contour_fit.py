@@ -1,7 +1,7 @@
-"""How far a thing of plain colours has moved: its outline laid on the pixels of its colours.
+"""Measures how far a thing of plain colours has moved, by fitting its outline to its colours.
 
-Colours of the thing against those around it (Swain and Ballard 1991), then the outline fitted to
-where they end along its normals, without those parts that something covers.
+Pixels are classified by colours of the thing and of its surroundings (Swain and Ballard 1991); the
+outline is then fitted to where the thing's colours end along its normals, except covered parts.
 """
 
 import cv2
@@ -15,38 +15,46 @@ from .view import Bytes, Floats, Mask, Points, Step, View
 Codes = npt.NDArray[np.intp]
 
 REACH = 16
-"""Px of the view along a normal in which an edge is looked for, either way."""
+"""Distance along a normal, either way, within which an edge is searched for, px of the view."""
 PLACES = 240
-"""Most points of the outline that are looked at."""
+"""The most points of the outline that are used."""
 BINS = 32
 FAINT, STRANGE = 1e-3, 0.5
-"""What colours never seen count, beside the commonest; of them fewer are the thing's."""
+"""Share that colours never seen are given, relative to the commonest one, and a factor on it for
+the thing, which has fewer of them than the ground."""
 SURE = 2.0
-"""The most that one pixel's colour can say."""
+"""Greatest absolute log odds of a pixel's colour."""
 NEAR = 0.01
-"""How much an edge further off says less, by the square of its px."""
+"""Penalty on an edge further off, per square of its px."""
 MIXED = 0.4
-"""Colours of thing and ground that overlap by more tell nothing."""
+"""Greatest overlap of the colours of thing and ground for them to be of use."""
 HUES = 0.1
-"""Colours without their brightness do if they overlap by no more than this beyond those with it."""
+"""Hues are used if their overlap exceeds that of full colours by no more than this."""
 TUKEY = (12.0, 8.0, 5.0, 3.0, 3.0)
-"""Px beyond which an edge counts for nothing, from round to round."""
+"""Tukey's biweight limits: px beyond which an edge counts for nothing, from round to round."""
 AGREES = 2.0
-"""Px off the motion found within which an edge agrees with it."""
+"""Distance from the motion found within which an edge agrees with it, px."""
 LOOSE, LEAST = 5.0, 0.5
-"""Px that edges lie off the outline in the first frame at most, and the least share that does."""
+"""Greatest distance of an edge from the outline in the first frame, px, and the least share of
+points that must have such an edge."""
 ROUND = 0.03
-"""The turn of a thing whose outline moves less than this by it, of a radian's, cannot be seen."""
+"""A turn cannot be seen if, per radian, it moves the outline along its normals by less than this
+share of the outline's mean radius."""
 CHANCE = 0.25
-"""The share that may agree with an outline laid anywhere."""
+"""Share of the edges that may agree with an outline anywhere, by chance."""
 LEARNT, NEW = 0.8, 0.3
-"""Where so much agrees, colours are learnt anew, which count so much: light changes."""
+"""If this share agrees, colours are learnt anew with this weight, because light changes."""
 HELD = 0.2
-"""Least share of what the whole outline says of each motion."""
+"""Least share of the whole outline's information on every motion."""
 
 
 class ContourFit:
-    """The thing's outline, and its colours in the first view (h, w, 3)."""
+    """Fit of the thing's outline, with its colours in the first view (h, w, 3).
+
+    Attributes:
+        points: (n, 2), the points of the outline that have an edge in the first view, px of it.
+        usable: whether the thing's colours and edges are distinct enough.
+    """
 
     def __init__(self, first: Bytes, view: View) -> None:
         ring = view.outline.polygon.exterior
@@ -57,7 +65,7 @@ class ContourFit:
         ]
         tangent = ends[1] - ends[0]
         self.points: Points = shapely.get_coordinates(ring.interpolate(along))
-        normals = np.column_stack([tangent[:, 1], -tangent[:, 0]])  # outward, as it runs so
+        normals = np.column_stack([tangent[:, 1], -tangent[:, 0]])  # outward for this ring
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
         arms = self.points - view.centre
         across = self._normals[:, 1] * arms[:, 0] - self._normals[:, 0] * arms[:, 1]
@@ -66,22 +74,23 @@ class ContourFit:
         self._rows[:, 2] *= across.std() >= ROUND * length
         self._units = np.array([1.0, 1.0, 1 / length])
         self._colours = Colours(first, view.mask)
-        self._mask, says = view.mask, self._colours.says(first)
-        self._alike = float(np.mean(says[self._mask] > 0))
-        self._rest, seen = self._edges(says)
+        self._mask, log_odds = view.mask, self._colours.log_odds(first)
+        self._alike = float(np.mean(log_odds[self._mask] > 0))
+        self._rest, seen = self._edges(log_odds)
         good = seen & (np.abs(self._rest) <= LOOSE)
         self.points, self._normals = self.points[good], self._normals[good]
         self._rows, self._rest = self._rows[good], self._rest[good]
         self.usable = self._colours.overlap <= MIXED and float(good.mean()) >= LEAST
 
     def step(self, seen: Bytes, within: Mask) -> Step:
-        """The thing's motion in a view.
+        """Measure the thing's motion in a view.
 
         Args:
+            seen: (h, w, 3), the view.
             within: (n,), which of `points` lie in the picture.
         """
-        says = self._colours.says(seen)
-        edges, usable = self._edges(says)
+        log_odds = self._colours.log_odds(seen)
+        edges, usable = self._edges(log_odds)
         edges, usable = edges - self._rest, usable & within
         by = np.zeros(3)
         for limit in TUKEY:
@@ -89,18 +98,18 @@ class ContourFit:
             weights = np.where(usable, np.clip(1 - (off / limit) ** 2, 0, None) ** 2, 0)
             by = by + self._solved(weights, off)
         agrees = usable & (np.abs(edges - self._rows @ by) < AGREES)
-        held = self._held(agrees) >= HELD
-        alike = np.mean(says[self._mask] > 0) / self._alike
+        held = self._least_information(agrees) >= HELD
+        alike = np.mean(log_odds[self._mask] > 0) / self._alike
         share = float(min((agrees[within].mean() - CHANCE) / (1 - CHANCE), alike)) if held else 0.0
         if share >= LEARNT and np.linalg.norm(by[:2]) < 1:
             self._colours.learn(seen, self._mask)
         return Step(by, max(share, 0.0))
 
-    def _edges(self, says: Floats) -> tuple[FloatArray, Mask]:
-        """How far out along its normal each point's edge is, (n,) px, and which have one."""
+    def _edges(self, log_odds: Floats) -> tuple[FloatArray, Mask]:
+        """Return how far out along the normals the edges are, (n,), px, and a mask (n,) of them."""
         offsets = np.arange(-REACH, REACH + 1)
         at = (self.points[:, None] + offsets[:, None] * self._normals[:, None]).astype(np.float32)
-        soft = cv2.GaussianBlur(says, (5, 5), 0)  # else edges lie at pixels' borders
+        soft = cv2.GaussianBlur(log_odds, (5, 5), 0)  # otherwise edges lie at pixels' borders
         profiles = cv2.remap(soft, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderValue=0.0)
         inside = np.cumsum(profiles, axis=1) - NEAR * (offsets + 0.5) ** 2
         best = inside.argmax(axis=1)
@@ -116,45 +125,48 @@ class ContourFit:
         solved = np.linalg.solve(squares, rows.T @ (weights * off))
         return np.asarray(self._units * solved, dtype=float)
 
-    def _held(self, agrees: Mask) -> float:
-        """The least that is known of any motion, as a share of what the whole outline tells."""
+    def _least_information(self, agrees: Mask) -> float:
+        """Return the least information on any motion, as a share of the whole outline's."""
         rows = self._rows * self._units
         whole, part = (r.T @ r + 1e-6 * np.eye(3) for r in (rows, rows[agrees]))
         return float(np.linalg.eigvals(np.linalg.solve(whole, part)).real.min())
 
 
 class Colours:
-    """What a pixel's colour says of whether it is the thing's: the logarithm of the odds.
+    """The log odds that a pixel belongs to the thing, from its colour.
 
-    Shares of the colours among each other are taken where they tell thing and ground apart, as
-    shadows leave them; else brightness too.
+    Hues alone are used if they tell thing and ground apart, because shadows do not change them;
+    otherwise brightness is used too.
 
     Attributes:
-        overlap: of the colours of thing and ground, 0 to 1.
+        overlap: overlap of the colours of thing and ground, 0 to 1.
     """
 
     def __init__(self, first: Bytes, mask: Mask) -> None:
         self._codes = _hues
-        self._shares = self._counted(first, mask)
+        self._shares = self._colour_shares(first, mask)
         hues, self._codes = self._shares, _colours
-        self._shares = self._counted(first, mask)
+        self._shares = self._colour_shares(first, mask)
         if _shared(hues) <= _shared(self._shares) + HUES:
             self._codes, self._shares = _hues, hues
         self.overlap = _shared(self._shares)
         self._odds = _odds(self._shares)
 
-    def says(self, bgr: Bytes) -> Floats:
-        """Of each pixel of a view (h, w, 3): above 0 where it looks like the thing, (h, w)."""
+    def log_odds(self, bgr: Bytes) -> Floats:
+        """Return the log odds (h, w) of a view (h, w, 3): above 0 where it looks like the thing."""
         return self._odds[self._codes(bgr)]
 
     def learn(self, bgr: Bytes, mask: Mask) -> None:
-        """Take in the colours of a later view (h, w, 3), in which the thing is the mask, (h, w)."""
+        """Learn the colours of a later view (h, w, 3), in which the thing is the mask, (h, w).
+
+        Hues are not learnt anew.
+        """
         if self._codes is _colours:
-            self._shares += NEW * (self._counted(bgr, mask) - self._shares)
+            self._shares += NEW * (self._colour_shares(bgr, mask) - self._shares)
             self._odds = _odds(self._shares)
 
-    def _counted(self, bgr: Bytes, mask: Mask) -> FloatArray:
-        """How common each colour is in the thing, and around it, (2, colours)."""
+    def _colour_shares(self, bgr: Bytes, mask: Mask) -> FloatArray:
+        """Return how common each colour is in the thing, and around it, (2, colours)."""
         from scipy.ndimage import gaussian_filter
 
         codes, kernel = self._codes(bgr), np.ones((5, 5), np.uint8)
@@ -171,20 +183,20 @@ def _shared(shares: FloatArray) -> float:
 
 
 def _odds(shares: FloatArray) -> Floats:
-    """By colour, from how common it is, (2, colours)."""
+    """Return each colour's log odds, (colours,), from how common it is, (2, colours)."""
     (thing, ground), rare = shares, FAINT * shares.max()
     odds = np.log((thing + STRANGE * rare) / (ground + rare))
     return np.clip(odds, -SURE, SURE).astype(np.float32)
 
 
 def _colours(bgr: Bytes) -> Codes:
-    """A number for each pixel's colour, (h, w)."""
+    """Return a code for each pixel's colour, (h, w)."""
     b, g, r = np.moveaxis(_smooth(bgr).astype(np.intp) * BINS // 256, 2, 0)
     return (b * BINS + g) * BINS + r
 
 
 def _hues(bgr: Bytes) -> Codes:
-    """The same without its brightness."""
+    """Return a code for each pixel's colour without its brightness, (h, w)."""
     smooth = _smooth(bgr).astype(np.float32) + 1
     shares = smooth[..., :2] / smooth.sum(axis=2, keepdims=True)
     b, g = np.moveaxis(np.minimum(shares * 1.5 * BINS, BINS - 1).astype(np.intp), 2, 0)

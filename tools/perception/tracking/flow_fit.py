@@ -1,6 +1,6 @@
-"""How far a thing with texture has moved: corners of it found again by optical flow.
+"""Measures how far a thing with texture has moved, by the optical flow of its corners.
 
-Pyramidal Lucas and Kanade (Bouguet 2000), there and back, then the rigid motion most agree on.
+Pyramidal Lucas-Kanade (Bouguet 2000), forward and back, then the rigid motion that most agree on.
 """
 
 from typing import cast
@@ -11,36 +11,42 @@ import numpy as np
 from .view import Bytes, Floats, Mask, Points, Step, View, rotation
 
 CORNERS, QUALITY, APART = 150, 0.05, 5
-"""Corners looked for, the least response beside the best one's, and px between two."""
+"""The most corners, the least response as a share of the best one's, and least px between two."""
 ENOUGH = 12
-"""Fewer corners that are found again are no texture."""
+"""Least number of corners for a thing to have texture, or a motion to be measured."""
 WINDOW, LEVELS = (15, 15), 3
 THERE_AND_BACK, RIGID = 1.0, 2.0
-"""Px that a corner may come off when followed back, and off the rigid motion."""
+"""Greatest error of a corner when followed back, and from the rigid motion, px."""
 ALIKE, PATCH = 0.5, (11, 11)
-"""Least correlation of what is about a corner with what was there in the first frame."""
+"""Least correlation of the patch around a corner with that in the first frame, and its size, px."""
 EVEN, CONTRAST = 8.0, 40.0
-"""Light is evened out over so many px; a standard deviation of grey becomes this much."""
+"""Sigma over which light is evened out, px, and what a standard deviation of grey becomes."""
 GRAIN = 8.0
-"""Grey levels that are noise rather than texture."""
+"""Spread of grey levels that is noise rather than texture."""
 
 
 class FlowFit:
-    """Corners of the thing in the first view (h, w, 3), looked for in later ones."""
+    """Fit of the thing's corners in the first view (h, w, 3) to later views.
+
+    Attributes:
+        points: (n, 2), the corners in the first view, px of it.
+        usable: whether there are enough of them.
+    """
 
     def __init__(self, first: Bytes, view: View) -> None:
         self._first, self._centre = _evened(first), view.centre
         inside = np.asarray(cv2.erode(view.mask.view(np.uint8), np.ones((5, 5), np.uint8)))
         found = cv2.goodFeaturesToTrack(self._first, CORNERS, QUALITY, APART, mask=inside)
-        found = cast("Floats | None", found)  # none: stubs do not know of it
+        found = cast("Floats | None", found)  # it may be None, which the stubs do not say
         self._corners = np.zeros((0, 1, 2), np.float32) if found is None else found
         self.points: Points = self._corners[:, 0].astype(float)
         self.usable = len(self.points) >= ENOUGH
 
     def step(self, seen: Bytes, within: Mask) -> Step:
-        """The thing's motion in a view.
+        """Measure the thing's motion in a view.
 
         Args:
+            seen: (h, w, 3), the view.
             within: (n,), which of `points` lie in the picture.
         """
         now = _evened(seen)
@@ -76,7 +82,10 @@ class FlowFit:
 
 
 def _rigid(start: Points, end: Points, good: Mask) -> tuple[Points, Mask]:
-    """The rigid motion (3,) that most good points (n, 2) make, and which do, (n,)."""
+    """Fit the rigid motion (3,) that most good points (n, 2) share, and say which do, (n,).
+
+    Without enough such points, the motion is zero and none do.
+    """
     none = np.zeros(3), np.zeros(len(start), dtype=np.bool_)
     if np.count_nonzero(good) < ENOUGH:
         return none
@@ -96,7 +105,7 @@ def _rigid(start: Points, end: Points, good: Mask) -> tuple[Points, Mask]:
 
 
 def _procrustes(start: Points, end: Points) -> Points:
-    """The rigid motion (3,) about (0, 0) of least squares, from points (n, 2) to others."""
+    """Return the least-squares rigid motion (3,) about (0, 0) from points (n, 2) to others."""
     a, b = start - start.mean(axis=0), end - end.mean(axis=0)
     turn = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
     shift = end.mean(axis=0) - rotation(turn) @ start.mean(axis=0)
@@ -104,7 +113,7 @@ def _procrustes(start: Points, end: Points) -> Points:
 
 
 def _evened(bgr: Bytes) -> Bytes:
-    """Grey (h, w) with shading and contrast evened out, so that shadows change little."""
+    """Return grey (h, w) with shading and contrast evened out, so that shadows change little."""
     grey = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).astype(np.float32)
     kernel = (0, 0)
     less = grey - cv2.GaussianBlur(grey, kernel, EVEN)
@@ -113,7 +122,7 @@ def _evened(bgr: Bytes) -> Bytes:
 
 
 def _correlation(a: Bytes, b: Bytes) -> Floats:
-    """Of the surroundings of each pixel in two pictures (h, w), -1 to 1."""
+    """Return the correlation of the patches around each pixel of two pictures (h, w), -1 to 1."""
     x, y = (picture.astype(np.float32) - 128 for picture in (a, b))
     both, xx, yy = (cv2.boxFilter(p, -1, PATCH) for p in (x * y, x * x, y * y))
     return np.asarray(both / np.sqrt(xx * yy + 1), dtype=np.float32)

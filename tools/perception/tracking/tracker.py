@@ -1,4 +1,4 @@
-"""Follows one thing from frame to frame: what it offers decides how, and unsure means lost."""
+"""Tracks one thing from frame to frame, by texture or colours; if unsure, it counts as lost."""
 
 from dataclasses import dataclass
 
@@ -13,24 +13,24 @@ from .view import Bytes, Points, View
 Fit = FlowFit | ContourFit
 
 ROUNDS, SETTLED = 4, 0.3
-"""A motion is measured so often at most, or until the view is off by no more px."""
+"""The most rounds in which a motion is measured, and the px below which a step ends them."""
 SURE = 0.7
-"""Where less agrees, the other way of measuring is asked too."""
+"""Confidence below which the other way of measuring is tried too."""
 LOST, FOUND = 0.4, 0.6
-"""Where less agrees, the thing is not seen; nor one that was lost, until so much does."""
+"""Confidence below which a thing is lost, and from which a lost one is found again."""
 VISIBLE = 0.5
-"""A thing of which a smaller share lies in the picture is not seen."""
+"""Least share of a thing in the picture for it to be seen."""
 JUMP = 0.3
-"""No part of a thing moves further between two frames, as a share of its size."""
+"""Greatest motion of any part of a thing between two frames, as a share of its size."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """Where a thing is, turned about the centre of its outline, then moved.
+    """Where a thing is: turned about the centre of its outline, then moved.
 
     Attributes:
         dx, dy: how far it has moved since the first frame, px.
-        turn: radians, clockwise as seen in the picture.
+        turn: how far it has turned, radians, clockwise as seen in the picture.
         confidence: 0 to 1; see `lost`.
     """
 
@@ -41,19 +41,19 @@ class Tracked:
 
     @property
     def lost(self) -> bool:
-        """Whether the thing is not seen; the rest is then where it was seen last."""
+        """Whether the thing is not seen; its motion is then where it was last seen."""
         return self.confidence < LOST
 
 
 class ObjectTracker:
-    """A thing in the frames of a camera that stands still, (H, W, 3) BGR each.
+    """Tracker of a thing in the frames of a fixed camera, (H, W, 3) BGR each.
 
     Args:
-        first: the frame in which the thing has its outline.
-        outline: of the thing, px of the frame.
+        first: the frame in which the thing has the outline.
+        outline: the thing's outline, px of the frame.
 
     Raises:
-        InputError: the thing has neither texture nor a colour of its own.
+        InputError: the thing has neither texture nor colours of its own.
     """
 
     def __init__(self, first: Bytes, outline: Outline) -> None:
@@ -70,8 +70,8 @@ class ObjectTracker:
             )
 
     def update(self, frame: Bytes) -> Tracked:
-        """Where the thing is in the next frame, (H, W, 3)."""
-        motion, confidence = self._found(frame)
+        """Find the thing in the next frame, (H, W, 3)."""
+        motion, confidence = self._best_motion(frame)
         if confidence < (FOUND if self._unseen else LOST):
             self._unseen, confidence = self._unseen + 1, 0.0
         else:
@@ -80,8 +80,8 @@ class ObjectTracker:
         dx, dy, turn = self._motion.tolist()
         return Tracked(dx, dy, turn, confidence)
 
-    def _found(self, frame: Bytes) -> tuple[Points, float]:
-        """The motion that most speaks for, and how much."""
+    def _best_motion(self, frame: Bytes) -> tuple[Points, float]:
+        """Return the motion that most agrees with the frame, and its confidence."""
         best, confidence = self._motion, 0.0
         frames = 1 + self._unseen
         for start in (self._motion + frames * self._speed, self._motion):

@@ -1,6 +1,6 @@
 """The part of a frame around a thing, moved back to where the thing was in the first frame.
 
-Both ways of tracking compare with the first frame alone: nothing adds up from frame to frame.
+Both ways of tracking compare with the first frame only, so that no errors add up.
 """
 
 import math
@@ -20,18 +20,18 @@ Mask = npt.NDArray[np.bool_]
 Points = npt.NDArray[np.float64]
 
 LARGEST = 320.0
-"""Things longer than this, px, are looked at on a smaller scale."""
+"""Length beyond which a thing is viewed at a smaller scale, px."""
 MARGIN_SHARE, LEAST_MARGIN = 0.3, 24.0
-"""Surroundings seen beyond the outline, as a share of its length, and px at least."""
+"""Margin seen beyond the outline, as a share of its length, and at least in px."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """How far a thing is off where a view has it, and how much speaks for that.
+    """How far a thing is from where a view expects it, and how well that is supported.
 
     Attributes:
-        by: (3,), view pixels and radians.
-        share: of what is looked at in the thing and lies in the picture, what agrees, 0 to 1.
+        by: (3,), dx, dy in view pixels and the turn in radians.
+        share: share of the thing's points in the picture that agree with this, 0 to 1.
     """
 
     by: Points
@@ -39,19 +39,19 @@ class Step:
 
 
 class View:
-    """A window on frames that is moved along with a thing.
+    """A window on frames that moves along with a thing.
 
     Motions are (3,): dx, dy in px of the picture, and a turn about the outline's centre, radians,
     clockwise as seen.
 
     Args:
-        outline: of the thing in the first frame.
+        outline: outline of the thing in the first frame.
 
     Attributes:
-        size: width and height, px of the view, to which the rest refers.
-        scale: its px per px of the picture.
-        outline, mask: of the thing in it, (h, w).
-        centre: of the outline.
+        size: width and height, px of the view.
+        scale: px of the view per px of the picture.
+        outline, mask: the thing's outline, px of the view, and its mask (h, w).
+        centre: centre (2,) of the outline, px of the view.
     """
 
     def __init__(self, outline: Outline) -> None:
@@ -70,13 +70,13 @@ class View:
         self._reach = length / 2
 
     def _matrix(self, motion: Points) -> Points:
-        """(2, 3), from the view to a frame."""
+        """Return the affine transform (2, 3) from the view to a frame."""
         turn = rotation(motion[2])
         shift = turn @ (self._origin - self._centre) + self._centre + motion[:2]
         return np.column_stack([turn / self.scale, shift])
 
     def seen(self, frame: Bytes, motion: Points) -> Bytes:
-        """A frame (H, W, 3) through the view of a thing that has moved so, (h, w, 3)."""
+        """Return the view (h, w, 3) of a frame (H, W, 3) for a thing that has made a motion."""
         flags = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
         return np.asarray(
             cv2.warpAffine(
@@ -86,23 +86,23 @@ class View:
         )
 
     def within(self, points: Points, motion: Points, frame: Bytes) -> Mask:
-        """Which points (n, 2) of the view lie in a frame, (n,)."""
+        """Return a mask (n,) of the points (n, 2) of the view that lie in a frame."""
         matrix = self._matrix(motion)
         places = points @ matrix[:, :2].T + matrix[:, 2]
         far = np.array([frame.shape[1] - 1, frame.shape[0] - 1])
         return np.all((places >= 0) & (places <= far), axis=1)
 
     def way(self, motion: Points) -> float:
-        """How far a motion moves any part of the thing at most, px."""
+        """Return how far a motion moves any part of the thing at most, px."""
         return float(np.linalg.norm(motion[:2]) + abs(motion[2]) * self._reach)
 
     def moved(self, motion: Points, step: Points) -> Points:
-        """The motion, with what the view has seen in addition."""
+        """Return the motion with a step added that was measured in its view."""
         along = rotation(motion[2]) @ step[:2] / self.scale
         return motion + np.array([along[0], along[1], step[2]])
 
 
 def rotation(turn: float) -> Points:
-    """(2, 2), of columns."""
+    """Return the rotation matrix (2, 2) that turns column vectors."""
     c, s = math.cos(turn), math.sin(turn)
     return np.array([[c, -s], [s, c]])
