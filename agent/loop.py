@@ -33,13 +33,13 @@ ANYTHING = Policy()
 
 
 class Recorder:
-    """Is given what happens, as it happens; this one records nothing."""
+    """Receives what happens, as it happens; this one records nothing."""
 
     async def message(self, message: Message, world: World) -> None:
-        """A new message, and the world after it."""
+        """Record a new message, and the world after it."""
 
     async def moving(self, plan_id: str, world: World) -> None:
-        """Robots are about to move to a plan; raising keeps them where they are."""
+        """Record that robots are about to move to a plan; raising keeps them where they are."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Approval:
 
 @dataclass
 class Conversation:
-    """The messages and the world so far, there whatever happens to the loop that adds to them."""
+    """The messages and the world so far, which outlast whatever happens to the loop."""
 
     messages: History
     world: World
@@ -74,7 +74,7 @@ class Conversation:
 
 @dataclass(frozen=True)
 class Turn:
-    """What stays the same while the loop works on what a person said."""
+    """What stays the same throughout a turn."""
 
     model: Model
     tools: tuple[Tool, ...]
@@ -86,7 +86,7 @@ class Turn:
     approved: Approval | None
 
     def permit(self, call: Call, history: History) -> Decision:
-        """What the policy says; a call that cannot be made does not trouble a person."""
+        """Return the policy's decision; nobody is asked about a call that cannot be made."""
         tool = tool_named(self.tools, call.name)
         if tool is None or (decision := self.policy.decide(tool)) == "allow":
             return "allow"
@@ -101,17 +101,17 @@ class Turn:
         return "ask"
 
     def moves(self, call: Call) -> bool:
-        """Whether a call moves robots."""
+        """Return whether a call moves robots."""
         tool = tool_named(self.tools, call.name)
         return tool is not None and tool.kind == "actuate"
 
     def plan_of(self, call: Call, history: History) -> str | None:
-        """The plan that a call which moves robots is for."""
+        """Return the id of the plan that a call which moves robots is for; None for others."""
         named = call.arguments.get("plan_id") or plan_of_reply(history)
         return str(named) if self.moves(call) and named else None
 
     async def ask(self, messages: History) -> Reply:
-        """The model's next reply, whole and in time."""
+        """Return the model's next reply, complete and in time."""
         sent = messages if getattr(self.model, "reads_all", False) else compacted(messages)
         request = Request(self.system, sent, self.offered)
         return await reply_in_time(self.model, request, self.limits.reply_seconds)
@@ -133,15 +133,15 @@ async def run(
     """Run a turn until it is answered, paused, stopped or cancelled.
 
     Args:
-        context: with the world as it is; each outcome has the world that came of it.
+        context: with the current world; the outcome has the resulting one.
         messages: the history so far; unanswered calls at its end are answered first. The turn
-            begins with its last message of the person's.
+            begins with the person's last message.
         system: the prompt.
-        offered: the tools the model is told of; None for all. It may know of others.
-        limits: bounds of the turn.
+        offered: the tools that the model is offered; None for all. It may call the others too.
+        limits: limits of the turn.
         policy: which calls go ahead.
-        approved: what a person has said yes to.
-        recorder: is given every new message.
+        approved: the call that a person has said yes to.
+        recorder: receives every new message.
     """
     talk = Conversation(messages, context.world, recorder or Recorder())
     shown = tools if offered is None else offered
@@ -181,7 +181,7 @@ async def _converse(turn: Turn, talk: Conversation, clock: asyncio.Timeout) -> O
 async def _settle(
     turn: Turn, talk: Conversation, call: Call, clock: asyncio.Timeout
 ) -> Outcome | None:
-    """Answer one call; how that ends the turn, if it does."""
+    """Answer one call; return how that ends the turn, or None."""
     if reason := calls_exhausted(talk.messages, turn.limits):
         return Stopped(talk.messages, talk.world, "limit", reason)
     before = failed_before(talk.messages)
@@ -216,7 +216,7 @@ async def _settle(
 
 
 async def _shown(turn: Turn, talk: Conversation, call: Call) -> None:
-    """Keep what a question offers, so that its ids mean the same in the answer."""
+    """Put what a question offers into the world, so that its ids mean the same in the answer."""
     tool = tool_named(turn.tools, call.name)
     if tool is not None and tool.kind == "ask":
         context = replace(turn.context, world=talk.world, observed=talk.keep)
@@ -225,7 +225,7 @@ async def _shown(turn: Turn, talk: Conversation, call: Call) -> None:
 
 @contextmanager
 def _stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
-    """The turn's clock stands still while robots drive."""
+    """Stop the turn's clock while robots drive."""
     now, ends = asyncio.get_running_loop().time, clock.when()
     left = None if ends is None else ends - now()
     clock.reschedule(None)
@@ -237,7 +237,7 @@ def _stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
 
 
 def _ended(talk: Conversation) -> Outcome | None:
-    """How the last result ends the turn, if it does: the model goes in circles, or is done."""
+    """Return how the last result ends the turn (done, or the model repeats itself), or None."""
     result = talk.messages[-1]
     assert isinstance(result, Result)
     if result.message is not None:

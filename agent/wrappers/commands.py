@@ -1,4 +1,4 @@
-"""A person's command in a model's place: calls they gave themselves, such as undo, and no words."""
+"""A person's own calls, such as undo, in a model's place."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -11,11 +11,11 @@ from ..offline.followup import Followup
 
 
 class Commands:
-    """Makes the calls it is given, in one reply, then says what came of them.
+    """A model that makes the calls it is given, in one reply, then says what came of them.
 
     Args:
         calls: names of tools and their arguments.
-        text: what is said where there are no calls.
+        text: what it says if there are no calls.
     """
 
     name = "person"
@@ -24,7 +24,7 @@ class Commands:
         self._calls, self._text = calls, text
 
     async def reply(self, request: Request) -> Reply:
-        """The calls, or the sentence that ends the turn."""
+        """Return the calls, or once they are answered the sentence that ends the turn."""
         turn = turn_of(request.messages)
         results = [m for m in turn if isinstance(m, Result)]
         if results:
@@ -39,7 +39,7 @@ class Commands:
 
 
 def _said(result: Result, arguments: Mapping[str, Any]) -> str:
-    """What a person is told of one call's result."""
+    """Return what the person reads about one call's result."""
     if result.error:
         return str((result.facts or {}).get("plain", result.text))
     data = json.loads(result.text)

@@ -1,7 +1,7 @@
-"""OpenTelemetry spans of a run by the GenAI semantic conventions, for who watches many of them.
+"""OpenTelemetry spans of a run by the GenAI semantic conventions, to watch many runs.
 
-They say what ran, how long, at what cost and how it ended, never what was said: no messages,
-instructions, arguments, results or keys, and of errors the kind alone, since their sentences
+They say what ran, for how long, at what cost and how it ended, never what was said: no messages,
+instructions, arguments, results or keys, and of errors only the kind, since their sentences may
 repeat what was said. The trace of the run holds all that.
 """
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from opentelemetry.trace import Span, Tracer
 
 NAME = "formup"
-"""Of the agent, the service and the instrumentation."""
+"""Name of the agent, the service and the instrumentation."""
 _PROVIDERS = {"openai-responses": "openai", "gemini": "gcp.gemini"}
-"""What the conventions call a provider, where that is another name than ours."""
+"""The conventions' names of providers, where they differ from ours."""
 _ENDPOINTS = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
 _LACKING = "OpenTelemetry is not installed; pip install 'formup[otel]'."
 
@@ -36,7 +36,7 @@ Told = Callable[[Outcome, Report], None]
 
 
 def traced_model(model: Model, tracer: "Tracer") -> Model:
-    """The model, with a span around each reply; its `prompt`, `aclose` and so on stay its own."""
+    """Return the model with a span around each reply; `prompt`, `aclose` and so on stay its own."""
     return _TracedModel(model, tracer)
 
 
@@ -60,10 +60,10 @@ class _TracedModel:
 
 
 def traced_tool(tool: Tool, tracer: "Tracer") -> Tool:
-    """The tool, with a span around each time it works.
+    """Return the tool with a span around each time it works.
 
-    A call that is refused, or against the schema, does not come so far and has none; neither has
-    a plain function that was given up and never ends.
+    A call that is refused or violates the schema does not get that far and has no span; neither
+    has a plain function that was given up and never ends.
     """
     facts = {
         "gen_ai.tool.name": tool.name,
@@ -72,7 +72,7 @@ def traced_tool(tool: Tool, tracer: "Tracer") -> Tool:
     }
     function: Callable[..., Any] = tool.function
     if not inspect.iscoroutinefunction(function):
-        spanned = _span(tracer, "execute_tool", tool.name, facts)  # a new one for each call
+        spanned = _span(tracer, "execute_tool", tool.name, facts)  # opens a new span for each call
         return replace(tool, function=spanned(function))
 
     @functools.wraps(function)
@@ -85,11 +85,11 @@ def traced_tool(tool: Tool, tracer: "Tracer") -> Tool:
 
 @contextmanager
 def traced_run(tracer: "Tracer | None", model: str, before: History) -> Generator[Told, None, None]:
-    """A span around a whole run, which is told how it ended; without a tracer nothing is done.
+    """Open a span around a whole run and yield what records its end; do nothing without a tracer.
 
     Args:
-        model: its name.
-        before: messages that were there already. What they used counted in the run they were of.
+        model: the model's name.
+        before: messages of earlier runs, which have counted what these used.
     """
     if tracer is None:
         yield lambda outcome, report: None
@@ -115,12 +115,12 @@ def traced_run(tracer: "Tracer | None", model: str, before: History) -> Generato
 
 @contextmanager
 def environment_tracer() -> "Generator[Tracer | None, None, None]":
-    """A tracer as OpenTelemetry's environment variables have it; None where they ask for none.
+    """Yield the tracer that OpenTelemetry's environment variables ask for, or None.
 
-    What it has seen is sent at the end, at the latest.
+    What it has recorded is sent at the end, at the latest.
 
     Raises:
-        InputError: the extra is missing, or they ask for an exporter there is not.
+        InputError: the extra is missing, or the variables ask for an unknown exporter.
     """
     if (kind := _exporter_wanted()) is None:
         yield None
@@ -161,7 +161,7 @@ def _exporter(kind: Literal["otlp", "console"]) -> "SpanExporter":
     if kind == "console":
         from opentelemetry.sdk.trace.export import ConsoleSpanExporter
 
-        return ConsoleSpanExporter(out=sys.stderr)  # a program may be reading what is printed
+        return ConsoleSpanExporter(out=sys.stderr)  # a program may be reading stdout
     from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
 
     return OTLPSpanExporter()
@@ -171,7 +171,7 @@ def _exporter(kind: Literal["otlp", "console"]) -> "SpanExporter":
 def _span(
     tracer: "Tracer", operation: str, what: str, facts: Mapping[str, str]
 ) -> "Generator[Span, None, None]":
-    """A span as the conventions name and mark them, without the words of an error."""
+    """Open a span named and marked as the conventions say, without the text of an error."""
     from opentelemetry.trace import SpanKind
 
     with tracer.start_as_current_span(
@@ -183,7 +183,7 @@ def _span(
     ) as span:
         try:
             yield span
-        except BaseException as error:  # being cancelled, too, is an end to be seen
+        except BaseException as error:  # a cancellation has to be seen as well
             _failed(span, type(error).__qualname__)
             raise
 
@@ -196,7 +196,7 @@ def _failed(span: "Span", kind: str) -> None:
 
 
 def _asked(name: str) -> dict[str, str]:
-    """Provider and model of a model's name; one without a provider runs in this process."""
+    """Return provider and model by a model's name; without a provider it runs in this process."""
     provider, colon, model = name.partition(":")
     return {
         "gen_ai.provider.name": _PROVIDERS.get(provider, provider) if colon else NAME,
