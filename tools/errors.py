@@ -110,7 +110,7 @@ class ToolError(FormupError):
     images: tuple[bytes, ...] = ()
 
     def showing(self, *images: bytes) -> "ToolError":
-        """The same error with pictures."""
+        """Return the same error with pictures."""
         self.images = images
         return self
 
