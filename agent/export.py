@@ -128,7 +128,7 @@ def _picture_lines(folder: Path, name: str, data: bytes) -> list[str]:
 
 
 def _escaped(text: str) -> str:
-    """Return a text as one line, with all characters escaped that mean something to Markdown."""
+    """Return a text as one line, with every character escaped that Markdown interprets."""
     return re.sub(r"([\\`*_{}\[\]<>#|&])", r"\\\1", " ".join(text.split()))
 
 

@@ -31,7 +31,7 @@ class Task:
     """The facts of a turn's first message.
 
     Attributes:
-        robots: how many, or None if only the instruction may say so.
+        robots: how many, or None if the person fixed no number beside the instruction.
         pointed: what the person pointed at, as arguments of propose_formation's `targets`.
         targets: ids of targets that were measured before the conversation began.
         deploy: whether robots are to move once the plan is certified.
@@ -127,7 +127,7 @@ def _past(context: Context, back: int) -> list[tuple[list[str], int]]:
 
 
 def _form(group: Group) -> str:
-    """Return a group's arrangement; a drawn circle is also one around its thing."""
+    """Return a group's arrangement; a drawn circle counts as `around` its thing."""
     circle = group.shape is not None and group.shape.kind == "circle"
     return "around" if circle else group.relation
 
@@ -173,11 +173,11 @@ def _size(words: str) -> tuple[int, int]:
 
 
 MOVED_SHARE = 0.1
-"""How far a thing may have moved in another picture and still be found, of its longer side."""
+"""How far a thing may have moved in another picture to be found: a share of its longer side."""
 
 
 def in_new_picture(context: Context, picture: Picture) -> Context:
-    """Return the context with another picture, where old targets are pointed at where they were."""
+    """Return the context with another picture, in which targets are pointed at where they were."""
     context.services.pictures[picture.sha256] = picture
     world = World.of(picture)
     made = context.world.having(

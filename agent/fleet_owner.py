@@ -32,7 +32,7 @@ class FleetOwner:
         Raises:
             FleetBusyError: another process has it.
         """
-        who, locked = "", f"fleet.{quote(name, safe='')}"  # a path as a name has slashes
+        who, locked = "", f"fleet.{quote(name, safe='')}"  # a fleet's name may be a path
         for _ in range(TRIES):
             if name in self._simulated:
                 return opened()

@@ -1,4 +1,4 @@
-"""How a turn ends, be it at a limit: four types, each with all messages and the world."""
+"""How a turn ends, also at a limit: four types, each with all messages and the world."""
 
 from dataclasses import dataclass
 from typing import Literal

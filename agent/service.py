@@ -242,7 +242,7 @@ class Service:
                 await asyncio.sleep(PATIENCE / 3)
 
     async def _cut(self, session: str, turn: Turn) -> Run | None:
-        """Hold the robots of a turn that runs here and end it, even if a fleet cannot be told."""
+        """Hold the robots of a turn that runs here and end it, even if a fleet is out of reach."""
         if turn.name == "stop":
             return await turn.ended()
         problem = await self._held(self._sessions.get(session))

@@ -40,7 +40,7 @@ class Turn:
 
     Attributes:
         name: of the command.
-        acting: whether it has got hold of the conversation that it changes.
+        acting: whether it holds the conversation that it changes.
         digest: hash of what was asked for, to tell whether a key was used for the same before.
         number: of the event that began it; 0 before that is written.
         since: when it was asked for, by the monotonic clock.

@@ -100,7 +100,7 @@ class Tool:
         return replace(self, hidden=frozenset(hidden))
 
     def parse(self, arguments: Mapping[str, Any]) -> BaseModel:
-        """Return the arguments validated.
+        """Return validated arguments.
 
         Raises:
             ArgumentsError: they are against the schema; the text names every violation at once.

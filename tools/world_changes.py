@@ -48,7 +48,7 @@ def with_changes(world: World, *changes: Mapping[str, Any]) -> World:
     """Return the world after changes that `changes_since` wrote, one after another.
 
     Raises:
-        ValidationError, KeyError, TypeError, ValueError, AttributeError: it did not write them.
+        ValidationError, KeyError, TypeError, ValueError, AttributeError: others wrote them.
     """
     return after_turns(world, [changes])[0]
 
@@ -76,7 +76,7 @@ def after_turns(
 
 
 def _apply(change: Mapping[str, Any], parts: dict[str, Any], world: World) -> None:
-    """Put the items of a change in place among parts that are not validated yet."""
+    """Apply a change to parts of a world that are not validated yet."""
     for name, value in change.items():
         if name not in BY_ID:
             parts[name] = value

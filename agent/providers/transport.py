@@ -142,7 +142,7 @@ class Transport:
     async def _body(
         self, response: httpx.Response, assembly: Assembly, show: ShowText | None
     ) -> tuple[Any, bool]:
-        """Return a complete body, streamed or not whatever its type says, and if text was shown."""
+        """Return a complete body and whether text was shown; content tells if it is a stream."""
         events, plain, size, streamed, told = Events(), bytearray(), 0, False, False
         try:
             async for chunk in _chunks(response):

@@ -43,7 +43,7 @@ class Assembly(Protocol):
             raise unexpected(f"a stream of something else than {self.events}") from None
 
     def take(self, event: Any) -> str:
-        """Do as `add`, but raise any built-in error for an event that is not this provider's."""
+        """Do what `add` does, with any built-in error for an event that is not this provider's."""
         ...
 
     def whole(self) -> Any:

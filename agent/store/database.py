@@ -47,7 +47,7 @@ class DatabaseStore:
 
     Raises:
         InputError: the URL is neither, or needs an extra that is not installed.
-        StorageError: the database cannot be used, or what it holds is not this formup's.
+        StorageError: the database cannot be used, or its tables are not those of this formup.
     """
 
     def __init__(self, url: str) -> None:
@@ -314,7 +314,7 @@ def _put(connection: Connection, session: str, data: bytes) -> None:
 
 
 def _insert(connection: Connection, session: str, events: Sequence[Event]) -> None:
-    """Write events, and what is listed of them."""
+    """Write events, and what lists of sessions show of them."""
     rows = [
         {
             "session": session,

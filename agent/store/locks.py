@@ -1,4 +1,4 @@
-"""Locks among processes: files that say who has them, freed by the system when that one ends."""
+"""Locks among processes, as files that name the holder; the system frees them when it ends."""
 
 import time
 from collections.abc import Callable
@@ -23,7 +23,7 @@ def taken(take: Callable[[], T]) -> T:
 
 
 def lock_file(path: Path) -> ExitStack | None:
-    """Take the lock that a file is; return None while another process has it.
+    """Take a file as a lock; return None while another process has it.
 
     Raises:
         OSError: the file cannot be made there.

@@ -100,7 +100,7 @@ class StoredSession(Protocol):
         """Return the events with numbers greater than `after`, in order.
 
         Raises:
-            StorageError: the session is missing, or is no whole session that formup wrote.
+            StorageError: the session is missing, or not a whole one as written by formup.
         """
         ...
 

@@ -194,7 +194,7 @@ def _is_whole(connection: Connection, label: str) -> bool:
 
 
 def _write_ahead(engine: Engine) -> None:
-    """Let readers not wait for a writer; tried again, as others may set this at the same time."""
+    """Log writes ahead, so that readers need not wait; retried, as others may do this just now."""
     until = time.monotonic() + PATIENCE
     while True:
         try:

@@ -41,7 +41,7 @@ class ReplayModel:
         """Return the recorded reply to the same messages.
 
         Raises:
-            ModelError: the messages are others, or the recording ends here.
+            ModelError: the messages differ, or the recording ends here.
         """
         if request.aside:
             return self._aside(request)

@@ -225,7 +225,7 @@ async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
 
 
 async def _team(context: Context, contract: Contract, taking: Sequence[str | None] = ()) -> Fleet:
-    """Return the fleet, if simulated with robots for the contract and those that keep places."""
+    """Return the fleet; a simulated one has robots for the contract and all that keep places."""
     settings, world, fleets = context.settings, context.world, context.services.fleets
     held = fleets.get(settings.fleet)
     ids = {pose.id for pose in world.robots}

@@ -20,7 +20,7 @@ MOST_ROBOTS = 60
 
 
 def _place_of_robot(world: World, name: str) -> tuple[float, float] | None:
-    """Return where a robot stands, or is to stand if never driven; None if there is no such one."""
+    """Return where a robot stands, or is to stand if never driven; None for an unknown name."""
     robot = name.removeprefix("r")
     driven = {pose.id: (pose.x, pose.y) for pose in world.robots if pose.seen > 0}
     if robot in driven:

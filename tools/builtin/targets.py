@@ -227,7 +227,7 @@ def well_missed(target: Target) -> list[Deviation]:
 
 
 def corrections(before: World, world: World, prompts: Iterable[TargetPrompt]) -> dict[str, Any]:
-    """Return what a reply says of outlines that points have corrected: what that has changed."""
+    """Return what a reply says of outlines that points have corrected: the areas that changed."""
     known = {t.id: t.outline.polygon for t in before.targets}
     pairs = {
         p.id: (known[p.id], world.target(p.id).outline.polygon)

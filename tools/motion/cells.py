@@ -114,7 +114,7 @@ def conflicts(cells: Cells, apart: float, step: float) -> Indices:
 def _distance(cells: Cells, pairs: Indices) -> FloatArray:
     """Return how near the cells of each pair come, (p,) px, by their ends alone.
 
-    For cells that cross that is more than 0, but less than any distance kept: cells are shorter.
+    For crossing cells this exceeds 0, but stays below any distance kept, since cells are shorter.
     """
     one, other = pairs.T
     ends = [

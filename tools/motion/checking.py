@@ -20,7 +20,7 @@ from .motion import Indices, Motion, Passages, arc_lengths, as_line
 ROUNDING = 1e-6
 """Distances may fall short of what is demanded by so much, px."""
 AS_NEAR = 0.98
-"""Robots that start or end too near to an obstacle may come as near as this share of that."""
+"""Robots that start or end too near to an obstacle may come to this share of that distance."""
 DETOUR = 3.0
 """Robots that start or end too near to an obstacle may stay so for at most so many times the sum of
 the shortest way out and a radius."""

@@ -67,7 +67,7 @@ class Motion:
 
 
 def as_line(path: FloatArray) -> BaseGeometry:
-    """Return a polyline, (k, 2), as a line, or as a point if it has no length, as lines must."""
+    """Return a polyline, (k, 2), as a line, or as a point if it lacks the length of a line."""
     return LineString(path) if (path != path[0]).any() else Point(path[0])
 
 
