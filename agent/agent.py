@@ -34,9 +34,9 @@ from .session import (
     Show,
     TurnOptions,
     answered_by,
-    believed,
     end_facts,
     picture_facts,
+    with_confirmed_outline,
 )
 from .session_start import prompt_facts, start_facts
 from .store.folder import FolderLog
@@ -294,7 +294,7 @@ class Agent:
                 fixed = context.settings.model_copy(update={"approved": plan_id})
                 context = replace(context, settings=fixed)
             if result is not None:
-                context = context.at(believed(context.world, messages, result))
+                context = context.at(with_confirmed_outline(context.world, messages, result))
                 await recorder.message(result, context.world)
                 messages = (*messages, result)
             left, spent = replace(run, context=context), run.report.usage.seconds

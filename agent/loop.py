@@ -18,9 +18,9 @@ from .messages import (
     Message,
     Reply,
     Result,
-    doubts_told,
     failed_before,
     is_repeated,
+    known_doubts,
     plan_of_reply,
     unanswered,
 )
@@ -187,35 +187,35 @@ async def _settle(
     before = failed_before(talk.messages)
     decision = "skip" if before and turn.moves(call) else turn.permit(call, talk.messages)
     if decision == "ask":
-        await _shown(turn, talk, call)
+        await _store_choices(turn, talk, call)
         return Paused(talk.messages, talk.world, call, turn.plan_of(call, talk.messages))
     if decision == "skip":
         await talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
         return None
     if decision == "refuse":
         await talk.add(refused(call, f"{call.name} may not be called here; do without it."))
-        return _ended(talk)
+        return _turn_end(talk)
     context = replace(
         turn.context,
         world=talk.world,
-        doubted=doubts_told(talk.messages),
+        doubted=known_doubts(talk.messages),
         proposed=plan_of_reply(talk.messages),
         agreed=turn.approved is not None and turn.approved.call == call,
         observed=talk.keep,
         moving=talk.moving,
     )
     try:
-        with _stopped(clock) if turn.moves(call) else nullcontext():
+        with _clock_stopped(clock) if turn.moves(call) else nullcontext():
             result = await answer(turn.tools, context, call, turn.limits.tool_seconds)
     except ApprovalError as needed:
         return Paused(talk.messages, talk.world, call, needed.plan_id)
     if isinstance(turn.context.asks, ModelFinder):
         result = result.model_copy(update={"asides": turn.context.asks.taken()})
     await talk.add(result)
-    return _ended(talk)
+    return _turn_end(talk)
 
 
-async def _shown(turn: Turn, talk: Conversation, call: Call) -> None:
+async def _store_choices(turn: Turn, talk: Conversation, call: Call) -> None:
     """Put what a question offers into the world, so that its ids mean the same in the answer."""
     tool = tool_named(turn.tools, call.name)
     if tool is not None and tool.kind == "ask":
@@ -224,7 +224,7 @@ async def _shown(turn: Turn, talk: Conversation, call: Call) -> None:
 
 
 @contextmanager
-def _stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
+def _clock_stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
     """Stop the turn's clock while robots drive."""
     now, ends = asyncio.get_running_loop().time, clock.when()
     left = None if ends is None else ends - now()
@@ -236,7 +236,7 @@ def _stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
             clock.reschedule(None if left is None else now() + left)
 
 
-def _ended(talk: Conversation) -> Outcome | None:
+def _turn_end(talk: Conversation) -> Outcome | None:
     """Return how the last result ends the turn (done, or the model repeats itself), or None."""
     result = talk.messages[-1]
     assert isinstance(result, Result)

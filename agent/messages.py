@@ -155,7 +155,7 @@ def plan_of_reply(history: Sequence[Message]) -> str | None:
     return None
 
 
-def doubts_told(history: Sequence[Message]) -> frozenset[str]:
+def known_doubts(history: Sequence[Message]) -> frozenset[str]:
     """Return the doubts of this turn that the model knew of when it gave its last reply."""
     turn = turn_of(history)
     last = max((i for i, m in enumerate(turn) if isinstance(m, Reply)), default=0)
@@ -209,7 +209,7 @@ def is_repeated(history: Sequence[Message]) -> bool:
 
 def closed(history: History, why: str) -> History:
     """Return the history with a result for each call that has none, as providers demand."""
-    return (*history, *(_unknown(call, why) for call in unanswered(history)))
+    return (*history, *(_unanswered_result(call, why) for call in unanswered(history)))
 
 
 LOST = "No result: it was broken off before one came, so that what it did is not known."
@@ -228,11 +228,11 @@ def paired(history: Sequence[Message]) -> History:
             if waiting.pop(message.call_id, None) is None:
                 continue
         else:
-            made += (_unknown(call, LOST) for call in waiting.values())
+            made += (_unanswered_result(call, LOST) for call in waiting.values())
             waiting = {c.id: c for c in message.calls} if isinstance(message, Reply) else {}
         made.append(message)
     return tuple(made)
 
 
-def _unknown(call: Call, why: str) -> Result:
+def _unanswered_result(call: Call, why: str) -> Result:
     return Result(call_id=call.id, name=call.name, text=why, error="refused")

@@ -215,7 +215,7 @@ def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Pl
         return world.plans[outcome.plan_id].plan
     if arrivals:
         return world.plans[list(arrivals)[-1]].plan
-    given_up = _given_up(outcome.messages)
+    given_up = _impossible_call(outcome.messages)
     named = given_up and given_up.arguments.get("plan_id")
     if named in world.plans and not world.is_void(world.plans[named].plan):
         return world.plans[named].plan
@@ -227,13 +227,13 @@ def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Pl
 
 def suggested(outcome: Outcome) -> Contract | None:
     """Return the contract that a question or a refusal suggests instead, or None."""
-    call = outcome.call if isinstance(outcome, Paused) else _given_up(outcome.messages)
+    call = outcome.call if isinstance(outcome, Paused) else _impossible_call(outcome.messages)
     ends = call is not None and call.name in ("ask_user", "report_impossible")
     stated = call.arguments.get("contract") if call and ends else None
     return None if stated is None else Contract.model_validate(stated)
 
 
-def _given_up(messages: History) -> Call | None:
+def _impossible_call(messages: History) -> Call | None:
     """Return the `report_impossible` call that ended the turn, or None."""
     last = messages[-1] if messages else None  # a run may be killed before its first message
     if not isinstance(last, Result) or last.name != "report_impossible" or last.error:
@@ -254,7 +254,7 @@ def _status(
         return "stopped", text
     if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
         # Robots have moved, whatever happened after that.
-        done = arrival.done and _given_up(outcome.messages) is None
+        done = arrival.done and _impossible_call(outcome.messages) is None
         return ("deployed" if done else "failed"), _with_arrival(outcome, arrival, text)
     if isinstance(outcome, Stopped):
         ours = outcome.kind in ("limit", "repeat")

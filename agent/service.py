@@ -221,11 +221,11 @@ class Service:
         """
         while True:
             if (turn := self._turns.get(session)) is not None:
-                if (cut := await self._cut(session, turn)) is not None:
+                if (cut := await self._end_turn(session, turn)) is not None:
                     return cut
                 continue  # the turn had not begun
             held = await self.fresh(session)
-            problem = await self._held(held)
+            problem = await self._hold_in_time(held)
             if session in self._turns:
                 continue
             if problem is not None:
@@ -241,18 +241,18 @@ class Service:
                 await asyncio.to_thread(note_stop, self._feeds[session].stored)
                 await asyncio.sleep(PATIENCE / 3)
 
-    async def _cut(self, session: str, turn: Turn) -> Run | None:
+    async def _end_turn(self, session: str, turn: Turn) -> Run | None:
         """Hold the robots of a turn that runs here and end it, even if a fleet is out of reach."""
         if turn.name == "stop":
             return await turn.ended()
-        problem = await self._held(self._sessions.get(session))
+        problem = await self._hold_in_time(self._sessions.get(session))
         turn.cancel()
         run = await turn.ended()
         if problem is not None:
             raise problem
         return run
 
-    async def _held(self, held: Session | None) -> FleetError | None:
+    async def _hold_in_time(self, held: Session | None) -> FleetError | None:
         """Hold all robots within HOLDING seconds; return what went wrong, or None."""
         try:
             async with asyncio.timeout(HOLDING):

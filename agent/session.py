@@ -235,7 +235,7 @@ def stored_picture(
     return given
 
 
-def believed(world: World, messages: Sequence[Message], answer: Result) -> World:
+def with_confirmed_outline(world: World, messages: Sequence[Message], answer: Result) -> World:
     """Return the world after an answer; a yes to a doubtful outline shown makes it a target."""
     last = next((m for m in reversed(messages) if isinstance(m, Result)), None)
     asked = last is not None and last.cause == "low_confidence"

@@ -341,7 +341,10 @@ class Context:
         for candidate in found:
             if shown is None and candidate.id == name:
                 return candidate
-            if shown is not None and _apart(candidate.outline.bounds, shown.box) <= SAME_PLACE:
+            if (
+                shown is not None
+                and _box_distance(candidate.outline.bounds, shown.box) <= SAME_PLACE
+            ):
                 return candidate
         known = f"c1 to c{len(found)}" if found else "none: nothing stands out in this picture"
         raise ToolError(f"There is no candidate {name!r}. Candidates: {known}.")
@@ -353,6 +356,6 @@ def noun_phrase(words: str) -> str:
     return " ".join(said[1:] if said[:1] in (["a"], ["an"], ["the"]) else said)
 
 
-def _apart(box: tuple[float, ...], other: tuple[float, ...]) -> float:
+def _box_distance(box: tuple[float, ...], other: tuple[float, ...]) -> float:
     """Return the largest distance between the same sides of two boxes, px."""
     return max(abs(a - b) for a, b in zip(box, other, strict=True))

@@ -48,7 +48,7 @@ def with_changes(world: World, *changes: Mapping[str, Any]) -> World:
     """Return the world after changes that `changes_since` wrote, one after another.
 
     Raises:
-        ValidationError, KeyError, TypeError, ValueError, AttributeError: others wrote them.
+        ValidationError, KeyError, TypeError, ValueError, AttributeError: it did not write them.
     """
     return after_turns(world, [changes])[0]
 

@@ -63,13 +63,13 @@ def make_calls(written: Iterable[Written], request: Request) -> tuple[Call, ...]
             number += 1
             id = f"call_{number}"
         taken.add(id)
-        tool = tool_meant(name, request.tools)
+        tool = find_tool(name, request.tools)
         called = tool.name if tool else name
         calls.append(Call(id=id, name=called, arguments=arguments_of(arguments, tool)))
     return tuple(calls)
 
 
-def tool_meant(name: str, tools: tuple[Tool, ...]) -> Tool | None:
+def find_tool(name: str, tools: tuple[Tool, ...]) -> Tool | None:
     """Return the tool that a name means, without what models put before and after it, or None."""
     exact = [tool for tool in tools if tool.name == name]
     bare = name.strip(" \n`'\"")
@@ -221,7 +221,7 @@ def _written_call(value: Any, tools: tuple[Tool, ...]) -> Written | None:
         del fields["type"]
         fields = fields["function"] if isinstance(fields.get("function"), dict) else fields
     name, given = fields.get("name"), fields.get("arguments", fields.get("parameters"))
-    known = isinstance(name, str) and tool_meant(name, tools) is not None
+    known = isinstance(name, str) and find_tool(name, tools) is not None
     if len(fields) != 2 or not known or given is None or UNREADABLE in arguments_of(given):
         return None
     return None, str(name), given

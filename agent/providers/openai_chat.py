@@ -118,7 +118,7 @@ class OpenAIChat(Wire):
             for c in message.tool_calls or ()
         ]
         text, calls = read(spoken.message.text, written, request)
-        kept = _kept(message, bool(calls))
+        kept = _fields_to_return(message, bool(calls))
         return Reply(
             text=text,
             calls=calls,
@@ -188,7 +188,7 @@ class OpenAIChat(Wire):
         return dumped(message | ({"tool_calls": calls} if calls else {}))
 
 
-def _kept(message: _Message, calling: bool) -> dict[str, Any]:
+def _fields_to_return(message: _Message, calling: bool) -> dict[str, Any]:
     """Return what came beside text and calls and must be sent back, as fields of the message."""
     kept = {name: value for name, value in message.more.items() if goes_back(name)}
     if not calling:

@@ -143,7 +143,7 @@ class OpenAIResponses(Wire):
         written = [(item.call_id, item.name or "", item.arguments) for item in made]
         text, calls = read("".join(part.text or "" for part in parts), written, request)
         items: tuple[dict[str, Any], ...] = ()
-        if len(made) == len(calls) and _must_be_kept(response.output):
+        if len(made) == len(calls) and _needs_original_items(response.output):
             said: list[dict[str, Any]] = body["output"]
             items = tuple({k: v for k, v in item.items() if v is not None} for item in said)
             give_names([i for i in items if i["type"] == "function_call"], calls, "call_id")
@@ -195,7 +195,7 @@ def _check_status(response: _Response) -> None:
         raise AskError(f"broke its reply off ({status})", "try again later", "later")
 
 
-def _must_be_kept(items: list[_Item]) -> bool:
+def _needs_original_items(items: list[_Item]) -> bool:
     """Return whether a reply holds more than text and calls, and can be sent back as it came.
 
     Thoughts that came without their content cannot be looked up by a server that stores none.

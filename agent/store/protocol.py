@@ -277,7 +277,7 @@ def missing(label: str) -> StorageError:
 
 def busy(label: str, meanwhile: Sequence[Event] = (), holder: str = "") -> StorageError:
     """Return the error for a session that another process writes, with what it wrote meanwhile."""
-    happened = f" Meanwhile {_told(meanwhile)}." if meanwhile else ""
+    happened = f" Meanwhile {_turns_text(meanwhile)}." if meanwhile else ""
     who = f"another process ({holder})" if holder else "another process"
     return StorageError(
         f"{label} is being written by {who}; wait for it to end, or stop it.{happened}",
@@ -287,7 +287,7 @@ def busy(label: str, meanwhile: Sequence[Event] = (), holder: str = "") -> Stora
 
 def gone_on(label: str, meanwhile: Sequence[Event]) -> StorageError:
     """Return the error for a session that has gone on elsewhere, with what happened there."""
-    happened = f": {_told(meanwhile)}" if meanwhile else ""
+    happened = f": {_turns_text(meanwhile)}" if meanwhile else ""
     return StorageError(
         f"{label} has gone on since it was opened{happened}. Nothing was written; open it again "
         "to go on from there.",
@@ -295,7 +295,7 @@ def gone_on(label: str, meanwhile: Sequence[Event]) -> StorageError:
     )
 
 
-def _told(events: Sequence[Event]) -> str:
+def _turns_text(events: Sequence[Event]) -> str:
     """Return what was said and how it ended as a clause, of many turns only the last few."""
     parts: list[str] = []
     for event in events:

@@ -29,7 +29,7 @@ class Commands:
         results = [m for m in turn if isinstance(m, Result)]
         if results:
             asked = {c.id: c.arguments for m in turn if isinstance(m, Reply) for c in m.calls}
-            return Reply(text=" ".join(_said(m, asked[m.call_id]) for m in results))
+            return Reply(text=" ".join(_result_text(m, asked[m.call_id]) for m in results))
         number = sum(isinstance(m, Reply) for m in request.messages) + 1
         calls = (
             Call(id=f"command-{number}-{k}", name=name, arguments=arguments)
@@ -38,7 +38,7 @@ class Commands:
         return Reply(text=self._text, calls=tuple(calls))
 
 
-def _said(result: Result, arguments: Mapping[str, Any]) -> str:
+def _result_text(result: Result, arguments: Mapping[str, Any]) -> str:
     """Return what the person reads about one call's result."""
     if result.error:
         return str((result.facts or {}).get("plain", result.text))

@@ -125,7 +125,7 @@ def asking(
     context: Context, model: Model, library: PromptLibrary, seconds: float | None
 ) -> Generator[ModelFinder | None]:
     """Yield the model as a turn's detector if the settings want that, else None."""
-    finder = ModelFinder(model, library, seconds) if _asks(context.settings) else None
+    finder = ModelFinder(model, library, seconds) if _uses_model_finder(context.settings) else None
     try:
         yield finder
     finally:
@@ -139,12 +139,12 @@ def check_sees(settings: Settings, model: Model) -> None:
     Raises:
         InputError: the settings have such a detector, and the model does not see.
     """
-    if _asks(settings) and not getattr(model, "sees", False):
+    if _uses_model_finder(settings) and not getattr(model, "sees", False):
         raise InputError(
             f"The detector {VlmDetector.name!r} asks the model that decides, and {model.name} sees "
             "no picture; choose a model such as openai:NAME, or another detector."
         )
 
 
-def _asks(settings: Settings) -> bool:
+def _uses_model_finder(settings: Settings) -> bool:
     return settings.detector.removeprefix(BESIDE) == VlmDetector.name

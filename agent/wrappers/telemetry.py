@@ -32,7 +32,7 @@ _PROVIDERS = {"openai-responses": "openai", "gemini": "gcp.gemini"}
 _ENDPOINTS = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
 _LACKING = "OpenTelemetry is not installed; pip install 'formup[otel]'."
 
-Told = Callable[[Outcome, Report], None]
+RecordEnd = Callable[[Outcome, Report], None]
 
 
 def traced_model(model: Model, tracer: "Tracer") -> Model:
@@ -49,7 +49,7 @@ class _TracedModel:
         return self._model.name
 
     async def reply(self, request: Request) -> Reply:
-        asked = _asked(self.name)
+        asked = _model_attributes(self.name)
         with _span(self._tracer, "chat", asked["gen_ai.request.model"], asked) as span:
             reply = await self._model.reply(request)
             span.set_attributes(_usage((reply,)))
@@ -84,7 +84,9 @@ def traced_tool(tool: Tool, tracer: "Tracer") -> Tool:
 
 
 @contextmanager
-def traced_run(tracer: "Tracer | None", model: str, before: History) -> Generator[Told, None, None]:
+def traced_run(
+    tracer: "Tracer | None", model: str, before: History
+) -> Generator[RecordEnd, None, None]:
     """Open a span around a whole run and yield what records its end; do nothing without a tracer.
 
     Args:
@@ -94,7 +96,7 @@ def traced_run(tracer: "Tracer | None", model: str, before: History) -> Generato
     if tracer is None:
         yield lambda outcome, report: None
         return
-    facts = _asked(model) | {"gen_ai.agent.name": NAME}
+    facts = _model_attributes(model) | {"gen_ai.agent.name": NAME}
     with _span(tracer, "invoke_agent", NAME, facts) as span:
 
         def told(outcome: Outcome, report: Report) -> None:
@@ -195,7 +197,7 @@ def _failed(span: "Span", kind: str) -> None:
     span.set_status(StatusCode.ERROR)
 
 
-def _asked(name: str) -> dict[str, str]:
+def _model_attributes(name: str) -> dict[str, str]:
     """Return provider and model by a model's name; without a provider it runs in this process."""
     provider, colon, model = name.partition(":")
     return {

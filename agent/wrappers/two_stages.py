@@ -65,13 +65,13 @@ class TwoStages:
         if request.aside:
             return await self._looker.reply(request)
         tools, turn = request.tools, tuple(turn_of(request.messages))
-        found, stands = measuring(turn), _plan_stands(turn)
+        found, stands = first_measuring_reply(turn), _plan_stands(turn)
         if found is None and (not stands or _is_to_look(turn)):
             seen = Request(self._look.render(), request.messages, offered(tools, self._look))
             return await self._looker.reply(seen)
         usual = self._revise if stands else self._plan
         prompt = self._repair if _uncertified(turn) else usual
-        told = Request(prompt.render(), _handed_over(turn, found), offered(tools, prompt))
+        told = Request(prompt.render(), _planner_history(turn, found), offered(tools, prompt))
         return await self._planner.reply(told)
 
     async def aclose(self) -> None:
@@ -115,7 +115,7 @@ def staged(
     return TwoStages(looker, planner, **prompts), tuple(prompts.values())
 
 
-def measuring(messages: History) -> int | None:
+def first_measuring_reply(messages: History) -> int | None:
     """Return the index of the first reply whose `segment` calls all succeeded, or None."""
     failed: dict[str, bool] = {}
     for message in messages:
@@ -145,7 +145,7 @@ def _uncertified(messages: History) -> bool:
     return last is not None and (last.error is not None or not json.loads(last.text)["certified"])
 
 
-def _handed_over(messages: History, found: int | None) -> History:
+def _planner_history(messages: History, found: int | None) -> History:
     """Return the history with the looker's part replaced by its outcome in the person's message.
 
     A planner that read the pattern as its own words might go on as if it had seen the picture.

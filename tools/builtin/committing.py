@@ -22,7 +22,7 @@ from ..geometry.cages.budget import cut_short, search_budget
 from ..perception.target_prompt import Point, TargetPrompt
 from ..tool import FilledBy, ToolResult, in_thread, tool
 from ..world import PlanNode, ShownCandidate, Target, World
-from .others import held_off, with_others
+from .others import with_hard_keep_outs, with_others
 from .robots import drive_to, with_observed, with_robots
 from .seeing import sighting
 from .targets import (
@@ -68,7 +68,7 @@ async def propose_formation(
         raise ToolError("propose_formation: give positions or samples, not both.")
     stated = contract_in_pixels(contract, context.world.metres_per_pixel)
     _check_against_words(context, stated)
-    held = held_off(_held_to(stated, context.settings), context.world)
+    held = with_hard_keep_outs(_with_fixed_settings(stated, context.settings), context.world)
     targets = with_pointed(context.world, targets, held.target_ids)
 
     def work() -> tuple[World, PlanNode | PlacementError, Plan | None]:
@@ -117,7 +117,7 @@ def tell_of(
     """Return the result of a tool that made a plan: what to look at first, or the last word."""
     now, message, certified = context.at(world), None, node.plan.verdict.certified
     looked = tuple(_seen(t) if t.id in node.unseen else t for t in world.targets)
-    if certified and (advice := _to_see(now, node)):
+    if certified and (advice := _look_first_advice(now, node)):
         data |= {"look_first": advice}
     elif certified and not context.settings.may_deploy:
         message = tell or None
@@ -212,7 +212,7 @@ async def deploy(
     plan_id, made = plan_id or _standing_id(context), context.proposed
     node = context.world.plan(plan_id or made)
     _check_may_move(context, node.plan)
-    if plan_id is None and (advice := _to_see(context, node)):
+    if plan_id is None and (advice := _look_first_advice(context, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
     arrival, world, moved = await drive_to(context, node, follow)
     worst = int(np.argmax(arrival.residual_px))
@@ -324,7 +324,7 @@ def _offer(plan: Plan) -> dict[str, str]:
     return {"plan_id": plan.id, "sentence": sentence}
 
 
-def _to_see(context: Context, node: PlanNode) -> str:
+def _look_first_advice(context: Context, node: PlanNode) -> str:
     """Return what has to be looked at before an unseen plan is carried out, or ""."""
     if not node.unseen:
         return ""
@@ -358,7 +358,7 @@ def _slack(plan: Plan, name: str) -> float:
     return max(SLACK_SHARE * min(kept, default=MIN_CLEARANCE), SLACK_PX)
 
 
-def _held_to(contract: Contract, settings: Settings) -> Contract:
+def _with_fixed_settings(contract: Contract, settings: Settings) -> Contract:
     """Return the contract with what the person fixed: robot radius and clearance."""
     groups = tuple(_with_clearance(g, settings.clearance) for g in contract.groups)
     radius = settings.robot_radius

@@ -83,7 +83,7 @@ async def followed(
             )
     finally:
         context.observed(world.having(robots=last))
-    arrival = await _filmed(context, arrival.model_copy(update={"follow": came}), seen)
+    arrival = await _with_follow_track(context, arrival.model_copy(update={"follow": came}), seen)
     world = world.having(robots=last).with_arrival(plan.id, arrival)
     if came.ended in ("stopped", "failed"):
         context.observed(world)
@@ -91,7 +91,7 @@ async def followed(
     return arrival, world
 
 
-async def _filmed(
+async def _with_follow_track(
     context: Context, arrival: Arrival, seen: Sequence[tuple[tuple[Pose, ...], Rigid]]
 ) -> Arrival:
     """Return an arrival whose track goes on with what was seen while robots followed."""

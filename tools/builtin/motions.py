@@ -82,7 +82,7 @@ def going(
     points, contract = plan.formation.points, plan.formation.contract
     ground = Ground(named_obstacles(contract, world.site(contract)), world.site(contract))
     radius = body_radius(fleet, contract, points)
-    robots, gap = _who(poses, points, taking, ground, radius)
+    robots, gap = _assigned_robots(poses, points, taking, ground, radius)
     at = {pose.id: (pose.x, pose.y) for pose in poses}
     team = Team(
         ids=robots,
@@ -113,7 +113,7 @@ def met_by(world: World, plan: Plan, found: Going | None) -> tuple[Encounter, ..
     return encounters_of(plan, site, found.paths, found.radius)
 
 
-def _who(
+def _assigned_robots(
     poses: tuple[Pose, ...],
     points: FloatArray,
     taking: Sequence[str | None] | None,

@@ -72,7 +72,7 @@ def _region(context: Context, prompt: TargetPrompt) -> Outline:
     return measured_all(context, (prompt,)).target(prompt.id).outline
 
 
-def held_off(contract: Contract, world: World) -> Contract:
+def with_hard_keep_outs(contract: Contract, world: World) -> Contract:
     """Return the contract with the world's regions that no robot may enter in its `keep_out`."""
     hard = (k.id for k in world.keep_out if k.hard)
     return contract.model_copy(

@@ -74,7 +74,7 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
     """
     for given in prompts:
         context, target, threshold = measured(context, given)
-        if target.confidence < threshold and not _believed(context.world, target):
+        if target.confidence < threshold and not _is_confirmed(context.world, target):
             context.observed(context.world.having(doubted=target))
             shown = closer_view(context, target)
             raise _insufficient(target.confidence, threshold, target.prompt).showing(shown)
@@ -98,7 +98,7 @@ def measured(context: Context, given: TargetPrompt) -> tuple[Context, Target, fl
     return context, _measured(context, prompt), _threshold(context, prompt.how)
 
 
-def _believed(world: World, target: Target) -> bool:
+def _is_confirmed(world: World, target: Target) -> bool:
     """Return whether a person has agreed to that very outline, however doubtful."""
     return any(t.id == target.id and t.outline == target.outline for t in world.targets)
 

@@ -255,8 +255,8 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
     pairs = pairs[robot[pairs[:, 0]] != robot[pairs[:, 1]]]
     s = np.concatenate(along)
     one, other = pairs.T
-    kept = _held(motion.passages, robot[one], s[one], robot[other], s[other])
-    kept = kept | _held(motion.passages, robot[other], s[other], robot[one], s[one])
+    kept = _is_held_back(motion.passages, robot[one], s[one], robot[other], s[other])
+    kept = kept | _is_held_back(motion.passages, robot[other], s[other], robot[one], s[one])
     ids = list(motion.paths)
     loose = sorted({(int(min(i, j)), int(max(i, j))) for i, j in robot[pairs[~kept]]})[:FINDINGS]
     return tuple(
@@ -272,7 +272,7 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
     )
 
 
-def _held(
+def _is_held_back(
     rows: Passages, waiting: Indices, at: FloatArray, first: Indices, past: FloatArray
 ) -> NDArray[np.bool_]:
     """Return whether a robot is held before a point until another has passed a point of its own.

@@ -28,7 +28,7 @@ class Following:
         self.ids = tuple(motion.paths)
         lengths = [arc_lengths(path) for path in motion.paths.values()]
         self.lengths = np.array([s[-1] for s in lengths])
-        kept = [_apart(s) for s in lengths]
+        kept = [_distinct_vertices(s) for s in lengths]
         sizes = np.array([len(rows) for rows in kept], dtype=np.intp)
         self._ends = np.cumsum(sizes)
         self._begins = self._ends - sizes
@@ -139,7 +139,7 @@ class Following:
         return np.clip(found, self._begins[rows] + 1, self._ends[rows] - 1)
 
 
-def _apart(lengths: FloatArray) -> Indices:
+def _distinct_vertices(lengths: FloatArray) -> Indices:
     """Return the vertices that are not where the one before is, and the last one.
 
     At the others, which repeat a place, robots do not turn.

@@ -66,9 +66,9 @@ class Matched:
         return np.array([*range(len(self.robots)), *self.aside], dtype=np.intp)
 
     @property
-    def circles(self) -> list[Indices]:
+    def cycles(self) -> list[Indices]:
         """Groups of paths each of which would have to be driven before the others."""
-        return circles(self.before, len(self.paths))
+        return cycles(self.before, len(self.paths))
 
 
 def match(
@@ -85,7 +85,7 @@ def match(
     return Matched(robots, paths, leaving, arriving, aside)
 
 
-def circles(before: Indices, count: int) -> list[Indices]:
+def cycles(before: Indices, count: int) -> list[Indices]:
     """Return the strongly connected components, of more than one node each, among `count` nodes."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -114,7 +114,7 @@ def ordered(before: Indices, lengths: Sequence[float]) -> list[int]:
     return order
 
 
-def matched_anew(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
+def rematched(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
     """Match interchangeable robots to other goals, where that leaves fewer demands in cycles.
 
     Args:
@@ -122,8 +122,8 @@ def matched_anew(found: Matched, starts: FloatArray, ways: Ways, apart: float) -
     """
     for _ in range(ROUNDS):
         better = found
-        for circle in found.circles:
-            goals = _by_order(better, circle)
+        for cycle in found.cycles:
+            goals = _by_order(better, cycle)
             better = _best(better, _exchanged(better, *goals, starts, ways, apart))
         if better is found:
             break
@@ -136,9 +136,9 @@ def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
     everyone, left = list(range(len(found.paths))), REROUTED
     for _ in range(ROUNDS):
         better = found
-        for circle in found.circles:
-            for i in map(int, circle):
-                for others in (everyone, [int(j) for j in circle]):
+        for cycle in found.cycles:
+            for i in map(int, cycle):
+                for others in (everyone, [int(j) for j in cycle]):
                     if len(others) > PARKED or not left:
                         continue
                     left -= 1
@@ -147,7 +147,7 @@ def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
                     if other is not None:
                         better = _best(better, other)
                         break
-        if better is found or not better.circles:
+        if better is found or not better.cycles:
             return better
         found = better
     return found
@@ -162,8 +162,8 @@ def stepped_aside(
         free: tells at which of some points, (k, 2), robots can wait, (k,).
     """
     tried: set[int] = set()
-    while found.circles:
-        inside = Counter(int(i) for circle in found.circles for i in circle)
+    while found.cycles:
+        inside = Counter(int(i) for cycle in found.cycles for i in cycle)
         demands = Counter(found.before.ravel().tolist())
         left = [i for i in inside if i < len(found.robots) and i not in {*tried, *found.aside}]
         if not left or len(tried) == ASIDE:
@@ -206,24 +206,24 @@ def _by_way_of(
 
 def _best(found: Matched, other: Matched | None) -> Matched:
     """Return the one that leaves fewer demands in cycles."""
-    return found if other is None or _worth(other) >= _worth(found) else other
+    return found if other is None or _cyclic_demands(other) >= _cyclic_demands(found) else other
 
 
-def _worth(found: Matched) -> int:
+def _cyclic_demands(found: Matched) -> int:
     """Return how many demands lie in cycles: the fewer the better."""
     number = np.full(len(found.paths), -1)
-    for k, circle in enumerate(found.circles):
-        number[circle] = k
+    for k, cycle in enumerate(found.cycles):
+        number[cycle] = k
     one, other = number[found.before].T
     return int(((one == other) & (one >= 0)).sum())
 
 
-def _by_order(found: Matched, circle: Indices) -> tuple[list[int], list[int]]:
+def _by_order(found: Matched, cycle: Indices) -> tuple[list[int], list[int]]:
     """Return the goals of a cycle in the order they are filled, and in the order robots leave.
 
     The first to leave takes the goal that is filled first, and so on.
     """
-    length = {i: float(arc_lengths(found.paths[i])[-1]) for i in map(int, circle)}
+    length = {i: float(arc_lengths(found.paths[i])[-1]) for i in map(int, cycle)}
     leaving = _sorted(found.leaving, length)
     filled = _sorted(found.arriving, {i: -way for i, way in length.items()})
     return filled, leaving
@@ -278,7 +278,7 @@ def _pairs_exchanged(found: Matched, starts: FloatArray, ways: Ways, apart: floa
     """Exchange the goals of pairs in cycles, wherever that leaves fewer demands in cycles."""
     tried: set[tuple[int, ...]] = set()
     while len(tried) < SWAPS:
-        inside = {int(i): k for k, circle in enumerate(found.circles) for i in circle}
+        inside = {int(i): k for k, cycle in enumerate(found.cycles) for i in cycle}
         pairs = (
             tuple(sorted(pair))
             for pair in found.before.tolist()

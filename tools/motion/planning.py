@@ -21,7 +21,7 @@ from .avoiding import routes_off
 from .cells import Cells, conflicts, cut
 from .checking import MotionVerdict, check_motion
 from .motion import Indices, Motion
-from .order import Matched, match, matched_anew, ordered, rerouted, stepped_aside
+from .order import Matched, match, ordered, rematched, rerouted, stepped_aside
 from .routes import NOBODY, union, way_lengths
 from .schedule import Near, NoTimeError, Schedule, passages, schedule
 
@@ -104,8 +104,8 @@ def plan_motion(
     """
     found, apart = _matched(team, goals, ground, interchangeable)
     ids = tuple(team.ids[int(i)] for i in found.robots)
-    if found.circles:
-        shut = found.owners[np.concatenate(found.circles)]
+    if found.cycles:
+        shut = found.owners[np.concatenate(found.cycles)]
         raise NoOrderError(list(dict.fromkeys(ids[int(i)] for i in shut)))
     cells, pairs = _cut(found, apart)
     lengths = cells.leave[cells.goals] - cells.enter[cells.starts]
@@ -173,12 +173,12 @@ def _matched(
         if apart == roomy < 2 * radius * EXACT:
             continue
         found = match(everyone, straight, apart)
-        if interchangeable and found.circles:
-            found = matched_anew(found, team.starts, ways, apart)
-        if found.circles and apart != roomy:
+        if interchangeable and found.cycles:
+            found = rematched(found, team.starts, ways, apart)
+        if found.cycles and apart != roomy:
             free = partial(_off, ground=ground, standing=standing, radius=radius, apart=apart)
             found = stepped_aside(rerouted(found, ways, apart), ways, apart, free)
-        if not found.circles:
+        if not found.cycles:
             break
     return found, apart
 
