@@ -34,9 +34,9 @@ from .session import (
     Show,
     TurnOptions,
     answered_by,
-    believed,
     end_facts,
     picture_facts,
+    with_confirmed_outline,
 )
 from .session_start import prompt_facts, start_facts
 from .store.folder import FolderLog
@@ -61,14 +61,14 @@ class Agent:
         base_url: of the server, for models given by name.
         prompt: `id@vNNN`, `id@draft-NAME`, or an id for its current version; None for the current
             version of the model's own.
-        library: where prompts are taken from; the shipped ones by default.
+        library: where prompts are taken from; those shipped with formup by default.
         planner: a second model, which makes the formation without seeing the picture; the first
             then only says what is meant. The prompt is the planner's.
         tools: what the model may call.
         system: a text in place of a prompt; the offline planner reads neither.
         limits: bounds of each run.
         policy: which calls go ahead, wait for a person, or are refused.
-        tracer: of OpenTelemetry; it is given spans of runs, replies and tools, and no texts.
+        tracer: an OpenTelemetry tracer, given spans of runs, replies and tools, but no texts.
         show_text: for models given by name; see `model_named`.
 
     Raises:
@@ -113,10 +113,10 @@ class Agent:
         self.offered = offered(self.tools, None if planner else self.prompt)
 
     def run(self, picture: Picture, instruction: str, **options: Unpack[RunOptions]) -> Run:
-        """Carry out one instruction; the synchronous door to `arun`.
+        """Carry out one instruction; the synchronous version of `arun`.
 
         Raises:
-            InputError: something given cannot be used.
+            InputError: an argument cannot be used.
         """
         return self._sync(self.arun(picture, instruction, **options))
 
@@ -134,24 +134,24 @@ class Agent:
         services: Services | None = None,
         show: Show | None = None,
     ) -> Run:
-        """Carry out one instruction on one picture: a session of one turn, that can go on.
+        """Carry out one instruction on one picture: a session of one turn, which can go on.
 
         Args:
-            picture: where.
-            instruction: what, in the person's words.
+            picture: the picture.
+            instruction: what to do, in the person's words.
             pointed: the things meant, if the person points.
-            targets: the things meant, where they are measured already.
+            targets: the things meant, if they are measured already.
             keep_out: what no robot may stand on or drive over.
             settings: what the person fixed.
-            trace: a file, or a new session of a store, to write to as it goes: it can be resumed
-                and replayed from there, by default in another process.
+            trace: a file, or a new session of a store, to write to as it goes: the run can be
+                resumed and replayed from there, also in another process.
             begun: how many events a session of a store has already, of which the first has the
                 `facts`.
             services: what tools use beside the world; made for the picture if left out.
-            show: is given every message as it comes.
+            show: called with every message as it comes.
 
         Raises:
-            InputError: something given cannot be used.
+            InputError: an argument cannot be used.
         """
         pointed = pointed_at(pointed, world := World.of(picture, targets=tuple(targets)))
         context = Context.of(picture, settings, world, services)
@@ -184,21 +184,21 @@ class Agent:
         """Begin a conversation about a picture: `session.say("...")`, turn after turn.
 
         Args:
-            picture: where.
+            picture: the picture.
             pointed: the things meant, t1 first, if the person points.
             keep_out: what no robot may enter.
             settings: what the person fixed.
-            stored: a new session of a store, to be written to.
+            stored: a new session of a store to write to.
             auto: whether simulated robots move as soon as a plan is certified, instead of at "go".
         """
         fixed, pointed, kept = settings or Settings(), tuple(pointed), tuple(keep_out)
         return Session(self, picture, fixed, pointed, kept, stored, auto)
 
     def say(self, run: Run, words: str, **options: Unpack[TurnOptions]) -> Run:
-        """The next turn of a session; the synchronous door to `asay`.
+        """Run the next turn of a session; the synchronous version of `asay`.
 
         Raises:
-            InputError: something given cannot be used.
+            InputError: an argument cannot be used.
         """
         return self._sync(self.asay(run, words, **options))
 
@@ -213,19 +213,19 @@ class Agent:
         picture: Picture | None = None,
         show: Show | None = None,
     ) -> Run:
-        """The next turn of a session: what the person says after a turn has ended.
+        """Run the next turn of a session: what the person says after a turn has ended.
 
         Args:
-            run: the session as it is; one that waits for an answer drops its question.
+            run: the session as it is; a question that it waits for is dropped.
             words: what the person says.
             pointed: the things meant, if the person points.
-            keep_out: what no robot may enter from now on, beside what there was.
-            settings: what the person fixes from now on; as before if left out, but for the number
-                of robots, their starts and approvals, which hold for one turn.
-            picture: another one from now on, which voids all plans.
+            keep_out: what no robot may enter from now on, in addition to what there was.
+            settings: what the person fixes from now on; if left out, as before except for the
+                number of robots, their starts and approvals, which hold for one turn.
+            picture: another picture from now on, which voids all plans.
 
         Raises:
-            InputError: something given cannot be used.
+            InputError: an argument cannot be used.
         """
         once: dict[str, Any] = {"robots": None, "starts": None}
         fixed = settings or run.context.settings.model_copy(update=once)
@@ -256,7 +256,7 @@ class Agent:
         approve: bool | None = None,
         show: Show | None = None,
     ) -> Run:
-        """Go on with a turn where it was left; the synchronous door to `aresume`.
+        """Go on with a turn where it was left; the synchronous version of `aresume`.
 
         Raises:
             InputError: the turn is over, or waits for something else.
@@ -274,11 +274,11 @@ class Agent:
         """Go on with a turn where it was left, here or, with `load_run`, in another process.
 
         Args:
-            run: one that waits for a person, was stopped, cancelled or killed; its log is written
-                on.
+            run: a run that waits for a person, or was stopped, cancelled or killed; its log is
+                continued.
             answer: to a question; "3" or "c3" is the third candidate. With a no, the reason.
             approve: a person's yes or no to the very call that waits, such as moving robots.
-            show: is given every new message as it comes, the person's first.
+            show: called with every new message as it comes, the person's first.
 
         Raises:
             InputError: the turn is over, or waits for something else.
@@ -294,7 +294,7 @@ class Agent:
                 fixed = context.settings.model_copy(update={"approved": plan_id})
                 context = replace(context, settings=fixed)
             if result is not None:
-                context = context.at(believed(context.world, messages, result))
+                context = context.at(with_confirmed_outline(context.world, messages, result))
                 await recorder.message(result, context.world)
                 messages = (*messages, result)
             left, spent = replace(run, context=context), run.report.usage.seconds
@@ -360,15 +360,15 @@ class Agent:
         return Run(report, outcome, context, left.began, left.stored, recorder.events)
 
     def check(self, settings: Settings) -> None:
-        """Refuse what a person fixed where the model cannot do it.
+        """Refuse settings that the model cannot meet.
 
         Raises:
-            InputError: its detector asks the model, which does not see.
+            InputError: their detector asks the model, which does not see.
         """
         check_sees(settings, self.model)
 
     def facts(self, picture: Picture, artefacts: Artefacts) -> dict[str, Any]:
-        """What a log begins with, enough to go on in another process."""
+        """Return the first event's data of a log, enough to go on in another process."""
         return start_facts(self, picture_facts(picture, artefacts))
 
     async def aclose(self) -> None:
@@ -378,7 +378,7 @@ class Agent:
             await close()
 
     def _sync(self, run: Coroutine[Any, Any, Run]) -> Run:
-        """A run with an event loop of its own: connections cannot outlive it."""
+        """Run in an event loop of its own and close the connections, which cannot outlive it."""
 
         async def closing() -> Run:
             try:

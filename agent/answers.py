@@ -1,4 +1,4 @@
-"""A person's plain yes, which makes a doubtful outline the one meant, for every model alike."""
+"""Recognises a person's plain yes, which confirms a doubtful outline whichever model decides."""
 
 import re
 
@@ -10,5 +10,5 @@ YES = re.compile(
 
 
 def says_yes(answer: str) -> bool:
-    """Whether an answer is a yes and nothing else: "yes", "ok, that's it", no "the right one"."""
+    """Return whether an answer is just a yes, as "ok, that's it" is and "the right one" is not."""
     return YES.fullmatch(answer.strip()) is not None

@@ -1,6 +1,6 @@
 """A person's yes to exactly one call, given from outside the turn that waits for it.
 
-Whoever is shown what waits is given a nonce, which no model sees. It is kept as a file of the
+Whoever is shown what waits is given a nonce, which no model sees. It is stored as a file of the
 session, so that any process can check it; it is void as soon as the session has gone on.
 """
 
@@ -21,7 +21,7 @@ class Waiting:
 
     Attributes:
         plan_id: the plan it is for; None where it moves nothing.
-        nonce: what the yes has to name.
+        nonce: what the yes has to quote.
         message: what the person is asked.
     """
 
@@ -31,7 +31,7 @@ class Waiting:
 
 
 def waiting(run: Run | None) -> Waiting | None:
-    """The call that waits for a yes, with a new nonce; None where none does."""
+    """Return the call that waits for a yes, with a new nonce, or None."""
     if not is_waiting(run) or run is None or run.stored is None:
         return None
     nonce = secrets.token_urlsafe(16)
@@ -42,7 +42,7 @@ def waiting(run: Run | None) -> Waiting | None:
 
 
 def check_nonce(run: Run | None, plan_id: str, nonce: str) -> None:
-    """Refuse a yes that is not to what waits now.
+    """Refuse a yes to anything but the call that waits now.
 
     Raises:
         InputError: nothing waits, another plan does, or the nonce is not one for it (`approval`).
@@ -62,13 +62,13 @@ def check_nonce(run: Run | None, plan_id: str, nonce: str) -> None:
 
 
 def is_waiting(run: Run | None) -> bool:
-    """Whether a call waits for a person's yes."""
+    """Return whether a call waits for a person's yes."""
     outcome = None if run is None else run.outcome
     return isinstance(outcome, Paused) and outcome.call.name != "ask_user"
 
 
 def _content(run: Run, nonce: str) -> bytes:
-    """What a yes is bound to: the session as far as it has come, the plan, the exact arguments."""
+    """Return what a yes is bound to: the session so far, the plan, the exact call, the nonce."""
     outcome = run.outcome
     assert isinstance(outcome, Paused) and run.stored is not None
     call = outcome.call

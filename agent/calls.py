@@ -1,6 +1,6 @@
-"""One call answered: what the model got wrong comes back to it as a result it can act on.
+"""Answers one call: what the model got wrong comes back to it as a result it can act on.
 
-A tool returns the next world, which the loop puts in place: one that hangs, breaks or is
+A tool returns the next world, which the loop puts in place, so one that hangs, breaks or is
 interrupted has changed nothing but what it had observed by then.
 """
 
@@ -17,16 +17,16 @@ from ..tools.world import World
 from .messages import Call, ErrorKind, Result
 
 SLOTS = max(8, 2 * (os.cpu_count() or 1))
-"""Tools that work at a time: more at once are no faster, but take memory and each other's time."""
+"""Most tools that work at a time: more are no faster, but take memory and each other's time."""
 _slots: WeakKeyDictionary[asyncio.AbstractEventLoop, asyncio.Semaphore] = WeakKeyDictionary()
 
 
 class BrokenToolError(Exception):
-    """A tool raised what no tool should; its cause is that exception."""
+    """A tool raised an exception that no tool should raise, which is the cause of this one."""
 
 
 def tool_named(tools: tuple[Tool, ...], name: str) -> Tool | None:
-    """The tool a call means."""
+    """Return the tool of a name, or None."""
     return next((tool for tool in tools if tool.name == name), None)
 
 
@@ -36,15 +36,14 @@ async def answer(
     call: Call,
     seconds: float | None,
 ) -> Result:
-    """Run one call.
+    """Run one call and return its result.
 
     Args:
         context: its `observed` is given the next world.
-        seconds: how long the tool may take; None is as long as it likes. Robots that drive are
-            not bound by it.
+        seconds: how long the tool may take; None is no limit. Tools that drive robots are exempt.
 
     Raises:
-        BrokenToolError: the tool has a mistake in it.
+        BrokenToolError: the tool has a bug.
         FleetError: robots failed, or what they do is not known.
         InputError: something the person fixed cannot be used.
     """
@@ -88,26 +87,26 @@ def _unknown(call: Call, tools: tuple[Tool, ...]) -> str:
 
 
 def _start(clock: asyncio.Timeout, seconds: float | None) -> None:
-    """Let a clock run from now on."""
+    """Let a clock run for so many seconds from now on, unless that is None."""
     if seconds is not None:
         clock.reschedule(asyncio.get_running_loop().time() + seconds)
 
 
 def _slot(tool: Tool) -> AbstractAsyncContextManager[None]:
-    """Waits for a place among the tools that work; robots that drive want none."""
+    """Return what waits for a place among working tools; driving and asking need none."""
     if tool.kind in ("actuate", "ask"):
         return nullcontext()
     return _slots.setdefault(asyncio.get_running_loop(), asyncio.Semaphore(SLOTS))
 
 
 def _plan_made(before: World, after: World) -> str | None:
-    """The id of the plan that a call has made the current one."""
+    """Return the id of the plan that a call has made, or None."""
     name = next(reversed(after.plans), "")
     return name if after.plans.get(name) is not before.plans.get(name) else None
 
 
 def failed(call: Call, kind: ErrorKind, text: str, error: ToolError | None = None) -> Result:
-    """The answer to a call that came to nothing."""
+    """Return the result of a call that failed."""
     result = Result(call_id=call.id, name=call.name, text=text, error=kind)
     if error is None:
         return result
@@ -116,12 +115,12 @@ def failed(call: Call, kind: ErrorKind, text: str, error: ToolError | None = Non
 
 
 def refused(call: Call, why: str) -> Result:
-    """The answer to a call that may not be made."""
+    """Return the result of a call that may not be made."""
     return failed(call, "refused", why)
 
 
 def _where(tool: Tool, error: Exception) -> str:
-    """One sentence for whoever wrote the tool."""
+    """Return one sentence for whoever wrote the tool: what it raised, and where."""
     last = traceback.extract_tb(error.__traceback__)[-1]
     raised = " ".join(f"{type(error).__name__}: {error}".split())
     return f"The tool {tool.name} broke ({raised}) at line {last.lineno} of {last.filename}."

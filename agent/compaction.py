@@ -1,8 +1,8 @@
-"""What of a long conversation a model is sent, so that its requests stay bounded.
+"""Shortens a long conversation for the model, so that its requests stay bounded.
 
-The last turns go whole; of earlier ones what was asked and what came of it; of most only that they
-were. It changes in steps, between which a request only extends the one before: caches of providers
-hold. What stands now, the contract among it, is in each turn's first message and so never lost.
+The last turns are sent whole, earlier ones as request and outcome, most only as a count. This
+changes in steps, between which a request only extends the one before, so provider caches hold. The
+current plan and its contract are in each turn's first message, and so never lost.
 """
 
 import json
@@ -12,21 +12,21 @@ from typing import Any
 from .messages import History, Message, Reply, Result, User
 
 STEP = 4
-"""Turns after which older ones are shortened."""
+"""Number of turns after which older ones are shortened."""
 WHOLE = 4
-"""The last turns that are always sent; all of the last two, the others without pictures and with
-the beginnings of long results once a step has passed."""
+"""How many last turns are always sent: the last two in full, and once a step has passed the others
+without pictures and with long results cut short."""
 OUTLINED = 8
-"""Turns before those of which it is told what was asked and what came of it, beside the first."""
+"""How many turns before those are sent as request and outcome, as is the very first one."""
 LONGEST_RESULT, LONGEST_TEXT, LONGEST_WORDS = 400, 300, 200
-"""Characters that are kept of a result, of what was told, and of what was said."""
+"""Most characters sent of a result, of the answer to the person, and of the person's words."""
 
 
 def compacted(history: History) -> History:
-    """The conversation as a model is sent it.
+    """Return the conversation as it is sent to a model.
 
     Args:
-        history: all of it; its last turn is kept to the letter.
+        history: the whole conversation; its last turn stays exactly as it is.
     """
     turns = _turns_of(history)
     passed = max(0, (len(turns) - WHOLE) // STEP * STEP)
@@ -47,7 +47,7 @@ def compacted(history: History) -> History:
 
 
 def _turns_of(history: History) -> list[list[Message]]:
-    """The messages by turns, each of which the person's message began."""
+    """Return the messages by turns, each of which begins with a message of the person."""
     turns: list[list[Message]] = [[]]
     for message in history:
         if isinstance(message, User) and turns[-1]:
@@ -57,12 +57,12 @@ def _turns_of(history: History) -> list[list[Message]]:
 
 
 def _pictures(turn: Sequence[Message]) -> tuple[bytes, ...]:
-    """What the person's message shows: the picture the conversation is about."""
+    """Return the images of the person's message: the picture the conversation is about."""
     return turn[0].images if turn and isinstance(turn[0], User) else ()
 
 
 def _thinned(turn: Sequence[Message], pictures: tuple[bytes, ...]) -> list[Message]:
-    """A turn without what its results showed, and with the beginnings of long ones."""
+    """Return a turn with long results cut short, and no images but `pictures` at its start."""
     made: list[Message] = []
     for message in turn:
         if isinstance(message, Result):
@@ -75,7 +75,7 @@ def _thinned(turn: Sequence[Message], pictures: tuple[bytes, ...]) -> list[Messa
 
 
 def _outlined(turn: Sequence[Message], pictures: tuple[bytes, ...]) -> list[Message]:
-    """What was asked in a turn, and what came of it."""
+    """Return a turn as two messages: what was asked, and what came of it."""
     calls = {c.id: c for m in turn if isinstance(m, Reply) for c in m.calls}
     asked = [_words(m.text) for m in turn if isinstance(m, User)]
     told, plan = "", None
@@ -95,13 +95,13 @@ def _outlined(turn: Sequence[Message], pictures: tuple[bytes, ...]) -> list[Mess
 
 
 def _followed_by(message: Message, turns: int) -> Message:
-    """What came of the first turn, with how many after it are left out."""
+    """Return a message with a note on how many turns after it are left out."""
     text = f"{message.text}\n[{turns} later turns are left out here; undo reaches their plans.]"
     return message.model_copy(update={"text": text})
 
 
 def _words(text: str) -> str:
-    """What the person said, of a turn's first message."""
+    """Return the person's words from a turn's first message."""
     lines = text.split("\n")
     return _cut(next((s for s in lines if s.startswith("Instruction: ")), text), LONGEST_WORDS)
 

@@ -1,6 +1,6 @@
 """Sessions for others to read: a page with pictures, JSON, or the folder that `formup trace` reads.
 
-All of it comes from the events; keys are in none of them.
+All of it comes from the events, none of which holds a key.
 """
 
 import io
@@ -27,7 +27,7 @@ FORMAT = "formup-export-1"
 
 
 def export_folder(session: StoredSession, folder: Path) -> Path:
-    """Write a session as a run folder; its log.
+    """Write a session as a run folder and return the path of its log.
 
     Raises:
         StorageError: there is a session already, or it cannot be read or written.
@@ -39,7 +39,9 @@ def export_folder(session: StoredSession, folder: Path) -> Path:
 
 
 def export_json(session: StoredSession, folder: Path) -> Path:
-    """Write all events of a session as one JSON object; pictures are named by their hash.
+    """Write all events of a session as one JSON object and return its path.
+
+    Pictures are named by their hash.
 
     Raises:
         StorageError: there is a file already, or it cannot be read or written.
@@ -55,7 +57,9 @@ def export_json(session: StoredSession, folder: Path) -> Path:
 
 
 def export_page(session: StoredSession, folder: Path) -> Path:
-    """Write what was said and what came of it as Markdown, with a picture of each new plan.
+    """Write what was said and what came of it as Markdown and return the page's path.
+
+    There is a picture of each new plan.
 
     Raises:
         StorageError: there is a page already, or it cannot be read or written.
@@ -95,7 +99,7 @@ def _after(world: World, turn: Sequence[Event]) -> World:
 
 
 def _asked_and_answered(turn: Sequence[Event]) -> Iterator[str]:
-    """Questions of the turn that were answered, with the answers."""
+    """Yield lines with the questions of a turn that were answered, and the answers."""
     messages = [event.data for event in turn if event.kind == "message"]
     calls = {c["id"]: c for m in messages for c in m.get("calls", ())}
     for message in messages:
@@ -117,14 +121,14 @@ def _plan_png(picture: Picture, world: World, title: str) -> bytes:
 
 
 def _picture_lines(folder: Path, name: str, data: bytes) -> list[str]:
-    """A picture beside the page, and the lines that show it."""
+    """Write a picture beside the page and return the lines that show it."""
     path = f"{PICTURES}/{name}.{suffix_of(data)}"
     write_whole(folder / path, data)
     return [f"![{name}]({path})", ""]
 
 
 def _escaped(text: str) -> str:
-    """A text as one line in which nothing means anything to Markdown."""
+    """Return a text as one line, with every character escaped that Markdown interprets."""
     return re.sub(r"([\\`*_{}\[\]<>#|&])", r"\\\1", " ".join(text.split()))
 
 

@@ -1,7 +1,7 @@
-"""What happens in a session, told to any number of subscribers while it is written.
+"""Sends what happens in a session to any number of subscribers as it is written.
 
-Events come in order and without gaps, from whatever number a subscriber has seen; poses are the
-latest alone, so that a slow subscriber holds up nobody, least of all robots.
+Events come in order and without gaps, from whatever number a subscriber has seen; of poses only
+the latest are sent, so a slow subscriber holds up nobody, least of all robots.
 """
 
 import asyncio
@@ -22,15 +22,15 @@ from .store.protocol import Event, EventKind, EventLog, StoredSession
 from .turns import Turn
 
 MOST_KEPT = 256
-"""Events kept in memory for subscribers that follow closely; the others are read from the store."""
+"""Events held in memory for subscribers that follow closely; others are read from the store."""
 POLL = 1.0
-"""Seconds after which a feed looks whether another process has gone on with the session."""
+"""Seconds between looks at whether another process has gone on with the session."""
 STAMPED = ("turn", "resume")
-"""Events that say who asked for them."""
+"""Kinds of events that record who asked for them."""
 
 
 def _shown_by_fleet(poses: tuple[Pose, ...], moved: Rigid | None = None, /) -> None:
-    """Nothing more to do: `Feed.moved` is given the poses."""
+    """Do nothing: the poses are passed to `Feed.moved` as well."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Poses:
     """Where all robots of the fleet were seen last.
 
     Attributes:
-        number: of the observation, from 1; those between were skipped.
+        number: of the observation, from 1; a subscriber may skip some.
     """
 
     number: int
@@ -49,16 +49,16 @@ class Feed:
     """What happens in one session.
 
     Args:
-        stored: where it is written.
-        events: those that there are.
+        stored: the session in its store.
+        events: the events it has so far.
 
     Attributes:
         last: the number of the last event.
-        loop: that subscribers and turns run in; None before any do.
-        turn: the turn that is under way in this process, or was last.
-        followers: how many subscribe.
+        loop: event loop of subscribers and turns; None before there are any.
+        turn: the turn that is under way in this process, or the last one.
+        followers: how many subscribers there are.
         watching: how many of them watch the robots.
-        keys: digest and number of each turn that was asked for, by the key it was asked under.
+        keys: digest and event number of each turn that was asked for under a key, by that key.
     """
 
     def __init__(self, stored: StoredSession, events: Sequence[Event]) -> None:
@@ -75,7 +75,7 @@ class Feed:
             self.publish(event)
 
     def publish(self, event: Event) -> None:
-        """Tell an event that was written, in whichever thread."""
+        """Send out an event that was written; may be called from any thread."""
         if self.loop is None or self.loop is running_loop():
             self._publish(event)
         else:
@@ -92,18 +92,18 @@ class Feed:
             self._wake()
 
     def moved(self, poses: tuple[Pose, ...]) -> None:
-        """Tell where robots are."""
+        """Send out where robots are."""
         self._poses = Poses(self._poses.number + 1, poses)
         self._wake()
 
     def end(self) -> None:
-        """End all subscriptions, after what has happened is told."""
+        """End all subscriptions once they have yielded what has happened so far."""
         self._ended = True
         self._wake()
 
     @contextmanager
     def view(self, context: Context, plan: Plan, fleet: Fleet) -> Generator[Shown]:
-        """Simulated robots drive in real time while anybody watches; see `Services.view`."""
+        """Let simulated robots drive in real time if anybody watches; see `Services.view`."""
         pace = pace_of(fleet) if self.watching else None
         if pace is None or pace.speed is not None:
             yield _shown_by_fleet
@@ -117,7 +117,7 @@ class Feed:
     async def subscribe(
         self, after: int = 0, *, watching: bool = False
     ) -> AsyncGenerator[Event | Poses]:
-        """What happens, from an event's number on.
+        """Yield events as they are written, from a number on, and the latest poses.
 
         Args:
             after: the number of the last event that the subscriber has seen.
@@ -155,7 +155,7 @@ class Feed:
                 await self._look()
 
     async def _since(self, after: int) -> tuple[Event, ...]:
-        """The events with greater numbers."""
+        """Return the events with greater numbers."""
         if after >= self.last:
             return ()
         if self._kept and self._kept[0].number <= after + 1:
@@ -163,7 +163,7 @@ class Feed:
         return await asyncio.to_thread(self.stored.events, after)
 
     async def _look(self) -> None:
-        """Find what another process has written; one subscriber looks for all."""
+        """Publish what another process has written; one subscriber looks for all."""
         if time.monotonic() - self._looked >= POLL:
             self._looked = time.monotonic()
             try:
@@ -180,7 +180,7 @@ class Feed:
 
 
 def running_loop() -> asyncio.AbstractEventLoop | None:
-    """The event loop that runs in this thread, if one does."""
+    """Return the event loop that runs in this thread, or None."""
     try:
         return asyncio.get_running_loop()
     except RuntimeError:
@@ -188,7 +188,7 @@ def running_loop() -> asyncio.AbstractEventLoop | None:
 
 
 class FedSession:
-    """A stored session whose feed tells what is written."""
+    """A stored session whose feed sends out what is written."""
 
     def __init__(self, stored: StoredSession, feed: Feed) -> None:
         self._stored, self._feed = stored, feed

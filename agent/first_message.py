@@ -1,4 +1,4 @@
-"""What the person asks for, as the first message of a turn: lines a model can read."""
+"""The first message of a turn: what the person asks for, as lines that a model can read."""
 
 import json
 from collections.abc import Sequence
@@ -17,13 +17,13 @@ from ..tools.world import Target, World, to_json_values
 from .messages import History, User
 
 MOST_NUMBERED = 40
-"""Candidates in the first picture."""
+"""Most candidates that are numbered in the first picture."""
 
 
 MOST_PAST = 12
-"""Plans to go back to that a turn is told of."""
+"""Most earlier plans, which undo can go back to, in a turn's first message."""
 MAX_TEXT = 4_000
-"""Characters of what a person says; longer texts are no instruction, and cost their reader."""
+"""Most characters of what a person says; longer texts are no instruction, and costly to read."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class Task:
     """The facts of a turn's first message.
 
     Attributes:
-        robots: how many, or None where the person left it to the words.
+        robots: how many, or None if the person fixed no number beside the instruction.
         pointed: what the person pointed at, as arguments of propose_formation's `targets`.
         targets: ids of targets that were measured before the conversation began.
-        deploy: whether robots shall move once the plan is certified.
-        metres_per_pixel: of the picture; None where it has no scale.
-        standing: of a later turn, the plan that stands and what led to it, see `standing`.
-        size: of the picture, px.
-        nouns: whether things can be found by what they are.
+        deploy: whether robots are to move once the plan is certified.
+        metres_per_pixel: scale of the picture; None if it has none.
+        standing: in a later turn, the current plan and what led to it; see `standing`.
+        size: width and height of the picture, px.
+        nouns: whether things can be found by nouns.
     """
 
     instruction: str
@@ -53,13 +53,13 @@ class Task:
 
 
 def first_message(context: Context, before: History, *, seen: bool, fresh: bool = False) -> User:
-    """What is asked, and for a model that sees the picture it is asked about.
+    """Return what is asked, with the picture for a model that sees and was not shown it yet.
 
     Args:
         context: with the person's words and the picture.
         before: the conversation so far, in which the picture has been shown.
         seen: whether the model sees.
-        fresh: whether the picture is another than before.
+        fresh: whether the picture is a new one.
     """
     if not seen or (before and not fresh):
         return User(text=task_text(context, follows=bool(before)))
@@ -72,7 +72,7 @@ def first_message(context: Context, before: History, *, seen: bool, fresh: bool 
 
 
 def task_text(context: Context, how: str = "", *, follows: bool = False) -> str:
-    """A turn's first message: one fact a line, the person's words quoted so that they stay one."""
+    """Return a turn's first message: one fact per line, the person's words quoted to fit on one."""
     settings, world = context.settings, context.world
     picture, scale = world.picture, world.metres_per_pixel
     pointed = [p.brief for p in world.pointed]
@@ -91,7 +91,7 @@ def task_text(context: Context, how: str = "", *, follows: bool = False) -> str:
 
 
 def standing(context: Context) -> dict[str, Any] | None:
-    """The plan that stands, in short: all that a follow-up can refer to. None where there is none.
+    """Return the current plan in short, all that a follow-up can refer to, or None without one.
 
     `last` is what made it: the person's words and, if it was a change, the edits; `undo` and `redo`
     are how many steps there are back and forward.
@@ -119,7 +119,7 @@ def standing(context: Context) -> dict[str, Any] | None:
 
 
 def _past(context: Context, back: int) -> list[tuple[list[str], int]]:
-    """Of the plans that undo goes back to, latest first: arrangements, and how many robots."""
+    """Return arrangements and number of robots of the plans undo goes back to, latest first."""
     steps = context.steps[max(back - MOST_PAST, 0) : max(back, 0)]
     names = [step.current for step in reversed(steps)]
     contracts = [context.world.plans[n].plan.formation.contract for n in names if n]
@@ -127,13 +127,13 @@ def _past(context: Context, back: int) -> list[tuple[list[str], int]]:
 
 
 def _form(group: Group) -> str:
-    """What a group is called: a drawn circle stands around its thing as well."""
+    """Return a group's arrangement; a drawn circle counts as `around` its thing."""
     circle = group.shape is not None and group.shape.kind == "circle"
     return "around" if circle else group.relation
 
 
 def _rounded(value: Any) -> Any:
-    """JSON with its numbers as exact as a model needs them."""
+    """Return a JSON value with numbers rounded to what a model needs."""
     if isinstance(value, float):
         return round(value, 1) if abs(value) >= 1 else round(value, 4)
     if isinstance(value, dict):
@@ -144,10 +144,10 @@ def _rounded(value: Any) -> Any:
 
 
 def read_task(text: str) -> Task:
-    """The facts of a message written by `task_text`.
+    """Return the facts of a message written by `task_text`.
 
     Raises:
-        ValueError: it was not.
+        ValueError: `task_text` did not write it.
     """
     facts = {
         name: json.loads(value)
@@ -173,11 +173,11 @@ def _size(words: str) -> tuple[int, int]:
 
 
 MOVED_SHARE = 0.1
-"""By so much of its longer side a thing may have moved in another picture to be found again."""
+"""How far a thing may have moved in another picture to be found: a share of its longer side."""
 
 
 def in_new_picture(context: Context, picture: Picture) -> Context:
-    """The context with another picture: what was measured is pointed at, where it was before."""
+    """Return the context with another picture, in which targets are pointed at where they were."""
     context.services.pictures[picture.sha256] = picture
     world = World.of(picture)
     made = context.world.having(
@@ -195,7 +195,7 @@ def in_new_picture(context: Context, picture: Picture) -> Context:
 
 
 def _where_it_was(target: Target, size: tuple[int, int]) -> TargetPrompt:
-    """A box around a target and what it may have moved by."""
+    """Return a prompt with a box around a target, widened by what it may have moved."""
     x0, y0, x1, y1 = target.box
     more = MOVED_SHARE * max(x1 - x0, y1 - y0)
     last = size[0] - 1, size[1] - 1
@@ -204,7 +204,7 @@ def _where_it_was(target: Target, size: tuple[int, int]) -> TargetPrompt:
 
 
 def pointed_at(pointed: Sequence[TargetPrompt], world: World) -> list[TargetPrompt]:
-    """What is pointed at in a later turn: other things than the targets there are.
+    """Return what is pointed at in a later turn, with ids other than those of existing targets.
 
     What was pointed at before and is not measured yet is still meant.
     """
@@ -221,10 +221,10 @@ def pointed_at(pointed: Sequence[TargetPrompt], world: World) -> list[TargetProm
 
 
 def check_turn(context: Context, words: str, pointed: Sequence[TargetPrompt]) -> None:
-    """Refuse what cannot be carried out before anything is written down.
+    """Refuse what cannot be carried out, before anything is recorded.
 
     Raises:
-        InputError: no words, a number of robots that cannot be, or a thing that is not there.
+        InputError: no words, an impossible number of robots, or a thing that is not there.
     """
     check_text("instruction", words, 'say what to do, such as "Surround the car at the corners"')
     robots = context.settings.robots
@@ -242,10 +242,10 @@ def check_turn(context: Context, words: str, pointed: Sequence[TargetPrompt]) ->
 
 
 def check_text(name: str, text: str, advice: str) -> None:
-    """Refuse what a person says where nobody could read it.
+    """Refuse a person's text that nobody could read.
 
     Raises:
-        InputError: empty, no text, or far too long.
+        InputError: the text is empty, not UTF-8, or far too long.
     """
     if not text.strip():
         raise InputError(f"The {name} is empty; {advice}.")

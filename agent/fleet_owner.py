@@ -1,4 +1,4 @@
-"""One process at a time has a real fleet, and all its conversations the same one."""
+"""Lets one process at a time have a real fleet, shared by all conversations of that process."""
 
 import asyncio
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from .conversation import stop_all
 from .store.protocol import PROCESS, Store
 
 TRIES, PAUSE = 20, 0.05
-"""How often a fleet is asked for that another process opens, and seconds between."""
+"""How often to try for a fleet that another process is opening, and seconds between tries."""
 
 
 class FleetOwner:
@@ -23,15 +23,16 @@ class FleetOwner:
         self._simulated: set[str] = set()
 
     async def claim(self, name: str, opened: Callable[[], Fleet]) -> Fleet:
-        """The fleet of a name: the real one there is, else one that is opened now.
+        """Return the fleet of a name: the real one that is open, else one that is opened now.
 
-        What is not known to be simulated is opened under its lock: no two drive one hardware. A
-        database that was restarted has lost the lock, which is then taken again.
+        A fleet that is not known to be simulated is opened under its lock, so that no two processes
+        drive the same hardware. A database that was restarted has lost the lock, which is then
+        taken again.
 
         Raises:
             FleetBusyError: another process has it.
         """
-        who, locked = "", f"fleet.{quote(name, safe='')}"  # a file's name has slashes
+        who, locked = "", f"fleet.{quote(name, safe='')}"  # a fleet's name may be a path
         for _ in range(TRIES):
             if name in self._simulated:
                 return opened()
@@ -41,8 +42,8 @@ class FleetOwner:
                 return mine
             lock = await to_its_end(lambda: self._store.lock(locked))
             if lock is None and mine is not None and not who:
-                return mine  # Windows reads no locked file
-            if lock is None:  # perhaps just for as long as a simulated one is opened
+                return mine  # the holder is unknown: Windows cannot read a locked file
+            if lock is None:  # perhaps only while a simulated fleet is opened
                 await asyncio.sleep(PAUSE)
                 continue
             with lock:
@@ -62,7 +63,7 @@ class FleetOwner:
         await stop_all(self._fleets.values())
 
     async def close(self) -> None:
-        """Hold the robots and let go of them."""
+        """Close all fleets, which holds their robots, and release the locks."""
         for fleet in self._fleets.values():
             await fleet.close()
         self._fleets.clear()

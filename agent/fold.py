@@ -1,4 +1,4 @@
-"""What folds out of the events of a log: messages, world, settings, and the steps undo takes."""
+"""Folds the events of a log into its state: messages, world, settings, and the steps of undo."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ GOES_ON = ("turn", "resume", "message")
 
 @dataclass(frozen=True)
 class State:
-    """What folds out of the events of a log.
+    """The state that the events of a log fold into.
 
     Attributes:
         facts: what the session began with: model, prompts, limits, policy, picture.
-        words: of the last turn.
+        words: the person's words in the last turn.
         began: the world when that turn began.
-        steps: those that undo went through then.
-        seconds: how long that turn has run, pauses aside.
-        end: how it ended; None where it was killed.
+        steps: the steps that undo went through at that time.
+        seconds: how long that turn has run, without pauses.
+        end: how it ended; None if it was killed.
     """
 
     facts: Mapping[str, Any]
@@ -40,12 +40,12 @@ class State:
 
 
 def stepped(steps: tuple[Step, ...], before: int, step: Step, undone: int) -> tuple[Step, ...]:
-    """The steps undo goes through, after a turn; one that took steps back adds none.
+    """Return the steps that undo goes through after a turn; one that took steps back adds none.
 
     Args:
         before: how many steps were taken back when the turn began.
-        step: at its end.
-        undone: how many steps were taken back then.
+        step: the step at the turn's end.
+        undone: how many steps were taken back at the turn's end.
     """
     if undone or step.current in (None, steps[-1].current):
         return steps
@@ -53,11 +53,11 @@ def stepped(steps: tuple[Step, ...], before: int, step: Step, undone: int) -> tu
 
 
 def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
-    """The state after all events.
+    """Return the state after all events.
 
     Raises:
-        InputError: nothing was said, or a picture of a message is missing.
-        ValidationError, KeyError, TypeError, ValueError: they are damaged.
+        InputError: nothing was said, a picture of a message is missing, or plans were altered.
+        ValidationError, KeyError, TypeError, ValueError: the events are damaged.
     """
     facts = events[0].data
     start = World.model_validate({"picture": facts["picture"]["facts"]})
@@ -90,7 +90,7 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     began, steps = _steps_before(start, turns)
     world = with_changes(began, *turns[-1])
     latest = [name for name in (world.current, *list(world.plans)[-1:]) if name]
-    if any(world.plans[name].plan.id != name for name in latest):  # others as they are used
+    if any(world.plans[name].plan.id != name for name in latest):  # others are checked when used
         raise InputError("Its plans were altered after formup wrote them; make them again.")
     messages = paired(read_messages(lines, artefacts))
     return State(facts, settings, said["words"], world, began, steps, messages, seconds + last, end)
@@ -99,9 +99,9 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
 def _steps_before(
     start: World, turns: Sequence[Sequence[Mapping[str, Any]]]
 ) -> tuple[World, tuple[Step, ...]]:
-    """The world when the last turn began, and the steps undo went through then.
+    """Return the world when the last turn began, and the steps that undo went through then.
 
-    The first step is what was there with the first words, before anything was planned.
+    The first step is what there was at the first words, before anything was planned.
     """
     said, *rest = turns[0][:1], turns[0][1:], *turns[1:]
     began, ends = after_turns(start, [said, *rest[:-1]])
@@ -113,7 +113,7 @@ def _steps_before(
 
 
 def _begun(events: Sequence[Event]) -> Sequence[Event]:
-    """The events but for turns that were broken off before their first message."""
+    """Return the events without turns that were broken off before their first message."""
     kept: list[Event] = []
     turn: int | None = None
     for event in events:
@@ -128,11 +128,11 @@ def _begun(events: Sequence[Event]) -> Sequence[Event]:
 
 
 def read_messages(lines: Sequence[Mapping[str, Any]], artefacts: Artefacts | None) -> History:
-    """Messages from the data of their events; without artefacts their images are left out.
+    """Return messages from the data of their events; without artefacts images are left out.
 
     Raises:
         StorageError: an image is missing, or not what it was.
-        ValidationError: they are no messages.
+        ValidationError: the data are no messages.
     """
     found: list[dict[str, Any]] = []
     for line in lines:

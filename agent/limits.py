@@ -1,4 +1,4 @@
-"""Bounds of a turn. Reaching one is an outcome like any other: the messages are all there."""
+"""Limits of a turn. Reaching one is an outcome like any other, with all messages in it."""
 
 from dataclasses import dataclass, fields
 
@@ -12,23 +12,23 @@ from .messages import History, Result, replies_of, turn_of
 class Limits:
     """What a turn may use; None is no limit.
 
-    Tokens and cost are checked before each request, so that the last one may go over; seconds
-    count from where the turn was begun or resumed, and stand still while robots drive.
+    Tokens and cost are checked before each request, so the last one may exceed them; seconds
+    count from when the turn was begun or resumed, and the clock stops while robots drive.
 
     Attributes:
-        requests: to the model.
-        tool_calls: all tools together, checked before each call.
-        tokens: input and output together.
-        cost_usd: as far as prices are known.
-        seconds: wall time; what runs then is interrupted.
-        tool_seconds: of one tool call; robots that drive are not bound by it.
-        reply_seconds: of one reply of the model, from the request to its end.
+        requests: requests to the model.
+        tool_calls: calls of all tools together, checked before each call.
+        tokens: input and output tokens together.
+        cost_usd: cost, as far as prices are known.
+        seconds: wall time; what is running when it is up is interrupted.
+        tool_seconds: wall time of one tool call; tools that drive robots are exempt.
+        reply_seconds: wall time of one model reply, from the request to its end.
 
     Raises:
-        InputError: one that is not above 0.
+        InputError: a limit is not above 0.
     """
 
-    __pydantic_config__ = ConfigDict(extra="forbid")  # where they are read from a log
+    __pydantic_config__ = ConfigDict(extra="forbid")  # for limits read from a log
 
     requests: int | None = 20
     tool_calls: int | None = 60
@@ -49,7 +49,7 @@ DEFAULT_LIMITS = Limits()
 
 
 def exhausted(history: History, limits: Limits) -> str | None:
-    """The limit that the last turn has reached, as a sentence."""
+    """Return the limit that the last turn has reached as a sentence, or None."""
     replies = replies_of(turn_of(history))
     if limits.requests is not None and len(replies) >= limits.requests:
         return f"The limit of {_counted(limits.requests, 'request')} was reached."
@@ -67,7 +67,7 @@ def exhausted(history: History, limits: Limits) -> str | None:
 
 
 def calls_exhausted(history: History, limits: Limits) -> str | None:
-    """The limit of tool calls, as a sentence, once it has been reached."""
+    """Return the limit of tool calls as a sentence if it has been reached, else None."""
     if limits.tool_calls is None:
         return None
     if sum(isinstance(m, Result) for m in turn_of(history)) < limits.tool_calls:

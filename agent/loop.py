@@ -18,9 +18,9 @@ from .messages import (
     Message,
     Reply,
     Result,
-    doubts_told,
     failed_before,
     is_repeated,
+    known_doubts,
     plan_of_reply,
     unanswered,
 )
@@ -33,13 +33,13 @@ ANYTHING = Policy()
 
 
 class Recorder:
-    """Is given what happens, as it happens; this one records nothing."""
+    """Receives what happens, as it happens; this one records nothing."""
 
     async def message(self, message: Message, world: World) -> None:
-        """A new message, and the world after it."""
+        """Record a new message, and the world after it."""
 
     async def moving(self, plan_id: str, world: World) -> None:
-        """Robots are about to move to a plan; raising keeps them where they are."""
+        """Record that robots are about to move to a plan; raising keeps them where they are."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Approval:
 
 @dataclass
 class Conversation:
-    """The messages and the world so far, there whatever happens to the loop that adds to them."""
+    """The messages and the world so far, which outlast whatever happens to the loop."""
 
     messages: History
     world: World
@@ -74,7 +74,7 @@ class Conversation:
 
 @dataclass(frozen=True)
 class Turn:
-    """What stays the same while the loop works on what a person said."""
+    """What stays the same throughout a turn."""
 
     model: Model
     tools: tuple[Tool, ...]
@@ -86,7 +86,7 @@ class Turn:
     approved: Approval | None
 
     def permit(self, call: Call, history: History) -> Decision:
-        """What the policy says; a call that cannot be made does not trouble a person."""
+        """Return the policy's decision; nobody is asked about a call that cannot be made."""
         tool = tool_named(self.tools, call.name)
         if tool is None or (decision := self.policy.decide(tool)) == "allow":
             return "allow"
@@ -101,17 +101,17 @@ class Turn:
         return "ask"
 
     def moves(self, call: Call) -> bool:
-        """Whether a call moves robots."""
+        """Return whether a call moves robots."""
         tool = tool_named(self.tools, call.name)
         return tool is not None and tool.kind == "actuate"
 
     def plan_of(self, call: Call, history: History) -> str | None:
-        """The plan that a call which moves robots is for."""
+        """Return the id of the plan that a call which moves robots is for; None for others."""
         named = call.arguments.get("plan_id") or plan_of_reply(history)
         return str(named) if self.moves(call) and named else None
 
     async def ask(self, messages: History) -> Reply:
-        """The model's next reply, whole and in time."""
+        """Return the model's next reply, complete and in time."""
         sent = messages if getattr(self.model, "reads_all", False) else compacted(messages)
         request = Request(self.system, sent, self.offered)
         return await reply_in_time(self.model, request, self.limits.reply_seconds)
@@ -133,15 +133,15 @@ async def run(
     """Run a turn until it is answered, paused, stopped or cancelled.
 
     Args:
-        context: with the world as it is; each outcome has the world that came of it.
+        context: with the current world; the outcome has the resulting one.
         messages: the history so far; unanswered calls at its end are answered first. The turn
-            begins with its last message of the person's.
+            begins with the person's last message.
         system: the prompt.
-        offered: the tools the model is told of; None for all. It may know of others.
-        limits: bounds of the turn.
+        offered: the tools that the model is offered; None for all. It may call the others too.
+        limits: limits of the turn.
         policy: which calls go ahead.
-        approved: what a person has said yes to.
-        recorder: is given every new message.
+        approved: the call that a person has said yes to.
+        recorder: receives every new message.
     """
     talk = Conversation(messages, context.world, recorder or Recorder())
     shown = tools if offered is None else offered
@@ -181,42 +181,42 @@ async def _converse(turn: Turn, talk: Conversation, clock: asyncio.Timeout) -> O
 async def _settle(
     turn: Turn, talk: Conversation, call: Call, clock: asyncio.Timeout
 ) -> Outcome | None:
-    """Answer one call; how that ends the turn, if it does."""
+    """Answer one call; return how that ends the turn, or None."""
     if reason := calls_exhausted(talk.messages, turn.limits):
         return Stopped(talk.messages, talk.world, "limit", reason)
     before = failed_before(talk.messages)
     decision = "skip" if before and turn.moves(call) else turn.permit(call, talk.messages)
     if decision == "ask":
-        await _shown(turn, talk, call)
+        await _store_choices(turn, talk, call)
         return Paused(talk.messages, talk.world, call, turn.plan_of(call, talk.messages))
     if decision == "skip":
         await talk.add(failed(call, "skipped", f"Not done, because {before} before it failed."))
         return None
     if decision == "refuse":
         await talk.add(refused(call, f"{call.name} may not be called here; do without it."))
-        return _ended(talk)
+        return _turn_end(talk)
     context = replace(
         turn.context,
         world=talk.world,
-        doubted=doubts_told(talk.messages),
+        doubted=known_doubts(talk.messages),
         proposed=plan_of_reply(talk.messages),
         agreed=turn.approved is not None and turn.approved.call == call,
         observed=talk.keep,
         moving=talk.moving,
     )
     try:
-        with _stopped(clock) if turn.moves(call) else nullcontext():
+        with _clock_stopped(clock) if turn.moves(call) else nullcontext():
             result = await answer(turn.tools, context, call, turn.limits.tool_seconds)
     except ApprovalError as needed:
         return Paused(talk.messages, talk.world, call, needed.plan_id)
     if isinstance(turn.context.asks, ModelFinder):
         result = result.model_copy(update={"asides": turn.context.asks.taken()})
     await talk.add(result)
-    return _ended(talk)
+    return _turn_end(talk)
 
 
-async def _shown(turn: Turn, talk: Conversation, call: Call) -> None:
-    """Keep what a question offers, so that its ids mean the same in the answer."""
+async def _store_choices(turn: Turn, talk: Conversation, call: Call) -> None:
+    """Put what a question offers into the world, so that its ids mean the same in the answer."""
     tool = tool_named(turn.tools, call.name)
     if tool is not None and tool.kind == "ask":
         context = replace(turn.context, world=talk.world, observed=talk.keep)
@@ -224,8 +224,8 @@ async def _shown(turn: Turn, talk: Conversation, call: Call) -> None:
 
 
 @contextmanager
-def _stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
-    """The turn's clock stands still while robots drive."""
+def _clock_stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
+    """Stop the turn's clock while robots drive."""
     now, ends = asyncio.get_running_loop().time, clock.when()
     left = None if ends is None else ends - now()
     clock.reschedule(None)
@@ -236,8 +236,8 @@ def _stopped(clock: asyncio.Timeout) -> Generator[None, None, None]:
             clock.reschedule(None if left is None else now() + left)
 
 
-def _ended(talk: Conversation) -> Outcome | None:
-    """How the last result ends the turn, if it does: the model goes in circles, or is done."""
+def _turn_end(talk: Conversation) -> Outcome | None:
+    """Return how the last result ends the turn (done, or the model repeats itself), or None."""
     result = talk.messages[-1]
     assert isinstance(result, Result)
     if result.message is not None:

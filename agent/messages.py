@@ -10,9 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 from pydantic_core import to_json
 
 ErrorKind = Literal["unknown_tool", "arguments", "tool", "timeout", "refused", "skipped"]
-"""unknown_tool: no such tool; arguments: against its schema; tool: it could not do that;
-timeout: it took too long; refused: it may not be called, or a person said no; skipped: robots are
-not moved when a call before it in the same reply failed."""
+"""unknown_tool: no such tool; arguments: they violate its schema; tool: it could not do what was
+asked; timeout: it took too long; refused: it may not be called, or a person said no; skipped:
+robots were not moved because an earlier call in the same reply failed."""
 
 
 class _Value(BaseModel):
@@ -22,7 +22,7 @@ class _Value(BaseModel):
 
 
 class Call(_Value):
-    """A model's wish to have a tool run."""
+    """A model's request to run a tool."""
 
     id: str
     name: str
@@ -31,7 +31,7 @@ class Call(_Value):
     @field_validator("arguments")
     @classmethod
     def _can_be_written(cls, arguments: dict[str, Any]) -> dict[str, Any]:
-        """A history must always be storable: no endless nesting, no text that is not Unicode."""
+        """Refuse arguments that cannot be stored: endless nesting, or text that is not Unicode."""
         to_json(arguments)
         return arguments
 
@@ -40,8 +40,8 @@ class Usage(_Value):
     """What one request cost; zero where nothing is counted.
 
     Attributes:
-        input_tokens: all of the input.
-        cached_tokens: those of the input that the provider read from its cache.
+        input_tokens: all input tokens.
+        cached_tokens: those input tokens that the provider read from its cache.
     """
 
     input_tokens: int = 0
@@ -59,14 +59,15 @@ class User(_Value):
 
 
 class Opaque(_Value):
-    """What is kept of a reply as its server wrote it: thoughts, signed or encrypted, and odd ids.
+    """The part of a reply stored as its server wrote it: signed or encrypted thoughts, odd ids.
 
-    It goes back to the model it came from, which may refuse the conversation without; no other
-    model and nothing else reads it.
+    It is sent back to the model it came from, which may refuse the conversation without it; no
+    other model and nothing else reads it.
 
     Attributes:
-        model: whose it is, such as gemini:NAME, and where it was asked if not at its own address.
-        items: what goes back beside text and calls; none where only ids have to stay as they are.
+        model: the model it came from, such as gemini:NAME, with its address if that is not the
+            provider's own.
+        items: what is sent back beside text and calls; empty where only ids have to be preserved.
     """
 
     model: str
@@ -84,7 +85,7 @@ class Reply(_Value):
 
 
 class Aside(_Value):
-    """What a tool asked the model on its way, and the reply, which counts as one of the turn's."""
+    """A question that a running tool put to the model, and the reply, which counts in the turn."""
 
     text: str
     reply: Reply
@@ -94,11 +95,11 @@ class Result(_Value):
     """A tool's answer to one call.
 
     Attributes:
-        error: what kind of mistake it reports, if any.
-        cause: the kind of the tool's error, see `tools.errors.Kind`; what code reacts to.
-        facts: that error's numbers and ids; else `plan_id`, of the plan that was made.
-        message: what the person is told, where the call has ended the turn.
-        asides: what the tool asked the model.
+        error: the kind of error it reports, if any.
+        cause: the kind of the tool's own error, which code reacts to; see `tools.errors.Kind`.
+        facts: that error's numbers and ids; without an error, `plan_id` of the plan that was made.
+        message: the message to the person, if the call has ended the turn.
+        asides: what the tool asked the model, with the replies.
     """
 
     role: Literal["tool"] = "tool"
@@ -122,7 +123,7 @@ HISTORY: TypeAdapter[History] = TypeAdapter(
 
 
 def unanswered(history: Sequence[Message]) -> tuple[Call, ...]:
-    """Calls of the last reply that have no result yet, in order."""
+    """Return the calls of the last reply that have no result yet, in order."""
     answered: set[str] = set()
     for message in reversed(history):
         if isinstance(message, Result):
@@ -135,7 +136,7 @@ def unanswered(history: Sequence[Message]) -> tuple[Call, ...]:
 
 
 def failed_before(history: Sequence[Message]) -> str | None:
-    """The name of the last call that failed among those of the last reply answered so far."""
+    """Return the name of the last failed call among the answered calls of the last reply."""
     for message in reversed(history):
         if isinstance(message, Result) and message.error:
             return message.name
@@ -145,7 +146,7 @@ def failed_before(history: Sequence[Message]) -> str | None:
 
 
 def plan_of_reply(history: Sequence[Message]) -> str | None:
-    """The id of the plan made last among the calls of the last reply answered so far."""
+    """Return the id of the plan made last by the answered calls of the last reply, or None."""
     for message in reversed(history):
         if not isinstance(message, Result):
             break
@@ -154,8 +155,8 @@ def plan_of_reply(history: Sequence[Message]) -> str | None:
     return None
 
 
-def doubts_told(history: Sequence[Message]) -> frozenset[str]:
-    """The doubts that the model knew of when it gave its last reply, of this turn."""
+def known_doubts(history: Sequence[Message]) -> frozenset[str]:
+    """Return the doubts of this turn that the model knew of when it gave its last reply."""
     turn = turn_of(history)
     last = max((i for i, m in enumerate(turn) if isinstance(m, Reply)), default=0)
     told = (m for m in turn[:last] if isinstance(m, Result) and m.cause == "doubt")
@@ -163,7 +164,7 @@ def doubts_told(history: Sequence[Message]) -> frozenset[str]:
 
 
 def replies_of(messages: Sequence[Message]) -> list[Reply]:
-    """The model's replies, to tools too."""
+    """Return the model's replies, including those to tools' questions."""
     found: list[Reply] = []
     for m in messages:
         found += [m] if isinstance(m, Reply) else []
@@ -172,7 +173,7 @@ def replies_of(messages: Sequence[Message]) -> list[Reply]:
 
 
 def turn_of(history: Sequence[Message]) -> Sequence[Message]:
-    """The messages of the last turn, which the person's last message began."""
+    """Return the messages of the last turn, which begins with the person's last message."""
     for place in range(len(history) - 1, -1, -1):
         if isinstance(history[place], User):
             return history[place:]
@@ -180,14 +181,14 @@ def turn_of(history: Sequence[Message]) -> Sequence[Message]:
 
 
 MOST_FAILING, MOST_ALIKE = 2, 3
-"""Replies in which a call may fail in the same way, and times a call may have the same answer,
-before the turn is stopped."""
+"""A turn is stopped once a call has failed the same way in so many replies, or has had the same
+answer so many times."""
 
 
 def is_repeated(history: Sequence[Message]) -> bool:
-    """Whether the last result shows a model that goes in circles, in this turn.
+    """Return whether the last result shows that the model goes in circles in this turn.
 
-    That is: the same call, name and arguments, had the same answer so often.
+    That is, the same call (name and arguments) had the same answer too often.
     """
     last = history[-1]
     if not isinstance(last, Result) or last.error == "skipped":
@@ -207,18 +208,18 @@ def is_repeated(history: Sequence[Message]) -> bool:
 
 
 def closed(history: History, why: str) -> History:
-    """The history with a result for each call that has none, so that any provider takes it."""
-    return (*history, *(_unknown(call, why) for call in unanswered(history)))
+    """Return the history with a result for each call that has none, as providers demand."""
+    return (*history, *(_unanswered_result(call, why) for call in unanswered(history)))
 
 
 LOST = "No result: it was broken off before one came, so that what it did is not known."
 
 
 def paired(history: Sequence[Message]) -> History:
-    """The history with each call answered once and at once, as every provider demands.
+    """Return the history with each call answered once and right away, as every provider demands.
 
-    Calls that a kill left without a result are given one that says so, but for those at the end,
-    which may yet be answered; results of no call, or of one that is answered, are left out.
+    Calls that a kill left without a result get one that says so, except those at the end, which
+    may still be answered; results without a call, or for an answered one, are left out.
     """
     made: list[Message] = []
     waiting: dict[str, Call] = {}
@@ -227,11 +228,11 @@ def paired(history: Sequence[Message]) -> History:
             if waiting.pop(message.call_id, None) is None:
                 continue
         else:
-            made += (_unknown(call, LOST) for call in waiting.values())
+            made += (_unanswered_result(call, LOST) for call in waiting.values())
             waiting = {c.id: c for c in message.calls} if isinstance(message, Reply) else {}
         made.append(message)
     return tuple(made)
 
 
-def _unknown(call: Call, why: str) -> Result:
+def _unanswered_result(call: Call, why: str) -> Result:
     return Result(call_id=call.id, name=call.name, text=why, error="refused")

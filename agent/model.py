@@ -1,4 +1,4 @@
-"""The cut between the loop and whatever decides: a model is a name and one method."""
+"""The interface between the loop and whatever decides: a model is a name and one method."""
 
 import asyncio
 from collections.abc import Callable
@@ -10,15 +10,15 @@ from ..tools.tool import Tool
 from .messages import History, Reply
 
 ShowText = Callable[[str | None], None]
-"""Given fragments of text as they come; None: what was shown of this reply is void."""
+"""Called with fragments of text as they arrive; None voids what was shown of this reply."""
 
 
 @dataclass(frozen=True)
 class Request:
     """All a model sees: the prompt, the conversation, the tools it may call.
 
-    One that is `aside` is a tool's, about the picture: its reply is no part of the conversation,
-    and is not shown.
+    A request that is `aside` comes from a tool and is about the picture: its reply is not part of
+    the conversation and is not shown.
     """
 
     system: str
@@ -30,28 +30,28 @@ class Request:
 class Model(Protocol):
     """Anything that answers a request with one complete reply.
 
-    One whose `reads_all` is true is sent all of a long conversation; see `compaction`.
+    A model whose `reads_all` is true is sent all of a long conversation; see `compaction`.
     """
 
     @property
     def name(self) -> str:
-        """What results are recorded under."""
+        """The name that results are recorded under."""
         ...
 
     async def reply(self, request: Request) -> Reply:
-        """Answer.
+        """Return a complete reply to a request.
 
         Raises:
-            ModelError: it cannot.
+            ModelError: the model cannot answer.
         """
         ...
 
 
 async def reply_in_time(model: Model, request: Request, seconds: float | None) -> Reply:
-    """The model's reply, whole and within so many seconds.
+    """Return the model's complete reply, given within so many seconds; None is no limit.
 
     Raises:
-        ModelError: there is none.
+        ModelError: the model cannot answer, or takes longer.
     """
     clock = asyncio.timeout(seconds)
     try:

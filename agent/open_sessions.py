@@ -1,4 +1,4 @@
-"""The conversations that a process has in memory: as the store has them, and not too many."""
+"""The conversations that a process has in memory: as they are stored, and not too many."""
 
 import asyncio
 from collections.abc import Mapping, Sequence
@@ -15,14 +15,14 @@ from .store.protocol import Event, Store
 from .turns import Turn
 
 MOST_OPEN, MOST_BYTES = 128, 2**30
-"""Conversations kept in memory, and bytes of their pictures; others are read when they go on."""
+"""Most conversations in memory, and most bytes of their pictures; others are read when needed."""
 
 
 class OpenSessions:
     """Conversations by their ids, with their feeds.
 
     Args:
-        turns: those that are under way, by the ids of their conversations.
+        turns: the turns under way, by the ids of their conversations.
         auto: whether simulated robots move as soon as a plan is certified.
     """
 
@@ -42,10 +42,10 @@ class OpenSessions:
         self._stopped: dict[str, set[str]] = {}
 
     async def current(self, session: str) -> Session:
-        """A conversation as the store has it, read again where another process has gone on.
+        """Return a conversation as stored, read again if another process has gone on with it.
 
         Raises:
-            InputError: there is none (`missing`; it is let go of), or it is damaged.
+            InputError: the conversation is missing (`missing`; it is then dropped) or damaged.
         """
         try:
             return await self._current(session)
@@ -57,7 +57,7 @@ class OpenSessions:
     async def _current(self, session: str) -> Session:
         held = self.sessions.pop(session, None)
         if held is not None:
-            self.sessions[session] = held  # used last
+            self.sessions[session] = held  # now the last one used
             last = held.begun if held.run is None else held.run.events
             stored = self.feeds[session].stored
             if last is not None and not await asyncio.to_thread(stored.events, last):
@@ -69,10 +69,10 @@ class OpenSessions:
         return self.sessions[session]
 
     def load(self, session: str, picture: Picture | None) -> tuple[Sequence[Event], Session]:
-        """A conversation as the store has it; in any thread.
+        """Read a conversation and its events from the store; may be called in any thread.
 
         Raises:
-            InputError: there is none, it is damaged, or the picture is another.
+            InputError: the conversation is missing or damaged, or the picture is another.
         """
         stored = self._store.open(session)
         events, old = stored.events(), self.sessions.get(session)
@@ -87,7 +87,7 @@ class OpenSessions:
         return events, read_conversation(fed, events, self._agents, picture, services)
 
     def keep(self, session: str, events: Sequence[Event], made: Session) -> None:
-        """Put a conversation in memory, and let go of others that were not used for long."""
+        """Put a conversation in memory, and drop the least recently used ones if there are many."""
         self._stopped.pop(session, None)
         made.auto, feed = self._auto, self.feeds[session]
         for event in events[feed.last :]:
@@ -100,7 +100,7 @@ class OpenSessions:
             self._forget(name)
 
     def _forget(self, session: str) -> None:
-        """Let go of a conversation that can be read again, unless it drives or has real robots."""
+        """Drop a conversation, which can be read again, unless it has a turn or real robots."""
         services = self.sessions[session].services or Services()
         if session in self._turns or any(fleet.real for fleet in services.fleets.values()):
             return
@@ -112,7 +112,7 @@ class OpenSessions:
             del self.feeds[session]
 
     def drop(self, session: str) -> None:
-        """Let go of a conversation that is deleted, and end what follows it."""
+        """Drop a conversation that is deleted, and end its subscriptions."""
         self.sessions.pop(session, None)
         self._stopped.pop(session, None)
         if (feed := self.feeds.pop(session, None)) is not None:

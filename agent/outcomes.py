@@ -1,4 +1,4 @@
-"""How a turn ends: four types, each with every message and the world. A limit is one of them."""
+"""How a turn ends, also at a limit: four types, each with all messages and the world."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -7,8 +7,8 @@ from ..tools.world import World
 from .messages import Call, History
 
 StopKind = Literal["limit", "repeat", "model", "tool", "fleet"]
-"""limit: a bound of this turn; repeat: the same call with the same answer, over and over; model,
-tool, fleet: they failed."""
+"""limit: a limit of the turn was reached; repeat: the same call had the same answer over and over;
+model, tool, fleet: it failed."""
 
 
 @dataclass(frozen=True)

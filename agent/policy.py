@@ -1,7 +1,7 @@
 """Which tool calls may go ahead, which wait for a person, which are refused.
 
 A policy can only be stricter than the tools are: questions always wait, and so do real robots,
-whose plan the tool that moves them wants approved.
+since the tool that moves them demands an approved plan.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Policy:
     """Rules of (glob, decision); the first whose glob fits a tool's name decides.
 
     Raises:
-        InputError: a decision that is none.
+        InputError: an unknown decision.
     """
 
     rules: tuple[tuple[str, Decision], ...] = ()
@@ -34,7 +34,7 @@ class Policy:
                 )
 
     def decide(self, tool: Tool) -> Decision:
-        """What is to happen with a call of a tool."""
+        """Return what is to happen with a call of a tool."""
         rules = [decision for glob, decision in self.rules if fnmatchcase(tool.name, glob)]
         least = "ask" if tool.kind == "ask" else "allow"
         return DECISIONS[max(map(DECISIONS.index, (*rules[:1], least)))]

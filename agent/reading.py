@@ -1,4 +1,4 @@
-"""A conversation as a service goes on with it, from its events."""
+"""Restores a conversation from its events, so that a service can go on with it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,16 +18,16 @@ def read_conversation(
     picture: Picture | None,
     services: Services,
 ) -> Session:
-    """A conversation as far as it has come, perhaps before anything was said.
+    """Return a conversation as far as it has come, perhaps before anything was said.
 
     Args:
-        events: all there are.
-        agents: of the service by their names; the first one decides where its own is not there.
-        picture: where it is not stored beside it any more.
+        events: all its events.
+        agents: the service's agents by name; the first decides if the conversation's own is gone.
+        picture: its picture, if that is no longer stored with it.
         services: what tools use beside the world.
 
     Raises:
-        InputError: it is damaged, or the picture is another.
+        InputError: the conversation is damaged, or the picture is another.
     """
     first = events[0].data
     opening = Opening.model_validate(first.get("opening") or {})

@@ -1,6 +1,6 @@
-"""Writes a turn down: each thing as it happens, in a thread, before anything follows from it.
+"""Records a turn: each thing as it happens, in a thread, before anything follows from it.
 
-A store that is slow holds up the turn that writes to it: no other one, no robots, and no stop.
+A slow store holds up only the turn that writes to it: no other turn, no robots and no stop.
 """
 
 import asyncio
@@ -22,7 +22,7 @@ from .store.protocol import EventLog
 
 
 def message_facts(message: Message) -> dict[str, Any]:
-    """A message as JSON, images as their hashes."""
+    """Return a message as JSON, with the hashes and sizes of its images in their place."""
     images = () if isinstance(message, Reply) else message.images
     facts = message.model_dump(mode="json", exclude={"images"}, exclude_defaults=True)
     hashes = [{"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)} for data in images]
@@ -30,14 +30,14 @@ def message_facts(message: Message) -> dict[str, Any]:
 
 
 class LogRecorder(Recorder):
-    """Writes down what happens, and shows it.
+    """Writes what happens to a log, and shows it.
 
     Once robots have moved, a log that can no longer be written does not undo that: the turn goes
     on, and `problem` says what was wrong.
 
     Args:
-        log: None to write nothing down.
-        world: as the log has it already; None where it has nothing yet.
+        log: None to record nothing.
+        world: the world as the log has it already; None where it has none yet.
     """
 
     def __init__(
@@ -49,26 +49,26 @@ class LogRecorder(Recorder):
 
     @property
     def events(self) -> int | None:
-        """How many events the log has; None where it could not be written any more."""
+        """How many events the log has; None if it could no longer be written."""
         return None if self.problem else 0 if self._log is None else self._log.last
 
     async def event(self, kind: Any, data: Mapping[str, Any]) -> None:
-        """Write an event that changes no world."""
+        """Write an event that does not change the world."""
         await self._try(lambda log: log.append(kind, data))
 
     async def message(self, message: Message, world: World) -> None:
-        """Write a message after what has changed in the world, then show it."""
+        """Write what has changed in the world, then a message, and show the message."""
         await self.world(world)
         await self._try(lambda log: log.append("message", self._facts(message)))
         if self._show is not None:
             self._show(message)
 
     async def moving(self, plan_id: str, world: World) -> None:
-        """Write down that robots are about to move; if it cannot be, they do not."""
+        """Write that robots are about to move; a first move that cannot be written is prevented."""
         await self.world(world)
         await self.event("moving", {"plan_id": plan_id})
         self._moved = True
-        await asyncio.sleep(0)  # a stop that came meanwhile comes first
+        await asyncio.sleep(0)  # a stop that came meanwhile takes effect first
 
     async def world(self, world: World) -> None:
         """Write what has changed in the world, if anything."""
@@ -109,10 +109,10 @@ async def recording(
     world: World | None,
     show: Show | None,
 ) -> AsyncGenerator[LogRecorder]:
-    """A recorder for a turn; `begin` opens its log, None where nothing is written down.
+    """Yield a recorder for a turn; `begin` opens its log, or is None if nothing is recorded.
 
     Raises:
-        StorageError: it cannot be opened.
+        StorageError: the log cannot be opened.
     """
     log = None if begin is None else await to_its_end(begin)
     try:
@@ -123,10 +123,11 @@ async def recording(
 
 
 def reopened(run: Run, show: Show | None) -> AbstractAsyncContextManager[LogRecorder]:
-    """The recorder of a session that goes on.
+    """Return a recorder for a session that goes on.
 
     Raises:
-        StorageError: another process writes its log, or it has gone on since it was read.
+        StorageError: another process writes its log, the log has gone on since it was read, or it
+            could not be written to its end.
     """
     begin = None
     if run.stored is not None:

@@ -1,4 +1,4 @@
-"""What a run came to, as one value: the object `formup run --json` prints."""
+"""The result of a run as one value: the object that `formup run --json` prints."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -93,7 +93,7 @@ class Report(BaseModel):
 
     @property
     def exit_code(self) -> int:
-        """What `formup run` exits with."""
+        """The exit code of `formup run`."""
         return EXIT_CODES[self.status]
 
 
@@ -101,9 +101,10 @@ METRIC_FRAME = "metres, x right, y down, 0, 0 is the centre of the picture's top
 
 
 def metric_data(world: World, plan: Plan | None, arrival: Arrival | None) -> dict[str, Any] | None:
-    """What a report says in metres; None where the scale is not known.
+    """Return what a report says in metres, or None where the scale is not known.
 
-    Positions as planned and as observed, how far off each is, and the certificate's measures.
+    That is the positions as planned and as observed, how far off each is, and the certificate's
+    measures.
     """
     scale = world.metres_per_pixel
     if scale is None:
@@ -121,7 +122,7 @@ def metric_data(world: World, plan: Plan | None, arrival: Arrival | None) -> dic
 
 
 def target_data(target: Target) -> dict[str, Any]:
-    """A target as the report shows it."""
+    """Return a target as the report shows it."""
     outline, holes = rounded_rings(target.outline)
     return {
         "id": target.id,
@@ -137,12 +138,12 @@ def target_data(target: Target) -> dict[str, Any]:
 
 
 def target_choice(target: Target) -> dict[str, Any]:
-    """A target as a question offers it."""
+    """Return a target as a question offers it."""
     return {"id": target.id, "label": target.label, "box": _box(target.box)}
 
 
 def candidate_choice(candidate: Candidate) -> dict[str, Any]:
-    """A candidate as a question offers it."""
+    """Return a candidate as a question offers it."""
     seen = candidate.attributes
     return {
         "id": candidate.id,
@@ -157,13 +158,13 @@ def candidate_choice(candidate: Candidate) -> dict[str, Any]:
 def make_report(
     outcome: Outcome, context: Context, began: World, model: str, seconds: float
 ) -> Report:
-    """What a turn that ended so has come to.
+    """Return the report of a turn that ended with an outcome.
 
     Args:
         context: with the world as the turn left it.
         began: the world when the turn began.
-        model: its name.
-        seconds: that the turn has taken.
+        model: the model's name.
+        seconds: how long the turn has taken.
     """
     world = context.world
     arrivals = {n: a for n, a in world.arrivals.items() if began.arrivals.get(n) is not a}
@@ -204,16 +205,17 @@ def make_report(
 
 
 def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Plan | None:
-    """The plan that waits for a person, else the one deployed last, else the one a report names,
-    else the one that stands, else the last proposed; none void.
+    """Return the plan to report, or None.
 
-    A partial plan is shown only where it is named.
+    It is the plan that waits for a person, else the one deployed last, else the one that
+    `report_impossible` names, unless void, else the current or else the last proposed one that is
+    neither void nor partial. None is reported once undo has gone back to before the first plan.
     """
     if isinstance(outcome, Paused) and outcome.plan_id in world.plans:
         return world.plans[outcome.plan_id].plan
     if arrivals:
         return world.plans[list(arrivals)[-1]].plan
-    given_up = _given_up(outcome.messages)
+    given_up = _impossible_call(outcome.messages)
     named = given_up and given_up.arguments.get("plan_id")
     if named in world.plans and not world.is_void(world.plans[named].plan):
         return world.plans[named].plan
@@ -224,16 +226,16 @@ def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Pl
 
 
 def suggested(outcome: Outcome) -> Contract | None:
-    """The contract that a question or a refusal says would do."""
-    call = outcome.call if isinstance(outcome, Paused) else _given_up(outcome.messages)
+    """Return the contract that a question or a refusal suggests instead, or None."""
+    call = outcome.call if isinstance(outcome, Paused) else _impossible_call(outcome.messages)
     ends = call is not None and call.name in ("ask_user", "report_impossible")
     stated = call.arguments.get("contract") if call and ends else None
     return None if stated is None else Contract.model_validate(stated)
 
 
-def _given_up(messages: History) -> Call | None:
-    """The report that ended the turn."""
-    last = messages[-1] if messages else None  # none where a run was killed before its first
+def _impossible_call(messages: History) -> Call | None:
+    """Return the `report_impossible` call that ended the turn, or None."""
+    last = messages[-1] if messages else None  # a run may be killed before its first message
     if not isinstance(last, Result) or last.name != "report_impossible" or last.error:
         return None
     calls = [c for m in turn_of(messages) if isinstance(m, Reply) for c in m.calls]
@@ -243,7 +245,7 @@ def _given_up(messages: History) -> Call | None:
 def _status(
     outcome: Outcome, plan: Plan | None, arrival: Arrival | None, *, new: bool
 ) -> tuple[Status, str]:
-    """Status and message of a turn; `new` is whether it made the plan."""
+    """Return the status and message of a turn; `new` is whether the turn made the plan."""
     text = _last_words(outcome)
     if isinstance(outcome, Paused):
         asked = outcome.call.name == "ask_user"
@@ -252,7 +254,7 @@ def _status(
         return "stopped", text
     if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
         # Robots have moved, whatever happened after that.
-        done = arrival.done and _given_up(outcome.messages) is None
+        done = arrival.done and _impossible_call(outcome.messages) is None
         return ("deployed" if done else "failed"), _with_arrival(outcome, arrival, text)
     if isinstance(outcome, Stopped):
         ours = outcome.kind in ("limit", "repeat")
@@ -269,14 +271,14 @@ def _status(
 
 
 def _with_arrival(outcome: Outcome, arrival: Arrival, text: str) -> str:
-    """What was observed, before what ended the turn after that."""
+    """Return the message, stating the arrival first where something else ended the turn later."""
     if isinstance(outcome, Answered) or not arrival.arrived:
         return text
     return f"All robots had arrived. {text}"
 
 
 def _with_encounters(text: str, node: PlanNode) -> str:
-    """What is told, with the other things that robots meet where a model has not named them."""
+    """Return the message, adding the notes on encountered things that it does not contain yet."""
     said = notes_of(node.encounters)
     return " ".join([text, *(note for note in said if note not in text)])
 
@@ -305,7 +307,7 @@ def _last_words(outcome: Outcome) -> str:
 
 
 def _candidates(outcome: Outcome, context: Context) -> tuple[dict[str, object], ...] | None:
-    """What a question offers, in its order; ids that mean nothing are left out."""
+    """Return what a question offers, in its order, without unknown ids; None without a question."""
     if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
         return None
     named = outcome.call.arguments.get("candidates", ())
@@ -316,7 +318,7 @@ def _candidates(outcome: Outcome, context: Context) -> tuple[dict[str, object], 
 
 
 def _options(outcome: Outcome) -> tuple[str, ...] | None:
-    """Words that would answer a question, where it says some."""
+    """Return the answers that a question suggests, or None."""
     if not (isinstance(outcome, Paused) and outcome.call.name == "ask_user"):
         return None
     return tuple(map(str, outcome.call.arguments.get("options", ()))) or None

@@ -1,7 +1,7 @@
 """Every command a front end can give, for many conversations in one process.
 
-One turn at a time per conversation, in whichever process; stop passes always. Front ends show and
-parse, nothing else.
+A conversation has one turn at a time, in whichever process; a stop is always let through. Front
+ends show and parse, nothing else.
 """
 
 import asyncio
@@ -26,7 +26,7 @@ from .store.protocol import Event, Store
 from .turns import PATIENCE, Asked, Turn, check_key, digest_of, is_noted, note_stop
 
 HOLDING = 2.0
-"""Longest that a fleet may take to say that its robots are held, s."""
+"""Seconds that a fleet may take to confirm that its robots are held."""
 ANYONE = Asked()
 
 
@@ -34,12 +34,12 @@ class Service:
     """Conversations by their ids.
 
     Args:
-        agents: who decides in all of them; several by names, of which the first is the usual one.
-        store: where they are written.
+        agents: the agent of all conversations; or several by name, the first being the default.
+        store: where conversations are stored.
         auto: whether simulated robots move as soon as a plan is certified.
 
     Attributes:
-        ended: is given every turn at its end, to be counted.
+        ended: called with every turn at its end, to count it.
     """
 
     def __init__(
@@ -69,15 +69,15 @@ class Service:
         """Begin a conversation about a picture.
 
         Args:
-            name: what a person calls it.
-            agent: who decides; the usual one by default.
-            owner: whose it is, which its id then begins with.
+            name: what a person calls the conversation.
+            agent: name of the agent; the first one by default.
+            owner: who owns the conversation; its id then begins with that.
 
         Returns:
-            Its id.
+            The conversation's id.
 
         Raises:
-            InputError: no such agent, or it cannot be written.
+            InputError: there is no such agent, or the conversation cannot be stored.
         """
         opening = Opening(
             agent=next(iter(self.agents)) if agent is None else agent,
@@ -95,33 +95,33 @@ class Service:
         return stored.id
 
     def reopen(self, session: str, picture: Picture | None = None) -> Session:
-        """Go on with a conversation that is stored.
+        """Open a stored conversation, to go on with it.
 
         Args:
-            picture: where it is not stored beside it any more.
+            picture: its picture, if that is no longer stored with it.
 
         Raises:
-            InputError: there is none, it is damaged, or the picture is another.
+            InputError: the conversation is missing or damaged, or the picture is another.
         """
         if session not in self._sessions:
             self._open.keep(session, *self._open.load(session, picture))
         return self._sessions[session]
 
     def session(self, session: str) -> Session:
-        """A conversation that is open.
+        """Return a conversation that is open.
 
         Raises:
-            InputError: it is not.
+            InputError: it is not open here.
         """
         if session not in self._sessions:
             raise InputError(f"The session {session!r} is not open here.", "missing")
         return self._sessions[session]
 
     def agent_named(self, name: str) -> Agent:
-        """Who decides under a name.
+        """Return the agent of a name.
 
         Raises:
-            InputError: nobody does.
+            InputError: there is none.
         """
         if name not in self.agents:
             there = ", ".join(filter(None, self.agents)) or "one without a name"
@@ -129,10 +129,10 @@ class Service:
         return self.agents[name]
 
     async def fresh(self, session: str) -> Session:
-        """A conversation as the store has it, read again where another process has gone on.
+        """Return a conversation as stored, read again if another process has gone on with it.
 
         Raises:
-            InputError: there is none, or it is damaged.
+            InputError: the conversation is missing or damaged.
         """
         held = self._sessions.get(session)
         return held if held and session in self._turns else await self._open.current(session)
@@ -140,11 +140,11 @@ class Service:
     def say(
         self, session: str, words: str, asked: Asked = ANYONE, **options: Unpack[SayOptions]
     ) -> Turn:
-        """What a person says next; see `Session.asay`.
+        """Begin a turn with what the person says next; see `Session.asay`.
 
         Raises:
-            InputError: a turn of it is under way (`busy`). When it is awaited: something given
-                cannot be used, or was done before under that key (`key`, `repeated`).
+            InputError: a turn is under way (`busy`). When the turn is awaited: an argument cannot
+                be used, or its key was used before (`key`, `repeated`).
         """
         if is_stop(words, driving=session in self._turns):
             turn = Turn(asked, "", "stop")
@@ -159,13 +159,13 @@ class Service:
         return run
 
     def edit(self, session: str, *edits: dict[str, Any], asked: Asked = ANYONE) -> Turn:
-        """Change the plan that stands, by edits as `edit_formation` takes them."""
+        """Change the current plan by edits as `edit_formation` takes them."""
         return self._begin(session, asked, "edit", *edits)
 
     def undo(
         self, session: str, steps: int = 1, to: str | None = None, asked: Asked = ANYONE
     ) -> Turn:
-        """Go back to the plan before; `steps` below 0 forward again."""
+        """Go back to an earlier plan; negative `steps` go forward again."""
         return self._begin(session, asked, "undo", steps, to)
 
     def go(
@@ -175,7 +175,7 @@ class Service:
         show: Show | None = None,
         asked: Asked = ANYONE,
     ) -> Turn:
-        """Drive the robots to a plan, the one that stands by default."""
+        """Drive the robots to a plan, by default the current one."""
         return self._begin(session, asked, "go", plan_id, show=show)
 
     def image(self, session: str, picture: Picture, asked: Asked = ANYONE) -> Turn:
@@ -193,7 +193,7 @@ class Service:
         """Approve exactly one plan, and drive real robots to it.
 
         Args:
-            nonce: of what waits, as `waits` said.
+            nonce: of the call that waits, as given by `waits`.
         """
 
         def check(held: Session) -> None:
@@ -202,7 +202,7 @@ class Service:
         return self._begin(session, asked, "approve", plan_id, show=show, check=check)
 
     async def waits(self, session: str) -> Waiting | None:
-        """The call that waits for a person's yes, if one does; the same until it is answered."""
+        """Return the call that waits for a person's yes, the same one until answered, or None."""
         run = (await self.fresh(session)).run
         events = None if run is None else run.events
         if self._waiting.get(session, (None, None))[0] != events:
@@ -210,22 +210,22 @@ class Service:
         return self._waiting[session][1] if run is not None else None
 
     def waiting(self) -> set[str]:
-        """The conversations in memory in which a call waits for a person's yes."""
+        """Return the conversations in memory in which a call waits for a person's yes."""
         return {name for name, held in self._sessions.items() if is_waiting(held.run)}
 
     async def stop(self, session: str, asked: Asked = ANYONE) -> Run | None:
-        """Hold the robots at once, and end the turn that runs, in whichever process.
+        """Hold the robots at once, and end the turn under way, in whichever process it is.
 
         Returns:
-            That turn, or one that says that they are held; None before anything was said.
+            The run of that turn, or of one that says they are held; None if nothing was said yet.
         """
         while True:
             if (turn := self._turns.get(session)) is not None:
-                if (cut := await self._cut(session, turn)) is not None:
+                if (cut := await self._end_turn(session, turn)) is not None:
                     return cut
-                continue  # it had not begun
+                continue  # the turn had not begun
             held = await self.fresh(session)
-            problem = await self._held(held)
+            problem = await self._hold_in_time(held)
             if session in self._turns:
                 continue
             if problem is not None:
@@ -241,19 +241,19 @@ class Service:
                 await asyncio.to_thread(note_stop, self._feeds[session].stored)
                 await asyncio.sleep(PATIENCE / 3)
 
-    async def _cut(self, session: str, turn: Turn) -> Run | None:
-        """End a turn that runs here, with its robots held; also where a fleet cannot be told."""
+    async def _end_turn(self, session: str, turn: Turn) -> Run | None:
+        """Hold the robots of a turn that runs here and end it, even if a fleet is out of reach."""
         if turn.name == "stop":
             return await turn.ended()
-        problem = await self._held(self._sessions.get(session))
+        problem = await self._hold_in_time(self._sessions.get(session))
         turn.cancel()
         run = await turn.ended()
         if problem is not None:
             raise problem
         return run
 
-    async def _held(self, held: Session | None) -> FleetError | None:
-        """Hold all robots there are, within a time; what went wrong with it."""
+    async def _hold_in_time(self, held: Session | None) -> FleetError | None:
+        """Hold all robots within HOLDING seconds; return what went wrong, or None."""
         try:
             async with asyncio.timeout(HOLDING):
                 await self.hold()
@@ -270,25 +270,25 @@ class Service:
         await self._owner.hold()
 
     def point(self, session: str, *prompts: TargetPrompt) -> None:
-        """What the person points at with their next words."""
+        """Note what the person points at with their next words."""
         held = self.session(session)
         held.pointed = (*held.pointed, *prompts)
 
     def turn(self, session: str) -> Turn | None:
-        """The turn that is under way in this process, if one is."""
+        """Return the turn that is under way in this process, or None."""
         return self._turns.get(session)
 
     def last_turn(self, session: str) -> int:
-        """The number of the event that began the last turn in this process; 0 where none did."""
+        """Return the number of the event that began the last turn in this process, or 0."""
         feed = self._feeds.get(session)
         return feed.turn.number if feed and feed.turn else 0
 
     def was_asked(self, session: str, key: str) -> bool:
-        """Whether a turn of a conversation in memory was asked for under a key."""
+        """Return whether a turn of a conversation in memory was asked for under a key."""
         return key in self._feeds[session].keys
 
     def is_written(self, session: str) -> bool:
-        """Whether a turn of it is under way, here or in another process."""
+        """Return whether a turn of a conversation is under way, here or in another process."""
         if session in self._turns:
             return True
         stored = self.store.open(session)
@@ -299,23 +299,23 @@ class Service:
         return False
 
     def fork(self, session: str, turn: int | None = None) -> str:
-        """The id of a new conversation that begins as another did, which stays as it is.
+        """Copy a conversation, which stays as it is, into a new one and return the new id.
 
         Args:
-            turn: after how many turns of it; all by default.
+            turn: how many turns to copy; all by default.
         """
         made = fork(self.store, self.store.open(session), turn)
         self.reopen(made.id)
         return made.id
 
     def events(self, session: str, after: int = 0) -> tuple[Event, ...]:
-        """What happened in a conversation, from a number on."""
+        """Return the events of a conversation with numbers greater than `after`."""
         return self.store.open(session).events(after)
 
     async def follow(
         self, session: str, after: int = 0, *, watching: bool = False
     ) -> AsyncGenerator[Event | Poses]:
-        """What happens in a conversation, as it happens; see `Feed.subscribe`."""
+        """Yield what happens in a conversation, as it happens; see `Feed.subscribe`."""
         await self.fresh(session)
         async for told in self._feeds[session].subscribe(after, watching=watching):
             yield told
@@ -329,17 +329,17 @@ class Service:
         self._waiting.pop(session, None)
 
     async def leave(self) -> None:
-        """Stop what runs, hold the robots, and end what is followed."""
+        """Stop all turns, which holds their robots, and end all subscriptions."""
         await asyncio.gather(*map(self.stop, self._turns), return_exceptions=True)
         for feed in self._feeds.values():
             feed.end()
 
     async def close(self) -> None:
-        """Leave, and let go of models, fleets and the store."""
+        """Stop everything as `leave` does, then close models, fleets and the store."""
         await self.leave()
         if self._watcher is not None:
             self._watcher.cancel()
-            await asyncio.wait({self._watcher})  # what it reads of the store is read
+            await asyncio.wait({self._watcher})  # until it has finished reading the store
         for held in self._sessions.values():
             if held.run is not None:
                 await held.run.context.services.close_fleets()
@@ -357,7 +357,7 @@ class Service:
         check: Callable[[Session], None] | None = None,
         **options: Any,
     ) -> Turn:
-        """Begin a turn, or go on with the one that was begun under the same key."""
+        """Begin a turn, or return the one under way that was begun under the same key."""
         turn, now = Turn(asked, digest_of(name, arguments, options), name), self._turns.get(session)
         if now is not None:
             if asked.key is not None and now.asked.key == asked.key:
@@ -379,7 +379,7 @@ class Service:
             self._turns.pop(session, None)
             self.ended(turn)
             if not task.cancelled():
-                task.exception()  # told to whoever awaits it, if anybody does
+                task.exception()  # retrieved here, in case nobody awaits the turn
 
         self._turns[session] = turn
         turn.task = asyncio.ensure_future(work())

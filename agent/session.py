@@ -1,7 +1,7 @@
-"""A session: an event log and what folds out of it, messages, world and settings, turn by turn.
+"""A session: an event log and what it folds into, messages, world and settings, turn by turn.
 
-A turn is what the person says until the loop has answered, paused or stopped. Whatever happens is
-written down before anything follows from it, so that the log opens again after a kill.
+A turn lasts from the person's words until the loop has answered, paused or stopped. Whatever
+happens is recorded before anything follows from it, so that the log opens again after a kill.
 """
 
 import gc
@@ -38,7 +38,7 @@ Show = Callable[[Message], None]
 
 
 class SayOptions(TypedDict, total=False):
-    """What may be given with words; see `Agent.asay`."""
+    """Options of any turn; see `Agent.asay`."""
 
     pointed: Sequence[TargetPrompt]
     keep_out: Sequence[TargetPrompt]
@@ -47,13 +47,13 @@ class SayOptions(TypedDict, total=False):
 
 
 class TurnOptions(SayOptions, total=False):
-    """What may be given with the words of a later turn; see `Agent.asay`."""
+    """Options of a later turn; see `Agent.asay`."""
 
     picture: Picture | None
 
 
 class RunOptions(SayOptions, total=False):
-    """What may be given with the first words; see `Agent.arun`."""
+    """Options of the first turn; see `Agent.arun`."""
 
     targets: Sequence[Target]
     trace: Path | StoredSession | None
@@ -63,16 +63,16 @@ class RunOptions(SayOptions, total=False):
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """A session as far as its last turn came.
+    """A session as far as its last turn has come.
 
     Attributes:
         report: what came of that turn.
         outcome: how it ended, with the messages and the world.
         context: with the world, the settings and the services to go on with.
         began: the world when the turn began.
-        stored: where it is written, if it is.
-        events: that the log had then; a log that has gone on since is not written by this run.
-            None where the log could not be written any more.
+        stored: the stored session it is written to, if any.
+        events: how many events the log had then; this run does not write to a log that has gone on
+            since. None if the log could no longer be written.
     """
 
     report: Report
@@ -84,7 +84,7 @@ class Run:
 
     @property
     def trace(self) -> Path | None:
-        """The log, where it is a file."""
+        """The path of the log, if it is a file."""
         return self.stored.path if isinstance(self.stored, FolderSession) else None
 
     @property
@@ -93,11 +93,11 @@ class Run:
         return self.outcome.world
 
     def __repr__(self) -> str:
-        """In short: a run holds the whole conversation."""
+        """Return a short form, since a run holds the whole conversation."""
         return f"Run({self.report.status!r}, plan_id={self.report.plan_id!r})"
 
     def _repr_png_(self) -> bytes | None:
-        """The plan that stands, for notebooks."""
+        """Return a picture of the reported plan for notebooks, if there is one."""
         plan, file = self._plan, io.BytesIO()
         if plan is None:
             return None
@@ -106,8 +106,8 @@ class Run:
         return file.getvalue()
 
     def view(self) -> bytes | None:
-        """A JPEG file, 1,024 px long or little more, of what a question offers or of an outline
-        that is doubted, else of the plan that stands."""
+        """Return a JPEG file, 1,024 px long or little more, of what a question offers, else of an
+        outline that is doubted, else of the reported plan, if there is one."""
         picture, world, plan = self.context.picture, self.world, self._plan
         if asked := [choice["id"] for choice in self.report.candidates or ()]:
             targets = tuple(t for t in world.targets if t.id in asked)
@@ -125,14 +125,14 @@ class Run:
 
     @property
     def steps(self) -> tuple[Step, ...]:
-        """The steps that undo goes through, this turn's among them."""
+        """The steps that undo goes through, including that of this turn."""
         world = self.world
         return stepped(self.context.steps, self.began.undone, world.step, world.undone)
 
 
 @contextmanager
 def _no_collections() -> Generator[None]:
-    """Without looking for garbage: a long session is a million values, and none of them is."""
+    """Suspend garbage collection: a long session is a million values, none of them garbage."""
     was = gc.isenabled()
     gc.disable()
     try:
@@ -148,15 +148,15 @@ def load_run(
     picture: Picture | None = None,
     services: Services | None = None,
 ) -> Run:
-    """A session from its log, as far as it had come: paused, stopped, or killed in the middle.
+    """Load a session from its log, as far as it had come: paused, stopped or killed midway.
 
     Args:
         source: the path of a log or of the folder with a trace.jsonl, or a session in a store.
-        picture: what it works on; None for the one stored beside the log, or else where it lay.
+        picture: its picture; None for the one stored with the log, or else at its original path.
         services: what tools use beside the world; made anew if left out.
 
     Raises:
-        InputError: it cannot be read, or the picture is not the same.
+        InputError: the log cannot be read, or the picture is not the same.
     """
     stored = FolderSession(log_path(Path(source))) if isinstance(source, str | Path) else source
     artefacts = stored.artefacts
@@ -184,7 +184,7 @@ def load_run(
 
 
 def prompt_name(facts: Mapping[str, Any] | None) -> str | None:
-    """`id@vNNN`, or `id@draft-NAME`, of a prompt as logs and reports have it."""
+    """Return `id@vNNN` or `id@draft-NAME` for a prompt as logs and reports have it."""
     if facts is None:
         return None
     version = facts["version"]
@@ -192,12 +192,12 @@ def prompt_name(facts: Mapping[str, Any] | None) -> str | None:
 
 
 def model_name(facts: Mapping[str, Any]) -> str:
-    """The name of the model or, joined by a plus, of the two that shared the work."""
+    """Return the name of the model or, joined by a plus, of the two that shared the work."""
     return "+".join(filter(None, (str(facts["model"]), facts.get("planner"))))
 
 
 def picture_facts(picture: Picture, artefacts: Artefacts) -> dict[str, Any]:
-    """What a log says of its picture, which is stored beside it."""
+    """Store a log's picture with it, and return what the log says of the picture."""
     return {
         "facts": World.of(picture).picture.model_dump(),
         "name": picture.name,
@@ -209,10 +209,10 @@ def picture_facts(picture: Picture, artefacts: Artefacts) -> dict[str, Any]:
 def stored_picture(
     facts: Mapping[str, Any], artefacts: Artefacts, given: Picture | None
 ) -> Picture:
-    """The picture of a session, with the very content it began with.
+    """Return the picture of a session, with the very content it began with.
 
     Raises:
-        InputError: it is not there any more, or the one given is another.
+        InputError: the picture is gone, or the one given is another.
     """
     wanted = facts["facts"]["sha256"]
     if given is None:
@@ -235,8 +235,8 @@ def stored_picture(
     return given
 
 
-def believed(world: World, messages: Sequence[Message], answer: Result) -> World:
-    """The world after an answer: a yes to a doubtful outline that was shown makes it a target."""
+def with_confirmed_outline(world: World, messages: Sequence[Message], answer: Result) -> World:
+    """Return the world after an answer; a yes to a doubtful outline shown makes it a target."""
     last = next((m for m in reversed(messages) if isinstance(m, Result)), None)
     asked = last is not None and last.cause == "low_confidence"
     if world.doubted is None or not asked or not says_yes(answer.text):
@@ -247,7 +247,7 @@ def believed(world: World, messages: Sequence[Message], answer: Result) -> World
 def answered_by(
     run: Run, answer: str | None, approve: bool | None
 ) -> tuple[Result | None, Approval | None]:
-    """What a person's answer adds to the history, and what it lets through.
+    """Return the result that a person's answer adds to the history, and the approval it gives.
 
     Raises:
         InputError: the turn is over, or waits for something else.
@@ -279,7 +279,7 @@ def answered_by(
 
 
 def _outcome(state: State) -> Outcome:
-    """How a turn ended or was left; one that was killed was cancelled from outside."""
+    """Return how a turn ended or was left; one that was killed counts as cancelled."""
     messages, world, end = state.messages, state.world, state.end
     last = messages[-1] if messages else None
     if isinstance(last, Reply) and not last.calls:
@@ -296,7 +296,7 @@ def _outcome(state: State) -> Outcome:
 
 
 def end_facts(outcome: Outcome, report: Report) -> dict[str, Any]:
-    """The event that ends a turn."""
+    """Return the data of the event that ends a turn."""
     facts = {
         "outcome": type(outcome).__name__.lower(),
         "status": report.status,

@@ -1,6 +1,6 @@
 """What a session's log begins with: who decides, within which limits and policy, on which picture.
 
-Whoever goes on with a session works by it, so that it is checked before anything follows from it.
+A session that goes on relies on it, so it is checked before anything follows from it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -47,12 +47,12 @@ class _StoredPicture(_Part):
 
 
 class Opening(Value):
-    """What a session begins with that its first turn works by.
+    """What is fixed at the start of a session, for its first turn.
 
     Attributes:
-        agent: the name, in a service, of who decides.
+        agent: name, in a service, of the agent that decides.
         settings: what the person fixed.
-        pointed: the things meant, where they point.
+        pointed: the things meant, where the person points.
         keep_out: what no robot may enter.
     """
 
@@ -77,7 +77,7 @@ class _Start(_Part):
 
 
 def start_facts(agent: "Agent", picture: Mapping[str, Any]) -> dict[str, Any]:
-    """What the log of a session that an agent begins begins with."""
+    """Return the first event's data for a session that an agent begins."""
     return {
         "format": FORMAT,
         "model": agent.names[0],
@@ -92,20 +92,20 @@ def start_facts(agent: "Agent", picture: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def prompt_facts(agent: "Agent") -> dict[str, Any]:
-    """The prompt and, where two models share the work, all of theirs."""
+    """Return the facts of the agent's prompt and, if two models share the work, of all theirs."""
     facts = tuple(p.facts for p in agent.prompts)
     mine = [f for f, p in zip(facts, agent.prompts, strict=True) if p == agent.prompt]
     return {"prompt": mine[0] if mine else None, "prompts": facts}
 
 
 def read_session(source: Path | StoredSession) -> Sequence[Event]:
-    """The events of a session, of which the first is as formup writes it.
+    """Return the events of a session, having checked that formup wrote the first.
 
     Args:
         source: a log, a folder with one, or a session in a store.
 
     Raises:
-        StorageError: missing, unreadable, or no log of a session.
+        StorageError: the source is missing, unreadable, or not the log of a session.
     """
     events = read_events(source) if isinstance(source, Path) else source.events()
     label = source if isinstance(source, Path) else source.label

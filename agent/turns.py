@@ -1,4 +1,4 @@
-"""A turn that somebody asked for, on its way, and where it has been before under the same key."""
+"""Turns that somebody asked for and that are under way; under one key each is done only once."""
 
 import asyncio
 import hashlib
@@ -25,7 +25,7 @@ class Asked:
 
     Attributes:
         by: their name; empty where there is only one who could.
-        key: of theirs, for this turn: asked again under it, it is not done again.
+        key: their key for this turn: asked for again under the same key, it is not done again.
         may_move: whether robots may be moved for them.
     """
 
@@ -36,12 +36,12 @@ class Asked:
 
 @dataclass(eq=False)
 class Turn:
-    """A turn on its way; awaiting it gives its run.
+    """A turn under way; awaiting it gives its run.
 
     Attributes:
         name: of the command.
-        acting: whether it has the conversation that it changes.
-        digest: of what was asked, to tell whether the same key means the same.
+        acting: whether it holds the conversation that it changes.
+        digest: hash of what was asked for, to tell whether a key was used for the same before.
         number: of the event that began it; 0 before that is written.
         since: when it was asked for, by the monotonic clock.
         moving: set once robots are about to move.
@@ -59,27 +59,27 @@ class Turn:
     _cancelled: bool = False
 
     def __await__(self) -> Generator[Any, None, Run]:
-        """Its run, at its end."""
+        """Wait for the turn's end and return its run."""
         return self.task.__await__()
 
     async def begin(self) -> None:
-        """Wait until its beginning is written, or it has ended.
+        """Wait until the event that begins the turn is written, or the turn has ended.
 
         Raises:
-            InputError: it could not begin.
+            InputError: the turn could not begin.
         """
         await self._first(self.began.wait(), None)
         if self.task.done():
             self._result()
 
     async def wait(self, seconds: float, *, moving: bool = True) -> Run | None:
-        """Its run; None where it goes on after so many seconds.
+        """Return the run if the turn ends within so many seconds, else None.
 
         Args:
-            moving: whether it is not waited for either once it drives robots.
+            moving: whether to stop waiting as soon as the turn drives robots.
 
         Raises:
-            InputError: it could not begin.
+            InputError: the turn could not begin.
         """
         waits = self.moving.wait() if moving else asyncio.sleep(seconds)
         await self._first(waits, seconds)
@@ -91,7 +91,7 @@ class Turn:
         return self.task.result()
 
     async def _first(self, waits: Coroutine[Any, Any, object], seconds: float | None) -> None:
-        """Wait for the first of its end and something else."""
+        """Wait for the turn's end or something else, whichever comes first."""
         other = asyncio.ensure_future(waits)
         try:
             first = asyncio.FIRST_COMPLETED
@@ -100,20 +100,20 @@ class Turn:
             other.cancel()
 
     async def ended(self) -> Run | None:
-        """Its run after it was stopped; None where it had not begun."""
+        """Return the run of the stopped turn, or None if it had not begun."""
         try:
             return await self.task
         except asyncio.CancelledError:
             return None
 
     def cancel(self) -> None:
-        """End it where it is; once, so that it can write how it ended."""
+        """Cancel the turn, once only, so that it can write how it ended."""
         if not self._cancelled:
             self._cancelled = True
             self.task.cancel()
 
     def heard(self, event: Event) -> None:
-        """Be told what was written."""
+        """Take note of an event that was written."""
         if event.kind in ("turn", "resume"):
             self.number = event.number
             self.began.set()
@@ -122,7 +122,7 @@ class Turn:
 
     @property
     def stamp(self) -> dict[str, Any]:
-        """What its event says of who asked for it."""
+        """What the event that begins the turn records of who asked for it."""
         said = {"by": self.asked.by, "key": self.asked.key}
         return {k: v for k, v in said.items() if v} | (
             {"digest": self.digest} if self.asked.key else {}
@@ -134,10 +134,11 @@ def check_key(turn: Turn, before: Mapping[str, tuple[str, int]], *, again: bool 
 
     Args:
         before: the digest and the number of each turn that was asked for, by its key.
-        again: whether the same may be asked for, because it is under way.
+        again: whether the same request is fine, because it joins the turn that is under way.
 
     Raises:
-        InputError: with other arguments (`key`), or with these (`repeated`: `turn` is its number).
+        InputError: the key was used with other arguments (`key`), or with the same ones
+            (`repeated`; `turn` is the number of that turn).
     """
     key = turn.asked.key
     if key is None or key not in before:
@@ -154,7 +155,7 @@ def check_key(turn: Turn, before: Mapping[str, tuple[str, int]], *, again: bool 
 
 
 def digest_of(name: str, arguments: Sequence[Any], options: Mapping[str, Any]) -> str:
-    """A hash of what is asked for; what is only shown does not count."""
+    """Return a hash of what is asked for, without `show`, which is only for display."""
     named = [(k, _as_json(v)) for k, v in sorted(options.items()) if k != "show"]
     try:
         said = to_json([name, *map(_as_json, arguments), named])
@@ -166,15 +167,15 @@ def digest_of(name: str, arguments: Sequence[Any], options: Mapping[str, Any]) -
 
 
 def _as_json(value: Any) -> Any:
-    """An argument as JSON; a picture as its hash."""
+    """Return an argument for JSON: a picture as its hash, others as they are."""
     return value.sha256 if isinstance(value, Picture) else value
 
 
 def note_stop(stored: StoredSession) -> None:
-    """Leave a file beside a session, so that the process which writes it stops its turn.
+    """Leave a file with a session, so that the process which writes the session stops its turn.
 
     Raises:
-        StorageError: it cannot be written.
+        StorageError: the file cannot be written.
     """
     begun = [event.number for event in stored.events() if event.kind in ("turn", "resume")]
     if begun:
@@ -186,6 +187,6 @@ def _note(session: str, turn: int) -> bytes:
 
 
 async def is_noted(stored: StoredSession, turn: int) -> bool:
-    """Whether another process wants a turn stopped."""
+    """Return whether another process wants a turn stopped."""
     name = hashlib.sha256(_note(stored.id, turn)).hexdigest()
     return turn > 0 and await to_its_end(lambda: name in stored.artefacts)

@@ -1,4 +1,4 @@
-"""Context: what one tool call works with: the world, the person's settings, and the services.
+"""The context that one tool call works with: the world, the person's settings, and services.
 
 Services hold what is not state: pixels, the networks and rules that find and measure things, the
 fleet, and caches by content hash. Whatever a tool finds out or decides goes into the next world.
@@ -29,10 +29,10 @@ from .perception.target_prompt import Point
 from .world import Step, World
 
 MOST_FOUND = 64
-"""Pictures whose candidates are remembered."""
+"""Most pictures whose candidates are remembered."""
 _FOUND: dict[tuple[str, ...], tuple[Candidate, ...]] = {}
 BESIDE = "standout+"
-"""Before the name of a detector that knows words: what stands out is found beside what it finds."""
+"""Prefix to the name of a detector that knows words: what stands out is found as well."""
 Descriptor = Literal["edges", "edges+vertices", "matrix"]
 SAME_PLACE = 1.0
 """How far the box of a candidate may be from where it was shown, px."""
@@ -75,10 +75,10 @@ class Settings(Value):
 
 
 def check_settings(settings: Settings) -> None:
-    """Refuse names of what is not there, and what does not go together.
+    """Refuse unknown names, and settings that do not go together.
 
     Raises:
-        InputError: saying so.
+        InputError: the settings have such a name, or do not go together.
     """
     segmenter = segmenter_named(settings.segmenter)
     detector = detector_named(settings.detector.removeprefix(BESIDE))
@@ -104,16 +104,16 @@ class Artefacts(Protocol):
         ...
 
     def get(self, sha256: str) -> bytes:
-        """A file's content.
+        """Return a file's content.
 
         Raises:
-            StorageError: it is missing, or not what it was.
+            StorageError: the file is missing, or not what it was.
         """
         ...
 
 
 class MemoryArtefacts:
-    """Files that are gone when the program ends."""
+    """Files in memory, which are gone when the program ends."""
 
     def __init__(self) -> None:
         self._files: dict[str, bytes] = {}
@@ -135,19 +135,19 @@ USUAL = Settings()
 
 
 async def _unshared(name: str, opened: Callable[[], Fleet]) -> Fleet:
-    """Nobody else has it."""
+    """Open a fleet that no other process uses."""
     return opened()
 
 
 def _ignore(*what: object) -> None:
-    """Nobody keeps what a tool observes."""
+    """Ignore what a tool observes."""
 
 
 Watch = Callable[[tuple[Pose, ...]], None]
 
 
 class Shown(Protocol):
-    """Is given the poses of robots that drive and, of a thing they follow, how it has moved."""
+    """Shows the poses of driving robots and, if they follow a thing, how it has moved."""
 
     def __call__(self, poses: tuple[Pose, ...], moved: Rigid | None = None, /) -> None:
         """Show them."""
@@ -158,12 +158,12 @@ View = Callable[["Context", Plan, Fleet], AbstractContextManager[Shown]]
 
 
 def unseen(context: "Context", plan: Plan, fleet: Fleet) -> AbstractContextManager[Shown]:
-    """Nobody watches the robots."""
+    """Show the robots to nobody."""
     return nullcontext(_ignore)
 
 
 async def _unrecorded(plan_id: str) -> None:
-    """Nobody keeps that robots move."""
+    """Do not record that robots move."""
 
 
 @dataclass
@@ -176,13 +176,13 @@ class Services:
         artefacts: files that events and the world name by their hash.
         found: what detectors found in pictures, by detector, picture, segmenter and phrases; shared
             by all services that are not given their own.
-        asked: the same where a model was asked, which is this conversation's alone.
-        stopped: fleets that were stopped when they were let go of.
-        claim: what is given a fleet's name and what opens it, and returns the one to use; raises
-            where it is another's.
-        watch: is given the poses of robots that drive, to be shown.
-        view: is given a plan, in its context, and the fleet that drives to it; what it yields for
-            as long as that lasts is given the poses too.
+        asked: the same where a model was asked; not shared with other conversations.
+        stopped: names of fleets that were stopped when they were closed.
+        claim: called with a fleet's name and what opens it; returns the fleet to use, or raises if
+            it belongs to another process.
+        watch: called with the poses of driving robots, to show them.
+        view: called with the context, a plan and the fleet that drives to it; what it yields is
+            called with the poses too for as long as the drive lasts.
     """
 
     pictures: dict[str, Picture] = field(default_factory=dict[str, Picture])
@@ -203,7 +203,7 @@ class Services:
         return bool(self.stopped) or any(fleet.stopped for fleet in self.fleets.values())
 
     async def close_fleets(self) -> None:
-        """Let go of all fleets; a stop stays in force when they are opened again."""
+        """Close all fleets; a stop stays in force when they are opened again."""
         for name, fleet in self.fleets.items():
             if fleet.stopped:
                 self.stopped.add(name)
@@ -212,7 +212,7 @@ class Services:
 
     @classmethod
     def of(cls, picture: Picture) -> "Services":
-        """Services for a conversation about one picture."""
+        """Return services for a conversation about one picture."""
         return cls({picture.sha256: picture})
 
 
@@ -221,15 +221,15 @@ class Context:
     """What a tool call works with.
 
     Attributes:
-        words: what the person said last; the contract is held against it.
+        words: what the person said last, which the contract is checked against.
         doubted: doubts that the model was told of in this turn, which its `reading` may answer.
         proposed: id of the plan that an earlier call of the same reply made.
         agreed: whether a person has said yes to this very call.
-        asks: asks the model that decides where things are; None outside of its turns.
-        steps: those of the turns that changed the plan, after the one that undo ends at.
+        asks: detector that asks the model that decides where things are; None outside its turns.
+        steps: the step that undo ends at, then one for each turn that changed the plan.
         observed: puts a world in place at once, because what it says was observed and holds even
             if the call fails or is cut off: measured things, poses of robots.
-        moving: is awaited with a plan's id before the first motion; raising prevents it.
+        moving: awaited with a plan's id before the first motion; raising prevents it.
     """
 
     world: World
@@ -252,10 +252,10 @@ class Context:
         world: World | None = None,
         services: "Services | None" = None,
     ) -> "Context":
-        """The context of a conversation about one picture.
+        """Return the context of a conversation about one picture.
 
         Raises:
-            InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
+            InputError: an unknown segmenter, detector or fleet, or an impossible scale.
         """
         services = services or Services()
         services.pictures[picture.sha256] = picture
@@ -263,10 +263,10 @@ class Context:
         return made.check()
 
     def check(self) -> "Context":
-        """The context, with the person's settings checked and their scale in the world.
+        """Check the person's settings and return the context with their scale in the world.
 
         Raises:
-            InputError: a segmenter, detector or fleet that there is not, or an impossible scale.
+            InputError: an unknown segmenter, detector or fleet, or an impossible scale.
         """
         check_settings(self.settings)
         scale = self.settings.metres_per_pixel
@@ -276,7 +276,7 @@ class Context:
         return replace(self, world=self.world.having(metres_per_pixel=scale))
 
     def at(self, world: World) -> "Context":
-        """The same with another world."""
+        """Return the same context with another world."""
         return replace(self, world=world)
 
     @property
@@ -296,12 +296,12 @@ class Context:
         return next((one for one in known if isinstance(one, Finder)), None)
 
     def looking_for(self, nouns: Iterable[str]) -> "Context":
-        """The same where what nouns name is among the candidates."""
+        """Return the same context with what nouns name among the candidates."""
         phrases = tuple(dict.fromkeys((*self.world.phrases, *map(noun_phrase, nouns))))
         return self.at(self.world.having(phrases=phrases))
 
     def candidates(self) -> tuple[Candidate, ...]:
-        """The things found in the picture: what stands out, then what phrases name.
+        """Return the things found in the picture: what stands out, then what phrases name.
 
         The picture is searched once for each.
         """
@@ -331,7 +331,7 @@ class Context:
         return kept[key]
 
     def candidate(self, name: str) -> Candidate:
-        """The candidate with an id; one that was shown is the one at the place it was shown.
+        """Return the candidate with an id; if one was shown as that, the one at the same place.
 
         Raises:
             ToolError: there is none; the text says which there are.
@@ -341,18 +341,21 @@ class Context:
         for candidate in found:
             if shown is None and candidate.id == name:
                 return candidate
-            if shown is not None and _apart(candidate.outline.bounds, shown.box) <= SAME_PLACE:
+            if (
+                shown is not None
+                and _box_distance(candidate.outline.bounds, shown.box) <= SAME_PLACE
+            ):
                 return candidate
         known = f"c1 to c{len(found)}" if found else "none: nothing stands out in this picture"
         raise ToolError(f"There is no candidate {name!r}. Candidates: {known}.")
 
 
 def noun_phrase(words: str) -> str:
-    """Words for a thing as a detector is asked: lower case, no article, single spaces."""
+    """Return words for a thing as detectors take them: lower case, no article, single spaces."""
     said = words.lower().split()
     return " ".join(said[1:] if said[:1] in (["a"], ["an"], ["the"]) else said)
 
 
-def _apart(box: tuple[float, ...], other: tuple[float, ...]) -> float:
-    """The furthest that two boxes' sides are from each other, px."""
+def _box_distance(box: tuple[float, ...], other: tuple[float, ...]) -> float:
+    """Return the largest distance between the same sides of two boxes, px."""
     return max(abs(a - b) for a, b in zip(box, other, strict=True))

@@ -1,7 +1,7 @@
 """Every exception formup raises on purpose, by who has to act. Code reads `kind` and `facts`.
 
 FormupError
-│   the model mends its call and goes on:
+│   the model corrects its call and goes on:
 ├── ToolError      a tool cannot do what it was asked for
 │   └── ArgumentsError the arguments are against the tool's schema
 │   the person changes what was given:
@@ -50,11 +50,10 @@ no such id; void_plan: the world has changed since; too_many_robots: more than c
 doubt: a contract that does not seem to be what the words say (`doubts`, each a clause); edit: the
 plan after a change is not certified (`findings`, each a sentence); no_order: robots that keep their
 places stand in each other's way; nothing_to_undo: there is no step back, or none taken back;
-missing, busy, gone_on: a session that is not in its store,
-is written by another process, or was written since it was opened; key, repeated: a turn was asked
-for under a key before, with other arguments or the same (`turn`, its number); approval: a yes to
-nothing that waits; not_allowed: whoever asks may not do that; too_large, too_many: more than a
-server takes."""
+missing, busy, gone_on: a session that is not in its store, is written by another process, or was
+written since it was opened; key, repeated: a turn was asked for under a key before, with other
+arguments or the same (`turn`, its number); approval: a yes to something that does not wait for
+one; not_allowed: whoever asks may not do that; too_large, too_many: more than a server takes."""
 
 
 class FormupError(Exception):
@@ -101,7 +100,7 @@ class ApprovalError(InputError):
 
 
 class ToolError(FormupError):
-    """A tool cannot do what its arguments ask; the model is told why and may repair.
+    """A tool cannot do what its arguments ask; the model is told why and may correct them.
 
     Attributes:
         images: PNG or JPEG files that show why, for models that see.
@@ -110,7 +109,7 @@ class ToolError(FormupError):
     images: tuple[bytes, ...] = ()
 
     def showing(self, *images: bytes) -> "ToolError":
-        """The same error with pictures."""
+        """Return the same error with pictures."""
         self.images = images
         return self
 

@@ -11,14 +11,14 @@ from .geometry.outline import Outline, outline_of
 
 
 def outline_rings(outline: Outline) -> dict[str, Any]:
-    """An outline as JSON: the ring around it and those around its holes, (x, y) px."""
+    """Return an outline as JSON: the ring around it and those around its holes, (x, y) px."""
     polygon = outline.polygon
     rings = [list(ring.coords[:-1]) for ring in (polygon.exterior, *polygon.interiors)]
     return {"outline": rings[0]} | ({"holes": rings[1:]} if rings[1:] else {})
 
 
 def rounded_rings(outline: Outline) -> tuple[list[Any], list[Any]]:
-    """The ring around an outline and those around its holes, rounded to what they are known to."""
+    """Return the ring around an outline and those around its holes, rounded to 0.001 px."""
     rings = outline_rings(outline)
     rounded = [
         [[round(x, 3), round(y, 3)] for x, y in ring]
@@ -28,7 +28,7 @@ def rounded_rings(outline: Outline) -> tuple[list[Any], list[Any]]:
 
 
 def _read_outline(value: Any) -> Outline:
-    """An outline, or what `outline_rings` wrote, with its rings exactly as they were."""
+    """Return an outline as it is, or read what `outline_rings` wrote, with exactly its rings."""
     if isinstance(value, Outline):
         return value
     try:

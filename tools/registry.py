@@ -21,7 +21,7 @@ class Registry(Generic[T]):
 
     Attributes:
         noun: what they are, for messages, such as `fleet`.
-        group: of the entry points that add more, such as `formup.fleets`.
+        group: group of the entry points that add more, such as `formup.fleets`.
         builtin: `module:attribute` of those that formup brings, by name.
     """
 
@@ -30,12 +30,12 @@ class Registry(Generic[T]):
     builtin: Mapping[str, str]
 
     def names(self) -> tuple[str, ...]:
-        """All there are: built in first, then those of other packages, sorted."""
+        """Return all names: those built in first, then those of other packages, sorted."""
         others = entry_points(group=self.group).names - set(self.builtin)
         return (*self.builtin, *sorted(others))
 
     def load(self, name: str) -> T:
-        """The object of a name.
+        """Return the object of a name.
 
         Raises:
             InputError: there is none, or its package cannot be imported.
@@ -55,7 +55,7 @@ class Registry(Generic[T]):
 
 
 def built(registry: Registry[Callable[..., T]], full_name: str) -> T:
-    """The object that a registered class makes.
+    """Return the object that a registered class makes.
 
     Args:
         full_name: NAME, or NAME:CHECKPOINT for what is made from a checkpoint.

@@ -1,7 +1,7 @@
-"""JSON Schemas as short as they can be said: models read, and people pay for, every word of them.
+"""Makes JSON Schemas as short as they can be: models read, and people pay for, every word of them.
 
-Titles repeat names, a null only says that something may be left out, and what is referred to once
-may as well stand there.
+Titles repeat names, a null only says that something may be left out, and a definition that is used
+once may as well be inlined.
 """
 
 import json
@@ -13,11 +13,11 @@ from pydantic import BaseModel
 BOUNDS = frozenset(
     f"{which}{what}" for which in ("min", "max") for what in ("imum", "Items", "Length")
 ) | {"exclusiveMinimum", "additionalProperties", "pattern", "default"}
-"""What a schema says of values that a model need not be told: an answer says what is wrong."""
+"""What a schema says of values that a model need not be told, since errors say what is wrong."""
 
 
 def compact_schema(model: type[BaseModel]) -> dict[str, Any]:
-    """A model's schema (draft 2020-12), which accepts all that the model's own does but nulls."""
+    """Return a schema (draft 2020-12) that accepts what the model's own does, except for nulls."""
     whole = model.model_json_schema()
     kinds = cast("dict[str, Any]", whole.pop("$defs", {}))
     written = json.dumps([whole, kinds])
@@ -40,7 +40,7 @@ def _compact(node: Any, once: Mapping[str, Any]) -> Any:
         return _compact({**once[name], **{k: v for k, v in fields.items() if k != "$ref"}}, once)
     made: dict[str, Any] = {}
     for key, value in fields.items():
-        if key == "properties":  # here keys are names of their own
+        if key == "properties":  # here keys are names of properties
             made[key] = {name: _compact(kind, once) for name, kind in value.items()}
         elif key == "anyOf" and {"type": "null"} in value:
             given = [_compact(choice, once) for choice in value if choice != {"type": "null"}]
@@ -53,14 +53,14 @@ def _compact(node: Any, once: Mapping[str, Any]) -> Any:
 
 
 def without_bounds(node: Any) -> Any:
-    """A schema as models are offered it: with every name, kind and choice, without BOUNDS."""
+    """Return a schema as offered to models: with every name, kind and choice, without BOUNDS."""
     if isinstance(node, list):
         return [without_bounds(item) for item in cast("list[Any]", node)]
     if not isinstance(node, dict):
         return node
     made: dict[str, Any] = {}
     for key, value in cast("dict[str, Any]", node).items():
-        if key in ("properties", "$defs"):  # here keys are names of their own
+        if key in ("properties", "$defs"):  # here keys are names of properties or definitions
             made[key] = {name: without_bounds(kind) for name, kind in value.items()}
         elif key not in BOUNDS:
             made[key] = without_bounds(value)

@@ -1,6 +1,6 @@
-"""A world as a file and back: the state file of single tool calls, and plan.json.
+"""Writes a world to a file and reads it: the state file of single tool calls, and plan.json.
 
-Pictures are not in it but named, with their hash; reading refuses one that has changed.
+Pictures are not in the file but named, with their hash; one that has changed is refused.
 """
 
 import hashlib
@@ -28,10 +28,10 @@ class StoredWorld(Value):
     """A world as a file holds it.
 
     Attributes:
-        digest: of the content, by which an alteration shows.
+        digest: hash of the content, which shows alterations.
         plan_id: the plan that a plan.json is for.
-        instruction: that the plan is for.
-        picture: where the picture lay; beside the file, in `pictures`, it is looked for first.
+        instruction: the instruction that the plan is for.
+        picture: where the picture lay; it is first looked for beside the file, in `pictures`.
     """
 
     format: str = FORMAT
@@ -42,7 +42,7 @@ class StoredWorld(Value):
     world: World
 
     def to_bytes(self) -> bytes:
-        """The file's content."""
+        """Return the file's content."""
         content = to_json_values(self)
         content["format"] = self.format
         content["digest"] = _digest(content)
@@ -50,7 +50,7 @@ class StoredWorld(Value):
 
 
 def plan_file(world: World, plan_id: str, instruction: str, picture: Picture) -> bytes:
-    """A plan.json: one plan with all it depends on, to be approved and deployed as it is."""
+    """Return a plan.json: one plan with all it depends on, to be approved and deployed as it is."""
     one = world.having(
         plans={plan_id: world.plans[plan_id]},
         current=plan_id,
@@ -68,7 +68,7 @@ def read_world(path: Path) -> StoredWorld:
     """Read a state file or a plan.json.
 
     Raises:
-        InputError: missing, no JSON, of another format, damaged or altered.
+        InputError: the file is missing, no JSON, of another format, damaged or altered.
     """
     try:
         data = parse_json(read_text(path), path)
@@ -98,7 +98,7 @@ def read_world(path: Path) -> StoredWorld:
 
 
 def picture_of(stored: StoredWorld, path: Path, given: Picture | None = None) -> Picture:
-    """The picture that a stored world is about.
+    """Return the picture that a stored world is about.
 
     Args:
         path: of the file it was read from.
@@ -127,19 +127,19 @@ def picture_of(stored: StoredWorld, path: Path, given: Picture | None = None) ->
 
 
 def _digest(content: dict[str, Any]) -> str:
-    """SHA-256 of a file's content as it is written, but for the digest in it."""
+    """Return the SHA-256 of a file's content as it is written, without the digest in it."""
     return hashlib.sha256(to_json(content | {"digest": ""})).hexdigest()
 
 
 def parse_json(text: str, source: object) -> Any:
-    """The value of a JSON text that all readers take in the same way.
+    """Return the value of a JSON text, refusing what readers may take differently.
 
     Args:
         source: what an error names: a file, or an option.
 
     Raises:
-        InputError: a name that an object has twice.
-        ValueError, RecursionError: it is no JSON.
+        InputError: an object has the same name twice.
+        ValueError, RecursionError: the text is no JSON.
     """
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -154,13 +154,14 @@ def parse_json(text: str, source: object) -> Any:
 
 
 def read_text(path: Path) -> str:
-    """The text of a file a person named, without a byte order mark.
+    """Return the text of a file a person named, without a byte order mark.
 
     Raises:
-        StorageError: missing, no regular file, too large, not readable or not UTF-8.
+        StorageError: the file is missing, no regular file, too large, not readable, or neither
+            UTF-8 nor UTF-16 with its byte order mark.
     """
     data = read_bytes(path)
-    wide = data[:2] in (BOM_UTF16_LE, BOM_UTF16_BE)  # Excel and PowerShell write it, with its mark
+    wide = data[:2] in (BOM_UTF16_LE, BOM_UTF16_BE)  # Excel and PowerShell write UTF-16 like this
     try:
         text = data.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeError:
@@ -169,10 +170,10 @@ def read_text(path: Path) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file a person named.
+    """Return the content of a file a person named.
 
     Raises:
-        StorageError: missing, no regular file, too large or not readable.
+        StorageError: the file is missing, no regular file, too large or not readable.
     """
     try:
         if path.exists() and not path.is_file():
@@ -185,7 +186,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file at once or not at all, readable to whom the person's umask allows.
+    """Write a file as a whole or not at all, readable by whomever the person's umask allows.
 
     What is no file, such as /dev/stdout, is written to and stays what it is; a link is followed.
 

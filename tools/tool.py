@@ -1,7 +1,7 @@
 """A tool is a typed function with a docstring; its JSON Schema is read from both, once.
 
 The first parameter is the Context the call works with; the rest is what the model fills in.
-Every parameter must be described, with unit and frame where it has one: this fails at import.
+Every parameter must be described, with unit and frame where it has one, or the import fails.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ end: gives up, which ends the turn."""
 
 @dataclass(frozen=True)
 class ToolResult:
-    """What a tool gives back.
+    """What a tool returns.
 
     Attributes:
         data: JSON object; what the model reads.
@@ -58,7 +58,7 @@ ToolFunction = Callable[..., Answer | Awaitable[Answer]]
 
 @dataclass(frozen=True)
 class FilledBy:
-    """Marks an argument that is of no use without a tool, by its name."""
+    """Marks an argument that is of no use without another tool, named here."""
 
     tool: str
 
@@ -85,13 +85,13 @@ class Tool:
 
     @property
     def offered(self) -> dict[str, Any]:
-        """The schema as models read it, in fewer words: what it leaves out, `parse` says."""
+        """The schema as models read it, in fewer words; `parse` reports what it leaves out."""
         schema = self.schema
         shown = {k: v for k, v in schema["properties"].items() if k not in self.hidden}
         return without_bounds(schema | {"properties": shown})
 
     def beside(self, names: Collection[str]) -> "Tool":
-        """This tool, offered with others alone: what only further ones could fill is hidden."""
+        """Return this tool as offered beside the named ones, without arguments that need others."""
         hidden = (
             name
             for name, field in self.arguments.model_fields.items()
@@ -100,10 +100,10 @@ class Tool:
         return replace(self, hidden=frozenset(hidden))
 
     def parse(self, arguments: Mapping[str, Any]) -> BaseModel:
-        """Validated arguments.
+        """Return validated arguments.
 
         Raises:
-            ArgumentsError: naming every violation at once.
+            ArgumentsError: they are against the schema; the text names every violation at once.
         """
         try:
             return self.arguments.model_validate(dict(arguments))
@@ -112,12 +112,12 @@ class Tool:
             raise ArgumentsError(text, plain=violations(error, plain=True)) from None
 
     async def call(self, context: Context, arguments: Mapping[str, Any]) -> ToolResult:
-        """Validate and run; a plain function runs in a thread of its own.
+        """Validate the arguments and run; a plain function runs in a thread of its own.
 
-        One that runs on after it was given up can no longer put a world in place.
+        A function that runs on after it was given up can no longer put a world in place.
 
         Raises:
-            ArgumentsError: they are against the schema.
+            ArgumentsError: the arguments are against the schema.
             ToolError: what they ask for is not possible; for the model.
         """
         parsed = self.parse(arguments)
@@ -142,7 +142,7 @@ class Tool:
 async def in_thread(work: Callable[[], Any]) -> Any:
     """Run without blocking the event loop, so that time limits and Ctrl-C work.
 
-    A daemon thread of its own: no pool waits at the end of the program for one that hangs.
+    The thread is a daemon of its own: a pool would wait for one that hangs as the program ends.
     """
     loop = asyncio.get_running_loop()
     done: asyncio.Future[Any] = loop.create_future()
@@ -160,7 +160,7 @@ async def in_thread(work: Callable[[], Any]) -> Any:
         try:
             value = work()
         except BaseException as raised:
-            # No future takes a StopIteration, and a tool's sys.exit() is not the program's.
+            # No future takes a StopIteration, and a tool's sys.exit() must not end the program.
             plain = isinstance(raised, Exception) and not isinstance(raised, StopIteration)
             error = raised if plain else RuntimeError(repr(raised))
         with suppress(RuntimeError):  # the loop has been closed: nobody waits any more
@@ -172,12 +172,12 @@ async def in_thread(work: Callable[[], Any]) -> Any:
 
 
 async def to_its_end(work: Callable[[], T], *, last: bool = False) -> T:
-    """The result of work in a thread, such as a write, that is waited for in any case.
+    """Run work in a thread, such as a write, wait for it in any case and return its result.
 
-    Being cancelled takes effect after it, so that what was done is what is known here.
+    A cancellation takes effect afterwards, so that it is known here what was done.
 
     Args:
-        last: nothing comes after it that could be cancelled.
+        last: whether nothing comes after it that could be cancelled.
     """
     job, task, cancelled = asyncio.ensure_future(in_thread(work)), asyncio.current_task(), False
     while not job.done():
@@ -223,10 +223,10 @@ def tool(kind: Kind) -> Callable[[ToolFunction], Tool]:
 
 
 def violations(error: ValidationError, *, plain: bool = False) -> str:
-    """All violations of a validation as one line a model or a person can act on.
+    """Return all violations of a validation as one line a model or a person can act on.
 
     Args:
-        plain: name the argument alone, not its place among the others, and not where the text does.
+        plain: name the argument without the path to it, and not at all where the text names it.
     """
     lines: list[str] = []
     items = error.errors(include_url=False)
@@ -250,7 +250,7 @@ def violations(error: ValidationError, *, plain: bool = False) -> str:
 
 
 def _docstring(text: str) -> tuple[str, dict[str, str]]:
-    """A docstring's description and its `Args:` lines by name."""
+    """Return a docstring's description and its `Args:` lines by name."""
     head, _, tail = text.partition("\nArgs:\n")
     body = re.split(r"\n(?=\S)", tail)[0]
     documented = {

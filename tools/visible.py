@@ -1,18 +1,18 @@
-"""Text from elsewhere, safe to show: what would steer a terminal or a page is written out.
+"""Makes text from elsewhere safe to show: what would control a terminal or a page is escaped.
 
 Models, tools, files and prompts may hold escape sequences that recolour, hide or overwrite what
-was printed, and marks that turn the order of letters around.
+was printed, and marks that reverse the order of letters.
 """
 
 import json
 from unicodedata import category
 
 STAY = frozenset("\n\t\u200c\u200d")
-"""Line ends, tabs, and the two joiners that Persian, Indic scripts and emoji are written with."""
+"""Left as they are: line ends, tabs, and the two joiners of Persian, Indic scripts and emoji."""
 
 
 def visible(text: str) -> str:
-    """The text with each control or format character, C1 and bidi included, written as `\\u001b`.
+    """Return text with control and format characters, C1 and bidi too, written as `\\u001b`.
 
     The escapes are those of JSON: JSON stays the same value.
     """

@@ -51,12 +51,12 @@ class Target(Value):
         label: what it is called; "the thing pointed at" where nobody named it.
         box: x0, y0, x1, y1.
         confidence: alpha, 0 to 1: self-consistency of the segmentation, not accuracy.
-        outline: measured, holes kept.
+        outline: as measured, with its holes.
         prompt: what it was found from: point, box, outline, candidate or mask.
-        parts: what alpha was made of.
+        parts: the values that alpha was computed from.
         source: what it was found from, if that was an outline somebody drew, or a mask.
-        missed: where the rough outline it was found from reaches out of `outline`, (x, y, by px).
-        added: where `outline` reaches out of that, likewise.
+        missed: where the rough outline it was found from reaches beyond `outline`, (x, y, by px).
+        added: where `outline` reaches beyond that, likewise.
         seen: whether a model was shown the outline to look at.
         note: what a person should know of how it was found; often empty.
     """
@@ -80,9 +80,9 @@ class KeepOut(Value):
 
     Attributes:
         id: k1, k2, ... if it is hard, else that of a candidate.
-        reason: why, in a few words; of a candidate what it looks like.
+        reason: why, in a few words; for a candidate what it looks like.
         hard: whether a plan that enters it cannot be certified; else it is avoided where possible.
-        confidence: 0 to 1, that it is a thing.
+        confidence: 0 to 1, how certain it is that it is a thing.
     """
 
     id: str
@@ -106,7 +106,7 @@ class PlanNode(Value):
     Attributes:
         parent: id of the plan it was made from by an edit.
         edit: the edits that made it, as JSON.
-        words: of the person, which it was made for.
+        words: the person's words that it was made for.
         unseen: targets whose outlines are to be looked at before robots move.
         encounters: other things that robots stand on or drive over, as far as is known.
         motion: the certificate of the way there from where the robots stood when it was made;
@@ -141,9 +141,9 @@ class World(Value):
         targets: measured things.
         keep_out: regions robots stay off.
         plans: by id, in the order they were last proposed.
-        current: the id of the plan that stands, certified in full; edits apply to it.
+        current: the id of the current plan, which is certified in full; edits apply to it.
         arrivals: by plan id, what was observed after its last deployment, the latest last.
-        robots: last observed pose of each robot; a snapshot, the fleet knows.
+        robots: last observed pose of each robot; a snapshot, since only the fleet knows.
         shown: candidates that a question offered.
         phrases: nouns that were looked for in the picture, in order; candidates' ids follow it.
         samples: positions that sampling tools named, s1, s2, ...
@@ -151,7 +151,7 @@ class World(Value):
         undone: how many of the steps that led here were taken back since the last plan was made.
 
     Raises:
-        InputError: metres per pixel that no picture has.
+        InputError: an impossible scale.
     """
 
     picture: PictureFacts
@@ -177,20 +177,20 @@ class World(Value):
 
     @classmethod
     def of(cls, picture: Picture, **parts: Any) -> "World":
-        """The world of a picture in which nothing has been found yet, or what `parts` give.
+        """Return the world of a picture in which nothing has been found yet, or what `parts` give.
 
-        Its scale is the one its file says, if it does.
+        Its scale is the one that the picture's file gives, if any.
         """
         facts = PictureFacts(sha256=picture.sha256, width=picture.width, height=picture.height)
         parts.setdefault("metres_per_pixel", picture.metres_per_pixel)
         return cls(picture=facts, **parts)
 
     def having(self, **parts: Any) -> "World":
-        """The world with other parts, which are not validated again."""
+        """Return the world with other parts, which are not validated again."""
         return self.model_copy(update=parts)
 
     def version_of(self, contract: Contract) -> str:
-        """Hash of what a contract's certificate depends on.
+        """Return a hash of what a contract's certificate depends on.
 
         That is the picture, its scale, the outlines the contract names, and all that no robot may
         enter. A target that was measured anew changes it for the contracts that name it.
@@ -201,11 +201,11 @@ class World(Value):
         return scene_version(self.picture.sha256, outlines, self.metres_per_pixel)
 
     def is_void(self, plan: Plan) -> bool:
-        """Whether what a plan was certified in has changed since."""
+        """Return whether what a plan was certified in has changed since."""
         return plan.formation.scene_version != self.version_of(plan.formation.contract)
 
     def target(self, name: str) -> Target:
-        """The target with an id.
+        """Return the target with an id.
 
         Raises:
             ToolError: there is none; the text lists those there are.
@@ -217,21 +217,21 @@ class World(Value):
         raise ToolError(f"There is no target {name!r}. Targets: {known}.", "unknown_target")
 
     def with_target(self, target: Target) -> "World":
-        """The world with one more target, or with the one of the same id replaced."""
+        """Return the world with one more target, or with the one of the same id replaced."""
         others = tuple(t for t in self.targets if t.id != target.id)
         return self.having(targets=(*others, target))
 
     def with_doubted(self) -> "World":
-        """The world to show to a person: with the outline that is doubted, if one is."""
+        """Return the world to show to a person: with the doubted outline, if there is one."""
         return self if self.doubted is None else self.with_target(self.doubted)
 
     def with_sample(self, points: Sequence[Point]) -> tuple["World", str]:
-        """The world with sampled positions under the next name, and that name."""
+        """Return the world with sampled positions under the next name, and that name."""
         name = f"s{len(self.samples) + 1}"
         return self.having(samples={**self.samples, name: tuple(points)}), name
 
     def with_plan(self, node: PlanNode) -> "World":
-        """The world with a plan as the latest one and, if it is certified in full, the current."""
+        """Return the world with a plan as the latest and, if certified in full, the current one."""
         name = node.plan.id
         others = {n: p for n, p in self.plans.items() if n != name}
         plans = {**others, name: node}
@@ -254,17 +254,17 @@ class World(Value):
         return Step.model_construct(**{name: getattr(self, name) for name in Step.model_fields})
 
     def back_at(self, step: Step, undone: int) -> "World":
-        """What was decided as it was then; plans stay known, and robots where they are."""
+        """Return the world with the decisions of a step; plans and robots stay as they are."""
         parts = {name: getattr(step, name) for name in Step.model_fields}
         return self.having(**parts, undone=undone)
 
     def with_arrival(self, plan_id: str, arrival: Arrival) -> "World":
-        """The world after a deployment."""
+        """Return the world after a deployment."""
         others = {n: a for n, a in self.arrivals.items() if n != plan_id}
         return self.having(arrivals={**others, plan_id: arrival})
 
     def plan(self, plan_id: str | None = None) -> PlanNode:
-        """The plan with an id, if what it was certified in is still so.
+        """Return the plan with an id, if what it was certified in has not changed.
 
         Args:
             plan_id: None for the current plan.
@@ -290,10 +290,10 @@ class World(Value):
         return node
 
     def site(self, contract: Contract) -> Site:
-        """The outlines a contract refers to, the picture's size, and what else is in it.
+        """Return the outlines a contract refers to, the picture's size, and what else is in it.
 
         Raises:
-            ToolError: it names a target that is not there.
+            ToolError: the contract names a target that is not there.
         """
         outlines = {name: self.outline(name) for name in contract.target_ids}
         whole = self.whole_site
@@ -314,7 +314,7 @@ class World(Value):
         return Site(outlines, *self.picture.size, self.metres_per_pixel, tuple(things))
 
     def outline(self, name: str) -> Outline:
-        """The outline of a target, or of a region that no robot may enter.
+        """Return the outline of a target, or of a region that no robot may enter.
 
         Raises:
             ToolError: there is none.
@@ -323,7 +323,7 @@ class World(Value):
         return hard[name] if name in hard else self.target(name).outline
 
     def met(self, plan_id: str) -> dict[str, Outline]:
-        """The other things that robots of a plan stand on or drive over, by their ids."""
+        """Return the outlines of things that a plan's robots stand on or drive over, by id."""
         node = self.plans.get(plan_id)
         names = {e.thing for e in node.encounters} if node is not None else set[str]()
         things = (*self.targets, *self.keep_out)
@@ -334,10 +334,10 @@ _ANYTHING: TypeAdapter[Any] = TypeAdapter(Any)
 
 
 def to_json_values(value: Any) -> Any:
-    """Values as JSON, what is as usual left out."""
+    """Return values as JSON, without what has its default value."""
     return _ANYTHING.dump_python(value, mode="json", exclude_defaults=True)
 
 
 def _canonical(outline: Outline) -> str:
-    """The region as text that does not depend on where its rings start or how they are ordered."""
+    """Return the region as text that depends neither on where rings start nor on their order."""
     return shapely.to_wkt(shapely.normalize(outline.polygon), rounding_precision=6)

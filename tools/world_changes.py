@@ -1,4 +1,4 @@
-"""What a log writes of a world: what has changed since the event before, and how it is read again.
+"""Writes to a log what has changed in a world since the event before, and reads it again.
 
 However many changes are read, each item that is left of them is validated once.
 """
@@ -22,10 +22,10 @@ class TurnEnd(NamedTuple):
 
 
 def changes_since(world: World, before: World | None) -> dict[str, Any]:
-    """What differs from an earlier world, as JSON that `with_changes` reads.
+    """Return what differs from an earlier world, as JSON that `with_changes` reads.
 
-    Of the parts that go by id (targets, plans, ...) only new and other items are written, which
-    come last, and the order of all ids where they do not; other parts are written whole.
+    Of the parts that go by id (targets, plans, ...) only new and changed items are written, with
+    the order of all ids unless those items come last; other parts are written whole.
     """
     changed: dict[str, Any] = {}
     for name in World.model_fields:
@@ -45,7 +45,7 @@ def changes_since(world: World, before: World | None) -> dict[str, Any]:
 
 
 def with_changes(world: World, *changes: Mapping[str, Any]) -> World:
-    """The world after changes that `changes_since` wrote, one after another.
+    """Return the world after changes that `changes_since` wrote, one after another.
 
     Raises:
         ValidationError, KeyError, TypeError, ValueError, AttributeError: it did not write them.
@@ -56,7 +56,7 @@ def with_changes(world: World, *changes: Mapping[str, Any]) -> World:
 def after_turns(
     world: World, turns: Sequence[Sequence[Mapping[str, Any]]]
 ) -> tuple[World, tuple[TurnEnd, ...]]:
-    """The world after the changes of several turns, and what undo restores of each one's end.
+    """Return the world after the changes of several turns, and what undo restores of their ends.
 
     Raises:
         ValidationError, KeyError, TypeError, ValueError, AttributeError: see `with_changes`.
@@ -76,7 +76,7 @@ def after_turns(
 
 
 def _apply(change: Mapping[str, Any], parts: dict[str, Any], world: World) -> None:
-    """Put the items of a change in place among parts that are not validated yet."""
+    """Apply a change to parts of a world that are not validated yet."""
     for name, value in change.items():
         if name not in BY_ID:
             parts[name] = value

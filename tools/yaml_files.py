@@ -1,4 +1,4 @@
-"""YAML files that people write: read strictly, as a word that goes unheard may move robots."""
+"""Reads YAML files that people write, strictly, as a word that is ignored may move robots."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,13 +15,14 @@ MOST_BYTES = 1_000_000
 
 
 def content_of(path: Path, begin: str) -> dict[str, Any]:
-    """The mapping that a file holds.
+    """Return the mapping that a file holds.
 
     Args:
-        begin: a line that it may begin with.
+        begin: a line that such a file may begin with, for the error.
 
     Raises:
-        InputError: it cannot be read, is not YAML, says something twice, or holds no mapping.
+        InputError: the file is too large, cannot be read, is not YAML, says something twice, or
+            holds no mapping.
     """
     try:
         if path.stat().st_size > MOST_BYTES:
@@ -38,13 +39,13 @@ def content_of(path: Path, begin: str) -> dict[str, Any]:
 
 
 def validated(path: Path, what: str, model: type[Model], given: Mapping[str, Any]) -> Model:
-    """A file's content as a model.
+    """Return a file's content as a model.
 
     Args:
-        what: it describes, with its article.
+        what: what the file describes, with its article.
 
     Raises:
-        InputError: it does not; names every mistake.
+        InputError: the file does not describe that; the text names every mistake.
     """
     try:
         return model.model_validate(given)
@@ -57,13 +58,13 @@ def _mistake(found: ErrorDetails) -> str:
     where = ".".join(map(str, found["loc"]))
     if found["type"] == "extra_forbidden":
         return f"{where}: no such key"
-    if found["type"] == "value_error":  # a sentence of ours, which says what was given if it may
+    if found["type"] == "value_error":  # a sentence of ours, which quotes what was given if it may
         return f"{where}: {found.get('ctx', {})['error']}".removeprefix(": ")
     return f"{where}: {found['msg'].lower()}, got {found['input']!r}"
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML in which nothing is said twice, as one of the two would go unheard."""
+    """A loader that refuses a key given twice, as one of the two would be ignored."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys = [key.value for key, _ in node.value]

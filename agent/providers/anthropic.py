@@ -1,4 +1,4 @@
-"""Anthropic Messages, with its marks for prompt caching."""
+"""Anthropic's Messages API, with its marks for prompt caching."""
 
 import io
 from functools import lru_cache
@@ -29,11 +29,12 @@ from .wire import (
 
 VERSION = "2023-06-01"
 MAX_TOKENS = 8_192
-"""Of one reply; the interface wants a bound, and this is the least of the current models'."""
+"""Most tokens of one reply; the API requires a bound, and this is the lowest of current models."""
 CACHED_TURNS = 2
-"""The last turn's mark writes the cache for the next request, the one before reads it."""
+"""User turns with a cache mark: the last one writes the cache for the next request, the one
+before it reads what was cached."""
 _PLAIN = {"text", "tool_use"}
-"""Blocks that can be written anew; thoughts, signed or hidden, have to come back as they came."""
+"""Blocks that can be rebuilt; thoughts, signed or hidden, have to be sent back as they came."""
 _MARK = b',"cache_control":{"type":"ephemeral"}}'
 
 
@@ -43,7 +44,7 @@ _GROWING = {
     "thinking": "thinking",
     "signature": "signature",
 }
-"""Fields of deltas, and the fields of blocks that they make grow."""
+"""Fields of deltas, and the fields of blocks that they extend."""
 
 
 class _Block(BaseModel):
@@ -70,7 +71,7 @@ class _Assembly(Assembly):
         self._usage: dict[str, Any] = {}
 
     def whole(self) -> Any:
-        # What was streamed as text stays text: only a complete reply is read.
+        # JSON that was streamed as text stays text: it is parsed once the reply is complete.
         for (index, name), text in self._grown.items():
             block, field = self._blocks.setdefault(index, {}), _GROWING[name]
             begun = block.get(field)
@@ -91,7 +92,7 @@ class _Assembly(Assembly):
             return delta.get("text") or ""
         if kind == "content_block_start":
             self._blocks[index] = {} | event["content_block"]
-        if kind == "message":  # all of it in one event
+        if kind == "message":  # the whole message in one event
             blocks: list[dict[str, Any]] = event["content"]
             self._blocks, delta = dict(enumerate(blocks)), event
         message: dict[str, Any] = event.get("message") or {}
@@ -104,7 +105,7 @@ class _Assembly(Assembly):
 
 
 class Anthropic(Wire):
-    """Speaks Messages."""
+    """The wire format of Anthropic's Messages API."""
 
     assembly = _Assembly
 
@@ -114,15 +115,15 @@ class Anthropic(Wire):
         self._blocks = MessageCache(self._role_and_blocks)
 
     def path(self, *, stream: bool) -> str:
-        """What follows the base URL."""
+        """Return what follows the base URL."""
         return "/v1/messages"
 
     def headers(self, key: str | None) -> dict[str, str]:
-        """The version of the interface, and the key where there is one."""
+        """Return the version of the API, and the key where there is one."""
         return {"anthropic-version": VERSION} | ({"x-api-key": key} if key else {})
 
     def body(self, request: Request, *, stream: bool) -> bytes:
-        """A request as JSON."""
+        """Return a request as JSON."""
         parts = [b'{"model":', self._model, b',"max_tokens":%d' % MAX_TOKENS]
         if request.system:
             parts += [b',"system":[', _cache_marked(_text_block(request.system)), b"]"]
@@ -135,7 +136,7 @@ class Anthropic(Wire):
         return b"".join([*parts, b"}"])
 
     def reply(self, body: Any, request: Request) -> Reply:
-        """What a complete body answers to a request."""
+        """Return the reply that a complete body holds."""
         message = validated(body, _Message, "message")
         text = "".join(b.text or "" for b in message.content if b.type == "text")
         if message.stop_reason == "refusal":
@@ -155,7 +156,7 @@ class Anthropic(Wire):
         return Reply(text=text, calls=calls, usage=usage, opaque=self._ids.opaque(calls, items))
 
     def _turns(self, request: Request) -> bytes:
-        """Messages by turns: results and what a person says belong to the same one."""
+        """Return messages by turns: results and what a person says share one turn."""
         said = [turn for message in request.messages if (turn := self._blocks(message))[1]]
         by_role = groupby(said, key=lambda turn: turn[0])
         turns = [(role, [blocks for _, blocks in turn]) for role, turn in by_role]
@@ -166,7 +167,7 @@ class Anthropic(Wire):
         )
 
     def _role_and_blocks(self, message: User | Reply | Result) -> tuple[bytes, bytes]:
-        """Role and blocks of a message; none where it says nothing, for empty ones are refused."""
+        """Return a message's role and blocks, none if it is empty: empty blocks are refused."""
         if isinstance(message, Reply):
             blocks = self._ids.items(message) or self._blocks_of(message)
             return b"assistant", b",".join(map(dumped, blocks))
@@ -180,7 +181,7 @@ class Anthropic(Wire):
         return b"user", dumped(head)[:-1] + b',"content":[' + content + b"]}"
 
     def _blocks_of(self, reply: Reply) -> list[dict[str, Any]]:
-        """A reply of which text and calls are all there is."""
+        """Return the blocks of a reply that holds nothing but text and calls."""
         text = [{"type": "text", "text": reply.text}] if reply.text.strip() else []
         calls = [
             {
@@ -214,7 +215,7 @@ def _image_block(image: bytes) -> bytes:
 
 
 def _cache_marked(blocks: bytes) -> bytes:
-    """Blocks with a cache mark in the last of them."""
+    """Return blocks with a cache mark in the last one."""
     return blocks[:-1] + _MARK
 
 

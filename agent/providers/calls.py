@@ -1,6 +1,6 @@
 """Calls as models and servers really write them: decorated names, arguments as text, calls in text.
 
-What can be read in more than one way is not read: it goes back to the model as it was written.
+What is ambiguous is not interpreted: it goes back to the model as it was written.
 """
 
 import hashlib
@@ -21,17 +21,17 @@ from .wire import dumped, safe_name
 Written = tuple[str | None, str, object]
 """A call as it came: id, name, arguments."""
 UNREADABLE = "this is not a JSON object"
-"""The argument under which a model gets back what it wrote in place of its arguments. No tool has
-such a parameter, so the call fails and says so, and what is sent on to servers is valid JSON."""
+"""The argument under which a model gets back arguments that could not be read. No tool has such a
+parameter, so the call fails and says so, and what is sent on to servers is valid JSON."""
 MOST_ID = 40
-"""Characters; OpenAI refuses longer ids than this."""
+"""Most characters of an id; OpenAI refuses longer ones."""
 _PLAIN_ID = re.compile(rf"[a-zA-Z0-9_-]{{1,{MOST_ID}}}")
 _BEFORE_NAME = r"(?:.*(?:[.:/]|__)|(?:functions|default_api)_)?"
 """Namespaces: functions.NAME, default_api:NAME, mcp__SERVER__NAME, functions_NAME."""
 _AFTER_NAME = r"(?:[:._#-]\d+|\(\)|<\|.*)?"
-"""A number among the calls of a reply, or special tokens: NAME:0, NAME<|channel|>commentary."""
+"""The number of a call in its reply, or special tokens: NAME:0, NAME<|channel|>commentary."""
 _THOUGHTS = re.compile(r"\A.*</think(?:ing)?>", re.DOTALL)
-"""Some servers eat the mark that thoughts begin with."""
+"""Thoughts up to their closing tag; some servers swallow the opening one."""
 _FENCED = re.compile(r"\A\s*```\w*\s(.*)```\s*\Z", re.DOTALL)
 _CLOSED = re.compile(r"(?:\s*(?:</[\w-]+>|<\|[\w-]+\|>))+\s*\Z")
 _OPENED = re.compile(r"^\s*(?=<tool_call>|<function_call>|\[TOOL_CALLS\])", re.MULTILINE)
@@ -40,10 +40,10 @@ _DECODER = json.JSONDecoder()
 
 
 def read(text: str, written: list[Written], request: Request) -> tuple[str, tuple[Call, ...]]:
-    """What a reply says and which calls it makes, thoughts aside; calls may stand in its text.
+    """Return a reply's text without thoughts, and its calls, which may also stand in the text.
 
     Raises:
-        AskError: neither text nor a call.
+        AskError: there is neither text nor a call.
     """
     said = _THOUGHTS.sub("", text).strip()
     if not written and (found := calls_in_text(said, request.tools)):
@@ -54,7 +54,7 @@ def read(text: str, written: list[Written], request: Request) -> tuple[str, tupl
 
 
 def make_calls(written: Iterable[Written], request: Request) -> tuple[Call, ...]:
-    """Calls of tools; ids that lack or repeat are made up, for each means one."""
+    """Return calls of tools; missing and repeated ids are replaced, since each must be unique."""
     taken = {c.id for m in request.messages if isinstance(m, Reply) for c in m.calls}
     calls: list[Call] = []
     for given, name, arguments in written:
@@ -63,14 +63,14 @@ def make_calls(written: Iterable[Written], request: Request) -> tuple[Call, ...]
             number += 1
             id = f"call_{number}"
         taken.add(id)
-        tool = tool_meant(name, request.tools)
+        tool = find_tool(name, request.tools)
         called = tool.name if tool else name
         calls.append(Call(id=id, name=called, arguments=arguments_of(arguments, tool)))
     return tuple(calls)
 
 
-def tool_meant(name: str, tools: tuple[Tool, ...]) -> Tool | None:
-    """The tool of a name, without what models put before and behind it."""
+def find_tool(name: str, tools: tuple[Tool, ...]) -> Tool | None:
+    """Return the tool that a name means, without what models put before and after it, or None."""
     exact = [tool for tool in tools if tool.name == name]
     bare = name.strip(" \n`'\"")
     return max(
@@ -81,13 +81,13 @@ def tool_meant(name: str, tools: tuple[Tool, ...]) -> Tool | None:
 
 
 def arguments_of(given: object, tool: Tool | None = None) -> dict[str, Any]:
-    """A call's arguments, whether they come as text or as an object.
+    """Return a call's arguments, whether they come as text or as an object.
 
-    What is no JSON object is kept under `UNREADABLE`: the tool refuses it, the model reads why.
+    What is no JSON object goes under `UNREADABLE`: the tool refuses it, and the model reads why.
     """
     value: Any = given
     try:
-        for _ in range(2):  # some servers write the text of a text
+        for _ in range(2):  # some servers encode the JSON twice
             value = _parsed(value) if isinstance(value, str) else value
     except (ValueError, RecursionError):
         return {UNREADABLE: given}
@@ -100,7 +100,7 @@ def arguments_of(given: object, tool: Tool | None = None) -> dict[str, Any]:
 
 
 def calls_in_text(text: str, tools: tuple[Tool, ...]) -> tuple[str, list[Written]] | None:
-    """The calls that a text ends with, and what it says before them; None where there are none.
+    """Return what a text says before the calls it ends with, and those calls; None without calls.
 
     Servers that do not know a model's format leave its calls in the text. Without the tags of such
     a format the whole text must be calls and nothing else; anything more may be meant as words.
@@ -127,12 +127,12 @@ def give_names(
     arguments: str = "",
     name: Callable[[str], str] = safe_name,
 ) -> None:
-    """Put into calls as they came the ids and names that their results will name.
+    """Set the ids and names that results will refer to in calls as they came.
 
     Args:
         id: the field of the id.
-        arguments: that of the arguments where they have to be an object; else they are text.
-        name: makes a name that the interface takes.
+        arguments: the field of the arguments where they have to be an object; else they are text.
+        name: makes a name that the API takes.
     """
     for item, call in zip(written, calls, strict=True):
         item |= {id: call.id, "name": name(call.name)}
@@ -143,7 +143,7 @@ def give_names(
 
 
 class CallIds:
-    """Ids of calls as they are sent: those a model made come back to it as they came.
+    """Ids of calls as they are sent: a model's own are sent back to it as they came.
 
     Args:
         owner: the model, and where it is asked.
@@ -154,7 +154,7 @@ class CallIds:
         self._own: set[str] = set()
 
     def __call__(self, id: str) -> str:
-        """An id; one of another model's that servers may refuse is replaced by a plain one."""
+        """Return an id to send; another model's id that servers may refuse becomes a plain one."""
         if id in self._own or _PLAIN_ID.fullmatch(id):
             return id
         digest = hashlib.sha256(id.encode(errors="replace")).hexdigest()[:12]
@@ -163,12 +163,12 @@ class CallIds:
     def opaque(
         self, calls: tuple[Call, ...], items: tuple[dict[str, Any], ...] = ()
     ) -> Opaque | None:
-        """What is kept of a reply of the owner's; None where all of it can be written anew."""
+        """Return what to store of a reply of the owner's; None where all of it can be rebuilt."""
         odd = any(not _PLAIN_ID.fullmatch(call.id) for call in calls)
         return Opaque(model=self.owner, items=items) if odd or items else None
 
     def items(self, reply: Reply) -> tuple[dict[str, Any], ...]:
-        """What was kept of a reply, if it was the owner's."""
+        """Return what was stored of a reply if it was the owner's, whose ids are noted as such."""
         if reply.opaque is None or reply.opaque.model != self.owner:
             return ()
         self._own.update(call.id for call in reply.calls)
@@ -186,10 +186,10 @@ def _schema(tool: Tool) -> dict[str, Any]:
 
 
 def _parsed(text: str) -> Any:
-    """The JSON value of a text: fences, closing tags and empty or equal objects beside it aside.
+    """Return the JSON value of a text, without fences, closing tags, `{}` and repeated values.
 
     Raises:
-        ValueError: it has none, or several.
+        ValueError: the text has no value, or several.
     """
     try:
         return from_json(text, allow_inf_nan=False) if text.strip() else {}
@@ -202,7 +202,7 @@ def _parsed(text: str) -> Any:
 
 
 def _values(text: str) -> list[Any]:
-    """The JSON values that a text consists of."""
+    """Return the JSON values that a text consists of."""
     fenced = _FENCED.match(text)
     body = _CLOSED.sub("", fenced[1] if fenced else text).strip()
     values: list[Any] = []
@@ -215,20 +215,20 @@ def _values(text: str) -> list[Any]:
 
 
 def _written_call(value: Any, tools: tuple[Tool, ...]) -> Written | None:
-    """A call out of an object that is one and nothing else."""
+    """Return the call that an object is, or None if it is or holds anything else."""
     fields = dict(cast("dict[str, Any]", value)) if isinstance(value, dict) else {}
     if fields.get("type") == "function":
         del fields["type"]
         fields = fields["function"] if isinstance(fields.get("function"), dict) else fields
     name, given = fields.get("name"), fields.get("arguments", fields.get("parameters"))
-    known = isinstance(name, str) and tool_meant(name, tools) is not None
+    known = isinstance(name, str) and find_tool(name, tools) is not None
     if len(fields) != 2 or not known or given is None or UNREADABLE in arguments_of(given):
         return None
     return None, str(name), given
 
 
 def _shaped(value: Any, schema: Mapping[str, Any], kinds: Mapping[str, Any]) -> Any:
-    """A value as its schema means it: objects that came as text, nulls of what may be left out."""
+    """Fit a value to its schema: parse objects given as text, drop nulls for optional fields."""
     if not isinstance(value, str | list | dict):
         return value
     options = [schema, *schema.get("anyOf", ()), *schema.get("oneOf", ())]

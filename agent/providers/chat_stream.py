@@ -1,4 +1,4 @@
-"""The fragments of a chat completion put together, in whichever way servers cut them."""
+"""Puts the fragments of a chat completion together, however servers cut them."""
 
 import io
 import re
@@ -10,23 +10,23 @@ from .wire import Assembly, dumped
 
 _GOES_BACK = re.compile(r"reasoning|thinking|thought|extra_content|provider_specific_fields")
 _GROWING = {"text", "summary", "thinking", "data"}
-"""Fields of a list's items that come in fragments; of others the last one counts."""
+"""Fields of list items whose fragments are joined; for other fields the last value counts."""
 
 
 def goes_back(name: str) -> bool:
-    """Whether a field of a message may be wanted back: thoughts and what signs them."""
+    """Return whether a message field may have to be sent back: thoughts and their signatures."""
     return _GOES_BACK.match(name) is not None
 
 
 def joined_text(content: str | list[dict[str, Any]]) -> str:
-    """Text; some servers answer in parts, as one may ask."""
+    """Return content as text; some servers answer in parts, the form requests may have."""
     if isinstance(content, str):
         return content
     return "".join([str(part.get("text") or "") for part in content])
 
 
 class ChatAssembly(Assembly):
-    """Takes the chunks of a chat completion in."""
+    """Assembles the chunks of a chat completion."""
 
     events = "chat completions"
 
@@ -35,7 +35,7 @@ class ChatAssembly(Assembly):
         self._usage: Any = None
 
     def take(self, event: dict[str, Any]) -> str:
-        """Take a chunk in; the text it brings to the first choice."""
+        """Add a chunk and return the text it brings to the first choice."""
         self._usage = event.get("usage") or self._usage
         shown = ""
         for fragment in event.get("choices") or ():
@@ -47,13 +47,13 @@ class ChatAssembly(Assembly):
         return shown
 
     def whole(self) -> Any:
-        """The complete body."""
+        """Return the complete body."""
         choices = [choice.whole() for _, choice in sorted(self._choices.items())]
         return {"choices": choices, "usage": self._usage}
 
 
 class _Choice:
-    """One of the answers that a stream brings; nearly always there is one."""
+    """One of the choices in a stream; nearly always there is only one."""
 
     def __init__(self) -> None:
         self._text, self._refusal = io.StringIO(), io.StringIO()
@@ -63,7 +63,7 @@ class _Choice:
         self._finish: Any = None
 
     def take(self, fragment: dict[str, Any]) -> str:
-        """Take a fragment in; the text it brings."""
+        """Add a fragment and return the text it brings."""
         self._finish = fragment.get("finish_reason") or self._finish
         # Some servers put all of the message into one event.
         delta: dict[str, Any] = fragment.get("delta") or fragment.get("message") or {}
@@ -83,7 +83,7 @@ class _Choice:
         return text
 
     def whole(self) -> dict[str, Any]:
-        """The choice as it would have come unstreamed."""
+        """Return the choice as it would have come unstreamed."""
         functions = [c["function"] | {"arguments": "".join(c["arguments"])} for c in self._calls]
         calls = [
             call["more"] | {"id": call["id"], "function": function}
@@ -94,7 +94,7 @@ class _Choice:
         return {"message": self._more | message, "finish_reason": self._finish}
 
     def _call(self, part: dict[str, Any]) -> None:
-        """Take the fragment of a call in."""
+        """Add the fragment of a call."""
         function: dict[str, Any] = part.get("function") or {}
         id, name, given = part.get("id"), function.get("name"), function.get("arguments")
         call = self._continuing(part.get("index"), id, name)
@@ -103,7 +103,7 @@ class _Choice:
             call |= {"more": {}, "function": {"name": ""}}
             self._calls.append(call)
         call["id"] = call["id"] or id
-        if name:  # in parts, or the same again with every fragment
+        if name:  # sent in parts, or whole with every fragment
             before = call["function"]["name"]
             call["function"]["name"] = name if name.startswith(before) else before + name
         if given is not None:
@@ -113,10 +113,10 @@ class _Choice:
             more.update({k: v for k, v in fields.items() if v is not None and k not in known})
 
     def _continuing(self, index: Any, id: Any, name: Any) -> dict[str, Any] | None:
-        """The call that a fragment goes on with; None where it begins one.
+        """Return the call that a fragment continues; None where it begins a new one.
 
-        Some servers leave the index out, or give every parallel call the same one, or no ids, or
-        each fragment another.
+        Some servers leave out the index or give every parallel call the same one, and some send
+        no ids or a different one with each fragment.
         """
         alike = [call for call in self._calls if call["index"] == index]
         if not alike and index is None and not (id or name):
@@ -132,7 +132,7 @@ class _Choice:
 
 
 def _is_complete(written: str) -> bool:
-    """Whether arguments are all there; an empty object may only stand before them."""
+    """Return whether arguments are complete; an empty object may merely precede them."""
     try:
         return bool(from_json(written))
     except ValueError:
@@ -140,7 +140,10 @@ def _is_complete(written: str) -> bool:
 
 
 def _continued(before: Any, value: Any) -> Any:
-    """A field with the next fragment of it; items of a list go on by index, or the last one."""
+    """Return a field with its next fragment added.
+
+    A fragment of a list continues the items of the same index, or without one the last item.
+    """
     if isinstance(before, str) and isinstance(value, str):
         return before + value
     if not (isinstance(before, list) and isinstance(value, list)):

@@ -1,4 +1,4 @@
-"""Where a model is asked and with which key. Keys appear in no text, no repr and no error."""
+"""The server of a model and the key for it. Keys appear in no text, no repr and no error."""
 
 import ipaddress
 import os
@@ -12,18 +12,18 @@ from urllib.parse import unquote, urlsplit
 from ...tools.errors import InputError
 
 SHORTEST_KEY = 8
-"""Characters; people give such as "none" to servers that want no key."""
+"""Fewest characters of a secret key; people give servers that want none a word such as "none"."""
 _KEYS_COME = "Keys come from the environment."
 MOST_KEY = 8_192
-"""Characters; a file with more holds something else."""
+"""Most characters of a key; a file with more holds something else."""
 
 
 @dataclass(frozen=True)
 class Endpoint:
-    """A server and the right to ask it.
+    """A server and the key for it.
 
     Attributes:
-        base_url: without a slash at its end.
+        base_url: without a trailing slash.
         key: None where none is needed or known.
         key_advice: what to do when the server does not accept the key.
     """
@@ -34,7 +34,7 @@ class Endpoint:
 
     @property
     def is_loopback(self) -> bool:
-        """Whether it is this very machine, which no proxy can reach."""
+        """Whether the server is on this machine, which no proxy can reach."""
         host = urlsplit(self.base_url).hostname or ""
         try:
             return ipaddress.ip_address(host).is_loopback
@@ -42,11 +42,11 @@ class Endpoint:
             return host == "localhost"
 
     def without_key(self, text: str) -> str:
-        """A text with the key struck out: some servers repeat it in their errors."""
+        """Return a text with the key struck out: some servers repeat it in their errors."""
         return text.replace(self.key, "[key]") if self.key else text
 
     def masked(self, value: Any) -> Any:
-        """A reply's JSON with the key struck out; words as short as "none" are no secret."""
+        """Return a reply's JSON with the key struck out, unless it is as short as "none"."""
         if isinstance(value, str) and len(self.key or "") >= SHORTEST_KEY:
             return self.without_key(value)
         if isinstance(value, dict):
@@ -57,7 +57,7 @@ class Endpoint:
         return value
 
     def masking(self, show: Callable[[str], object]) -> Callable[..., None]:
-        """What shows fragments of text without the key, however it is cut."""
+        """Return a `show` that strikes the key out, even where it is split across fragments."""
         held, key = "", self.key or ""
 
         def shown(text: str, *, last: bool = False) -> None:
@@ -72,13 +72,12 @@ class Endpoint:
 
 
 def endpoint(base_url: str, *variables: str) -> Endpoint:
-    """An endpoint with the key that the environment holds for it.
+    """Return an endpoint with the key that the environment holds for it.
 
     Args:
         base_url: such as https://api.openai.com/v1.
-        variables: environment variables of the key, of which the first that is set counts; the
-            one named like it with _FILE names a file that holds it. None for servers that take
-            no key.
+        variables: environment variables for the key, of which the first that is set counts; the
+            same name with _FILE may name a file that holds it. Given none, no key is sent.
 
     Raises:
         InputError: no usable URL, or a key is needed and there is none.
@@ -98,9 +97,9 @@ def endpoint(base_url: str, *variables: str) -> Endpoint:
 
 def _checked_url(base_url: str) -> str:
     advice = "give one such as http://127.0.0.1:8000/v1"
-    if "@" in normalize("NFKC", unquote(unquote(base_url))):  # however the rest is spelled
+    if "@" in normalize("NFKC", unquote(unquote(base_url))):  # first, even if the rest is malformed
         raise InputError(f"The base URL holds a name or a password; {advice}. {_KEYS_COME}")
-    if "?" in base_url or "#" in base_url:  # what stands behind may be a key: it is not repeated
+    if "?" in base_url or "#" in base_url:  # not quoted: what follows may be a key
         raise InputError(f"The base URL holds more than a path; {advice}. {_KEYS_COME}")
     try:
         parts = urlsplit(base_url)

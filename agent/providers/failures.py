@@ -1,4 +1,4 @@
-"""What goes wrong with a model's server: one sentence each, and whether to ask again."""
+"""Failures of a model's server: one sentence for each, and whether to ask again."""
 
 import json
 import math
@@ -8,10 +8,10 @@ from email.utils import parsedate_to_datetime
 from typing import Any, Literal, cast
 
 Again = Literal["never", "unless-same", "later"]
-"""never: the request itself is refused; unless-same: until it fails the very same way twice in a
-row, for then nothing will change; later: the server is busy, or the network failed."""
+"""never: the request itself is refused; unless-same: retry until it fails the same way twice in a
+row, since then nothing will change; later: the server is busy, or the network failed."""
 MAX_QUOTED = 300
-"""Characters of a server's own words that are passed on."""
+"""Most characters of a server's own words that are quoted."""
 MAX_WAIT = 60.0
 """Seconds; a server that asks for a longer wait is not waited for."""
 _LATER = {429, 503, 529}
@@ -27,7 +27,7 @@ _STATUS_OF = {
     "rate_limit_exceeded": 429,
     "request_too_large": 413,
 }
-"""Names of errors that come without a status: in a stream, or under status 200."""
+"""HTTP status by the name of an error that comes without one: in a stream, or under status 200."""
 
 
 class AskError(Exception):
@@ -49,12 +49,12 @@ class AskError(Exception):
         self.what, self.advice, self.again, self.wait = what, advice, again, wait
 
     def ends(self, before: str | None) -> bool:
-        """Whether to give up, after a failure that said `before`."""
+        """Return whether to give up, given `what` the failure before was, if there was one."""
         return self.again == "never" or (self.again == "unless-same" and self.what == before)
 
 
 def of_status(status: int, headers: Mapping[str, str], body: bytes, key_advice: str) -> AskError:
-    """The failure that an HTTP status other than success is."""
+    """Return the failure that an unsuccessful HTTP status means."""
     wait = _retry_after(headers)
     try:
         data = json.loads(body)
@@ -67,7 +67,7 @@ def of_status(status: int, headers: Mapping[str, str], body: bytes, key_advice: 
 
 
 def of_error_body(data: object, key_advice: str) -> AskError | None:
-    """The failure in a body that came as a success or within a stream, or None."""
+    """Return the failure in a body that came as a success or within a stream, or None."""
     if not isinstance(data, dict) or not cast("dict[str, Any]", data).get("error"):
         return None
     message, code = _message_and_code(cast("dict[str, Any]", data))
@@ -77,23 +77,23 @@ def of_error_body(data: object, key_advice: str) -> AskError | None:
 
 
 def cut_off(limit: int | None = None) -> AskError:
-    """The model ran into its length limit in mid-reply: nothing of it may be acted on."""
+    """Return the failure of a reply cut off at the length limit: none of it may be acted on."""
     bound = "its limit of length" if limit is None else f"the limit of {limit:,} tokens"
     return AskError(f"cut its reply off at {bound}", "ask for less at once, or use another model")
 
 
 def refused(words: str) -> AskError:
-    """The model refused to answer."""
+    """Return the failure of a model that refused to answer."""
     return AskError(f"refused{_quoted(words)}", "say it another way, or use another model")
 
 
 def empty() -> AskError:
-    """The reply holds neither text nor a call."""
+    """Return the failure of a reply with neither text nor a call."""
     return AskError("gave an empty reply", "try again, or use another model", "unless-same")
 
 
 def unexpected(what: str) -> AskError:
-    """Not what the interface promises."""
+    """Return the failure of an answer that is not what the API promises."""
     return AskError(
         f"answered with {what}", "is the base URL right? It usually ends in /v1", "unless-same"
     )
@@ -129,7 +129,7 @@ def _advice(status: int, key_advice: str) -> str:
 
 
 def _message_and_code(data: object) -> tuple[str, str]:
-    """Message and code of an error body, of whichever of the usual shapes."""
+    """Return the message and code of an error body in any of the usual shapes."""
     data = _unwrapped(data)
     if not isinstance(data, dict):
         return (data, "") if isinstance(data, str) else ("", "")
@@ -144,21 +144,21 @@ def _message_and_code(data: object) -> tuple[str, str]:
 
 
 def _quoted(words: str) -> str:
-    """A server's words in brackets: one line, printable, of bearable length."""
+    """Return a server's words in brackets, as one printable line of limited length."""
     line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
     shown = line.rstrip(".") if len(line) <= MAX_QUOTED else line[: MAX_QUOTED - 3] + "..."
     return f" ({shown})" if shown else ""
 
 
 def _unwrapped(data: object) -> object:
-    """What stands alone in a list, as Gemini writes errors where a stream was asked for."""
+    """Unwrap a list of one object, in which Gemini sends errors when a stream was asked for."""
     listed = cast("list[Any]", data) if isinstance(data, list) else []
     alone = len(listed) == 1 and isinstance(listed[0], dict)
     return cast("object", listed[0] if alone else data)
 
 
 def _retry_delay(data: object) -> float | None:
-    """Seconds of a wait that Gemini asks for among an error's details."""
+    """Return the seconds to wait that Gemini gives in an error's details, or None."""
     try:
         details = cast("Any", _unwrapped(data))["error"]["details"]
         delays = [detail["retryDelay"] for detail in details if "retryDelay" in detail]
@@ -168,7 +168,7 @@ def _retry_delay(data: object) -> float | None:
 
 
 def _retry_after(headers: Mapping[str, str]) -> float | None:
-    """Seconds of a Retry-After header, in either of its forms."""
+    """Return the seconds of a Retry-After header, in either of its forms, or None."""
     given = headers.get("retry-after", "")
     try:
         seconds = float(given)

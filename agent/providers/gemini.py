@@ -1,7 +1,7 @@
 """Google Gemini's generateContent, with the thought signatures it wants back.
 
-A signature belongs to the part it came with, and a signed part must not be joined to another: so a
-reply that holds one is kept, and sent back, part by part.
+A signature belongs to the part it came with, and a signed part must not be joined to another, so a
+reply that holds one is stored and sent back part by part.
 """
 
 import re
@@ -32,7 +32,7 @@ from .wire import (
 )
 
 UNSIGNED = "skip_thought_signature_validator"
-"""What Google documents as the signature of calls that the model did not make itself."""
+"""The signature that Google documents for calls that the model did not make itself."""
 _WANTS_SIGNATURES = re.compile(r"(models/)?gemini-(?![12]\b)")
 """Since Gemini 3 the first call of a reply must be signed."""
 _CUT_OFF = {"MAX_TOKENS", "CONTINUATION"}
@@ -119,7 +119,7 @@ class _Assembly(Assembly):
         return "".join([self._candidate(candidate) for candidate in candidates])
 
     def _candidate(self, fragment: dict[str, Any]) -> str:
-        """Take a fragment in; the text it brings to the first candidate."""
+        """Add a fragment and return the text it brings to the first candidate."""
         index = int(fragment.get("index") or 0)
         candidate = self._candidates.setdefault(index, {"content": []})
         ends = {key: fragment.get(key) for key in ("finishReason", "finishMessage")}
@@ -133,7 +133,7 @@ class _Assembly(Assembly):
 
 
 def _joined(parts: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Parts of one text as one; what is signed or anything else stays apart."""
+    """Join runs of plain text parts; signed and other parts stay separate."""
     runs = groupby(parts, key=lambda part: part.keys() == {"text"})
     return [
         part
@@ -143,7 +143,7 @@ def _joined(parts: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 class Gemini(Wire):
-    """Speaks generateContent."""
+    """The wire format of Gemini's generateContent."""
 
     assembly = _Assembly
 
@@ -154,16 +154,16 @@ class Gemini(Wire):
         self._turns = MessageCache(self._turn)
 
     def path(self, *, stream: bool) -> str:
-        """What follows the base URL."""
+        """Return what follows the base URL."""
         method = "streamGenerateContent?alt=sse" if stream else "generateContent"
         return f"/v1beta/{self._resource}:{method}"
 
     def headers(self, key: str | None) -> dict[str, str]:
-        """The key, where there is one; not in the URL, for URLs are logged."""
+        """Return the key, where there is one; it is not in the URL, since URLs are logged."""
         return {"x-goog-api-key": key} if key else {}
 
     def body(self, request: Request, *, stream: bool) -> bytes:
-        """A request as JSON."""
+        """Return a request as JSON."""
         parts = [b"{"]
         if request.system:
             parts += [b'"systemInstruction":{"parts":[', dumped({"text": request.system}), b"]},"]
@@ -172,7 +172,7 @@ class Gemini(Wire):
         return b"".join([*parts, b'"contents":[', self._contents(request), b"]}"])
 
     def reply(self, body: Any, request: Request) -> Reply:
-        """What a complete body answers to a request."""
+        """Return the reply that a complete body holds."""
         response = validated(body, _Response, "content of Gemini's")
         if not response.candidates:
             raise _without_candidates(body, response.promptFeedback)
@@ -191,7 +191,7 @@ class Gemini(Wire):
         return Reply(text=text, calls=calls, usage=usage, opaque=self._ids.opaque(calls, items))
 
     def _contents(self, request: Request) -> bytes:
-        """Messages by turns: all results of one reply belong to the same."""
+        """Return messages by turns: all results of one reply share a turn."""
         turns: list[tuple[bytes, list[bytes]]] = []
         before: User | Reply | Result | None = None
         for message in request.messages:
@@ -208,7 +208,7 @@ class Gemini(Wire):
         )
 
     def _turn(self, message: User | Reply | Result) -> tuple[bytes, bytes]:
-        """Role and parts of a message; none where it says nothing, for empty ones are refused."""
+        """Return a message's role and parts, none if it is empty: empty parts are refused."""
         if isinstance(message, Reply):
             return b"model", b",".join(map(dumped, self._model_parts(message)))
         shown = [_inline_data(image) for image in message.images]
@@ -220,7 +220,7 @@ class Gemini(Wire):
             "name": _function_name(message.name),
             "response": {"error" if message.error else "output": message.text},
         }
-        # Within a functionResponse only some models take images; beside it, all that see.
+        # Only some models take images within a functionResponse; all that see take them beside it.
         return b"user", b",".join(map(dumped, [{"functionResponse": answer}, *shown]))
 
     def _model_parts(self, reply: Reply) -> list[dict[str, Any]]:
@@ -243,7 +243,7 @@ class Gemini(Wire):
 
 
 def _without_candidates(data: Any, feedback: _Feedback | None) -> AskError:
-    """What a body without candidates means."""
+    """Return the failure that a body without candidates means."""
     if feedback and feedback.blockReason:
         return refused(feedback.blockReasonMessage or feedback.blockReason)
     if any(data.get(key) is not None for key in _KEYS):
@@ -258,7 +258,7 @@ def _check_finish_reason(candidate: _Candidate) -> None:
     if reason in _REFUSED:
         raise refused(candidate.finishMessage or reason)
     if reason not in ("STOP", "FINISH_REASON_UNSPECIFIED"):
-        # MALFORMED_FUNCTION_CALL above all: the model wrote a call that is none.
+        # Mostly MALFORMED_FUNCTION_CALL: the model wrote a call that cannot be read.
         what = f"broke its reply off ({reason})"
         raise AskError(what, "try again, or use another model", "unless-same")
 
@@ -266,13 +266,13 @@ def _check_finish_reason(candidate: _Candidate) -> None:
 def _gemini_usage(usage: Any, price: Price) -> Usage:
     given = count(usage, "promptTokenCount")
     cached = min(given, count(usage, "cachedContentTokenCount"))
-    # Thoughts are billed as output and not among the candidates' tokens.
+    # Thoughts are billed as output, but not counted among the candidates' tokens.
     output = count(usage, "candidatesTokenCount") + count(usage, "thoughtsTokenCount")
     return usage_of(price, fresh=given - cached, cached=cached, output=output)
 
 
 def _function_name(name: str) -> str:
-    """A name that Gemini takes; what it takes stays, for results must name calls to the letter."""
+    """Return a name that Gemini takes; valid ones stay, as results must name calls exactly."""
     return re.sub(r"[^a-zA-Z0-9_.:-]", "_", name)[:64] or "unnamed"
 
 

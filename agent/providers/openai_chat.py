@@ -1,6 +1,6 @@
-"""OpenAI Chat Completions, and what else speaks it: vLLM, Ollama, llama.cpp, LM Studio, ...
+"""OpenAI Chat Completions, and the servers that speak it: vLLM, Ollama, llama.cpp, LM Studio, ...
 
-Only fields that every such server knows are sent, and never a null: some refuse either.
+Only fields that every such server knows are sent, and never a null, as some servers refuse these.
 """
 
 from functools import lru_cache
@@ -29,9 +29,9 @@ from .wire import (
 )
 
 _BRIDGE = b'{"role":"assistant","content":"OK."}'
-"""Strict servers take no user's message directly after a tool's."""
+"""Goes between a tool's message and a user's, which strict servers reject in direct succession."""
 _BESIDE_CALLS = {"reasoning", "reasoning_content"}
-"""Thoughts as plain text are wanted back with calls alone; some servers refuse them elsewhere."""
+"""Plain-text thoughts are wanted back only with calls; some servers refuse them elsewhere."""
 
 
 class _Open(BaseModel):
@@ -39,7 +39,7 @@ class _Open(BaseModel):
 
     @property
     def more(self) -> dict[str, Any]:
-        """What the interface does not know of; a null says nothing."""
+        """The fields that the API does not define, without nulls."""
         return {k: v for k, v in (self.model_extra or {}).items() if v is not None}
 
 
@@ -76,7 +76,7 @@ class _Completion(BaseModel):
 
 
 class OpenAIChat(Wire):
-    """Speaks Chat Completions."""
+    """The wire format of OpenAI's Chat Completions API."""
 
     assembly = ChatAssembly
 
@@ -88,11 +88,11 @@ class OpenAIChat(Wire):
         self._messages = MessageCache(self._rendered)
 
     def path(self, *, stream: bool) -> str:
-        """What follows the base URL."""
+        """Return what follows the base URL."""
         return "/chat/completions"
 
     def body(self, request: Request, *, stream: bool) -> bytes:
-        """A request as JSON."""
+        """Return a request as JSON."""
         written = [_system_message(request.system)] if request.system else []
         written += self._conversation(request)
         parts = [b'{"model":', self._model, b',"messages":[', b",".join(written), b"]"]
@@ -103,10 +103,10 @@ class OpenAIChat(Wire):
         return b"".join([*parts, b"}"])
 
     def reply(self, body: Any, request: Request) -> Reply:
-        """What a complete body answers to a request."""
+        """Return the reply that a complete body holds."""
         completion = validated(body, _Completion, "chat completion")
         choices = completion.choices
-        # Some gateways make a choice each of the words and of the calls of one reply.
+        # Some gateways put the words and the calls of one reply into separate choices.
         spoken = next((c for c in choices if c.message.text.strip()), choices[0])
         choice = next((c for c in choices if c.message.tool_calls), spoken)
         message = choice.message
@@ -118,7 +118,7 @@ class OpenAIChat(Wire):
             for c in message.tool_calls or ()
         ]
         text, calls = read(spoken.message.text, written, request)
-        kept = _kept(message, bool(calls))
+        kept = _fields_to_return(message, bool(calls))
         return Reply(
             text=text,
             calls=calls,
@@ -127,7 +127,7 @@ class OpenAIChat(Wire):
         )
 
     def gives_up(self, refusal: str) -> bool:
-        """Do without fields that came with replies where the server refuses them by name."""
+        """Stop sending back the reply fields that a refusal names; return whether it names any."""
         named = {name for name in self._returned if name in refusal} - self._refused
         self._refused |= named
         if named:
@@ -135,7 +135,7 @@ class OpenAIChat(Wire):
         return bool(named)
 
     def _conversation(self, request: Request) -> list[bytes]:
-        """Messages in an order that strict servers take: what users say in a row is one message."""
+        """Return messages as strict servers take them: successive user messages become one."""
         written: list[bytes] = []
         said: list[tuple[bytes, bytes]] = []
         after_tool = False
@@ -152,9 +152,10 @@ class OpenAIChat(Wire):
         return written + _users_turn(said, after_tool)
 
     def _rendered(self, message: User | Reply | Result) -> tuple[bytes, bytes]:
-        """A message, and the parts of a user's one: results hold text only in this interface.
+        """Return a message, and what of it goes into the next user message as parts.
 
-        Of a user's message the first is its content, where that is text alone.
+        Results hold only text in this API, so their images go into a user message. Of a user's
+        own message the first value is its content where that is text alone, else empty.
         """
         if isinstance(message, User):
             parts = [_text_part(message.text), *map(_image_part, message.images)]
@@ -169,7 +170,7 @@ class OpenAIChat(Wire):
         return dumped(result), b",".join([caption, *map(_image_part, message.images)])
 
     def _assistant_message(self, reply: Reply) -> bytes:
-        """A reply, with what came beside its text and calls."""
+        """Return a reply as JSON, with what came beside its text and calls."""
         items = self._ids.items(reply)
         kept = {k: v for k, v in (items[0] if items else {}).items() if k not in self._refused}
         signs: list[dict[str, Any]] = [*kept.pop("tool_calls", ()), *({} for _ in reply.calls)]
@@ -187,8 +188,8 @@ class OpenAIChat(Wire):
         return dumped(message | ({"tool_calls": calls} if calls else {}))
 
 
-def _kept(message: _Message, calling: bool) -> dict[str, Any]:
-    """What came beside text and calls and has to go back, as fields of the message to be sent."""
+def _fields_to_return(message: _Message, calling: bool) -> dict[str, Any]:
+    """Return what came beside text and calls and must be sent back, as fields of the message."""
     kept = {name: value for name, value in message.more.items() if goes_back(name)}
     if not calling:
         return {name: value for name, value in kept.items() if name not in _BESIDE_CALLS}
@@ -202,7 +203,7 @@ def _kept(message: _Message, calling: bool) -> dict[str, Any]:
     thinks = (
         "</think" in content if isinstance(content, str) else any("text" not in p for p in content)
     )
-    # Where the calls stand in the text, it is written anew.
+    # If the calls came in the text, the content is rebuilt instead.
     return kept | ({"content": content} if thinks and message.tool_calls else {})
 
 
@@ -216,7 +217,7 @@ def _check_finish_reason(reason: str | None) -> None:
 
 
 def openai_usage(usage: Any, price: Price, read: str, wrote: str) -> Usage:
-    """Tokens and their cost; `read` and `wrote` are what the interface calls input and output."""
+    """Return tokens and cost; `read` and `wrote` are the API's names for input and output."""
     given, details = count(usage, f"{read}_tokens"), f"{read}_tokens_details"
     cached = min(given, count(usage, details, "cached_tokens"))
     written = count(usage, details, "cache_write_tokens") if price.written else 0
@@ -226,7 +227,7 @@ def openai_usage(usage: Any, price: Price, read: str, wrote: str) -> Usage:
 
 
 def _users_turn(said: list[tuple[bytes, bytes]], after_tool: bool) -> list[bytes]:
-    """The message that says all this, and what has to stand before it; text alone stays text."""
+    """Return one message of all parts, with a bridge before it if needed; text alone stays text."""
     if not said:
         return []
     (content, parts), alone = said[0], len(said) == 1

@@ -1,6 +1,6 @@
-"""OpenAI Responses, used without any state on the server.
+"""OpenAI's Responses API, used without any state on the server.
 
-Nothing is stored there, so that what a model thought comes back to it encrypted, with its calls.
+Nothing is stored there, so a model's thoughts are sent back to it encrypted, with its calls.
 """
 
 import io
@@ -72,7 +72,7 @@ class _Assembly(Assembly):
         return self._response | {"output": self._response.get("output") or items}
 
     def take(self, event: dict[str, Any]) -> str:
-        if event.get("object") == "response":  # all of it in one event
+        if event.get("object") == "response":  # the whole response in one event
             event = {"type": "response.completed", "response": event}
         kind, place = event["type"], event.get("output_index", len(self._items))
         hash(place)
@@ -90,7 +90,7 @@ class _Assembly(Assembly):
         return ""
 
     def _item(self, place: Any) -> dict[str, Any]:
-        """An item as it was completed, or else of its fragments."""
+        """Return an item as it was completed, or else assembled from its fragments."""
         item = self._items[place]
         written = self._written[place].getvalue() if place in self._written else ""
         if item.get("type") == "function_call":
@@ -100,7 +100,7 @@ class _Assembly(Assembly):
 
 
 class OpenAIResponses(Wire):
-    """Speaks Responses."""
+    """The wire format of OpenAI's Responses API."""
 
     assembly = _Assembly
 
@@ -111,11 +111,11 @@ class OpenAIResponses(Wire):
         self._items = MessageCache(self._written)
 
     def path(self, *, stream: bool) -> str:
-        """What follows the base URL."""
+        """Return what follows the base URL."""
         return "/responses"
 
     def body(self, request: Request, *, stream: bool) -> bytes:
-        """A request as JSON."""
+        """Return a request as JSON."""
         parts = [b'{"model":', self._model, b',"store":false']
         if self._keeps_thoughts:
             parts.append(b',"include":["reasoning.encrypted_content"]')
@@ -130,7 +130,7 @@ class OpenAIResponses(Wire):
         return b"".join([*parts, b"}"])
 
     def reply(self, body: Any, request: Request) -> Reply:
-        """What a complete body answers to a request."""
+        """Return the reply that a complete body holds."""
         if failure := of_error_body(body, _KEY_ADVICE):
             raise failure
         response = validated(body, _Response, "response")
@@ -143,7 +143,7 @@ class OpenAIResponses(Wire):
         written = [(item.call_id, item.name or "", item.arguments) for item in made]
         text, calls = read("".join(part.text or "" for part in parts), written, request)
         items: tuple[dict[str, Any], ...] = ()
-        if len(made) == len(calls) and _must_be_kept(response.output):
+        if len(made) == len(calls) and _needs_original_items(response.output):
             said: list[dict[str, Any]] = body["output"]
             items = tuple({k: v for k, v in item.items() if v is not None} for item in said)
             give_names([i for i in items if i["type"] == "function_call"], calls, "call_id")
@@ -151,7 +151,7 @@ class OpenAIResponses(Wire):
         return Reply(text=text, calls=calls, usage=usage, opaque=self._ids.opaque(calls, items))
 
     def gives_up(self, refusal: str) -> bool:
-        """Do without encrypted thoughts: models that do not think refuse to be asked for them."""
+        """Stop asking for encrypted thoughts if refused, as models without thoughts do."""
         if not self._keeps_thoughts or "encrypted" not in refusal.lower():
             return False
         self._keeps_thoughts = False
@@ -159,7 +159,7 @@ class OpenAIResponses(Wire):
         return True
 
     def _written(self, message: User | Reply | Result) -> bytes:
-        """The items of a message, none where it says nothing."""
+        """Return the items of a message; none if a reply is empty."""
         if isinstance(message, User):
             return dumped({"role": "user", "content": _input_content(message.text, message.images)})
         if isinstance(message, Result):
@@ -170,7 +170,7 @@ class OpenAIResponses(Wire):
         return b",".join(map(dumped, kept or self._items_of(message)))
 
     def _items_of(self, reply: Reply) -> list[dict[str, Any]]:
-        """A reply of which text and calls are all there is."""
+        """Return the items of a reply that holds nothing but text and calls."""
         text = [{"role": "assistant", "content": reply.text}] if reply.text.strip() else []
         calls = [
             {
@@ -195,8 +195,8 @@ def _check_status(response: _Response) -> None:
         raise AskError(f"broke its reply off ({status})", "try again later", "later")
 
 
-def _must_be_kept(items: list[_Item]) -> bool:
-    """Whether a reply holds more than text and calls, and all that it takes to send it back.
+def _needs_original_items(items: list[_Item]) -> bool:
+    """Return whether a reply holds more than text and calls, and can be sent back as it came.
 
     Thoughts that came without their content cannot be looked up by a server that stores none.
     """
@@ -215,6 +215,6 @@ def _input_content(text: str, images: tuple[bytes, ...]) -> str | list[dict[str,
 
 @lru_cache(maxsize=16)
 def _function_tools(tools: tuple[Tool, ...]) -> bytes:
-    # The schemas have optional parameters, which strict mode does not know.
+    # The schemas have optional parameters, which strict mode does not allow.
     listed = described(tools, "parameters")
     return dumped([{"type": "function"} | tool | {"strict": False} for tool in listed])

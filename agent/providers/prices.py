@@ -1,4 +1,4 @@
-"""What a request cost, after a dated list; a model that is not on it costs 0."""
+"""What a request cost, by a dated price list; a model that is not on it costs 0."""
 
 import re
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ _FILE = Path(__file__).with_name("prices.yaml")
 
 @dataclass(frozen=True)
 class Price:
-    """US dollars for a million tokens.
+    """US dollars per million tokens.
 
     Attributes:
-        cached: of input read from the provider's cache.
-        written: of input written to it.
+        cached: for input read from the provider's cache.
+        written: for input written to it.
     """
 
     input: float = 0.0
@@ -25,7 +25,9 @@ class Price:
     output: float = 0.0
 
     def cost(self, *, fresh: int, cached: int, written: int = 0, output: int) -> float:
-        """Dollars for these numbers of tokens; `fresh` is input of neither other kind."""
+        """Return the dollars for these token counts; `fresh` is input not read from or written to
+        a cache.
+        """
         spent = (
             fresh * self.input
             + cached * self.cached
@@ -39,7 +41,7 @@ UNKNOWN = Price()
 
 
 def price_of(provider: str, model: str) -> Price:
-    """The price of a model by its name, with or without a date at its end; else `UNKNOWN`."""
+    """Return the price of a model by its name, with or without a date at the end, or `UNKNOWN`."""
     undated = re.sub(r"-\d{4}-?\d\d-?\d\d$", "", model)
     return _prices().get(f"{provider}:{undated}", UNKNOWN)
 

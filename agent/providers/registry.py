@@ -1,4 +1,4 @@
-"""Models by name: who decides in a run."""
+"""Looks up models, which decide in a run, by name."""
 
 from pathlib import Path
 
@@ -15,20 +15,20 @@ def model_named(
     base_url: str | None = None,
     show: ShowText | None = None,
 ) -> Model:
-    """Look a model up.
+    """Return the model of a name.
 
     Args:
         name: one of `MODELS`, such as openai:gpt-5.
-        base_url: of a server that speaks as the provider does; None for the provider's own.
-        show: is given fragments of the model's text as they come, or None where a reply begins
-            anew; it decides nothing.
+        base_url: of a server that speaks the provider's API; None for the provider's own.
+        show: called with fragments of the model's text as they arrive, or None where a reply
+            starts over; for display only.
 
     Raises:
-        InputError: there is none of that name, no usable base URL, or no key for it.
+        InputError: there is no model of that name, no usable base URL, or no key for it.
     """
     provider, _, model = name.partition(":")
     if provider in PROVIDERS and model.strip():
-        from .remote import remote_model  # not before: it loads the HTTP library
+        from .remote import remote_model  # imported late: it loads the HTTP library
 
         return remote_model(provider, model.strip(), base_url, show=show)
     if name != "offline" and not (provider == "replay" and model):

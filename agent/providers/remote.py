@@ -1,4 +1,4 @@
-"""A model behind a server: a provider's language, an endpoint and the transport put together."""
+"""A model on a server: a provider's wire format, an endpoint and the transport put together."""
 
 import asyncio
 import os
@@ -21,11 +21,11 @@ from .wire import Wire
 
 @dataclass(frozen=True)
 class _Provider:
-    """Where a provider is asked.
+    """How a provider is reached.
 
     Attributes:
-        elsewhere: the environment variable that names another base URL, as in its own packages.
-        variables: hold its key in the environment.
+        elsewhere: environment variable that names another base URL, as in its own packages.
+        variables: environment variables that may hold its key.
         billed_as: the name its prices are listed under.
     """
 
@@ -59,25 +59,25 @@ _PROVIDERS = {
 VARIABLES = tuple(
     dict.fromkeys(n for p in _PROVIDERS.values() for n in (*p.variables, p.elsewhere))
 )
-"""What the environment may hold for them: keys, and base URLs."""
+"""All environment variables that are read for providers: keys and base URLs."""
 
 _VERSION_AT_START, _VERSION_AT_END = re.compile(r"\A/v\d\w*"), re.compile(r"/v\d\w*\Z")
-"""Of an interface: people write it at the end of a base URL, or leave it out."""
+"""The version of an API, which people write at the end of a base URL or leave out."""
 
 
 class RemoteModel:
-    """Asks a model on a server.
+    """A model on a server.
 
     Args:
         name: what results are recorded under.
-        wire: the server's language.
-        transport: the way to it.
-        show: is given fragments of text as they come; with None nothing is streamed. A None
-            fragment voids what was shown of the current reply, which begins anew.
+        wire: the server's wire format.
+        transport: the connection to it.
+        show: called with fragments of text as they arrive; with None nothing is streamed. A None
+            fragment voids what was shown of the current reply, which starts over.
     """
 
     prompt = "former"
-    """The prompt that tells it what it is here for."""
+    """Id of the prompt it is given by default."""
     sees = True
     """Whether it is given the picture."""
 
@@ -89,7 +89,7 @@ class RemoteModel:
         self._streams = show is not None
 
     async def reply(self, request: Request) -> Reply:
-        """The server's reply, complete.
+        """Return the server's complete reply.
 
         Raises:
             ModelError: there is none.
@@ -106,9 +106,9 @@ class RemoteModel:
         await self._transport.aclose()
 
     def _gives_up(self, refusal: str) -> bool:
-        """Do without what a server refuses by name; False if it can not be done without."""
+        """Drop a feature that the refusal names; return False if there is none to drop."""
         if self._streams and "stream_options" in refusal:
-            self._streams = False  # without this field usage would not be counted
+            self._streams = False  # streaming without this field would not count usage
             return True
         return self._wire.gives_up(refusal)
 
@@ -119,7 +119,7 @@ class RemoteModel:
 
 
 def _ignore(text: str | None) -> None:
-    """Nobody is shown what a tool asks."""
+    """Show nothing: a reply to a tool's question is not for display."""
 
 
 def remote_model(
@@ -130,17 +130,17 @@ def remote_model(
     show: ShowText | None = None,
     sleep: Sleep = asyncio.sleep,
 ) -> RemoteModel:
-    """A model of a provider, at its own address or another that speaks the same.
+    """Return a model of a provider, at its own address or at a compatible server.
 
-    Without a base URL the one the environment names counts, else the provider's own; `show` is as
-    of `RemoteModel`.
+    Without a base URL the one that the environment names counts, else the provider's own; for
+    `show` see `RemoteModel`.
 
     Raises:
         InputError: no usable base URL, or no key for it.
     """
     known = _PROVIDERS[provider]
     base_url = base_url or os.environ.get(known.elsewhere)
-    # Who runs another server sets other prices.
+    # Another server has its own prices.
     price = UNKNOWN if base_url else price_of(known.billed_as, model)
     at = endpoint(base_url or known.base_url, *known.variables)
     wire = known.wire(

@@ -1,6 +1,6 @@
-"""HTTP to a model's server: one client, bounded retries, server-sent events, replies whole.
+"""HTTP to a model's server: one client, bounded retries, server-sent events, complete replies.
 
-Whether streamed or not, what comes out is one complete reply; fragments are only shown.
+Whether streamed or not, the result is one complete reply; fragments are only for display.
 """
 
 import asyncio
@@ -28,20 +28,20 @@ FIRST_PAUSE = 0.5
 """Seconds before the second try; doubled before each further one."""
 CONNECT_S = 10.0
 SILENCE_S = 300.0
-"""The longest a server may say nothing: large models think for minutes."""
+"""Seconds for which a server may send nothing: large models think for minutes."""
 MAX_BYTES = 64 * 2**20
 _MARK = b"\xef\xbb\xbf"
-"""That a text is UTF-8, as some servers begin theirs."""
+"""The UTF-8 byte order mark, with which some servers begin their text."""
 
 Sleep = Callable[[float], Awaitable[object]]
 
 
 class Transport:
-    """Asks one URL, again where that may help.
+    """Sends requests to one URL, retrying where that may help.
 
     Args:
-        endpoint: whom.
-        url: where exactly.
+        endpoint: the server.
+        url: the full URL.
         headers: sent with every request, the key among them.
         sleep: waits between tries.
     """
@@ -69,7 +69,7 @@ class Transport:
         """Send a request, whose body the wire has written, until it is answered.
 
         Raises:
-            ModelError: it will not be; one sentence says who did what and what to do.
+            ModelError: it is not answered; one sentence says who did what, and what to do.
         """
         before: str | None = None
         tries = 0
@@ -98,7 +98,7 @@ class Transport:
         return self._endpoint.without_key(text + end)
 
     def _pool(self) -> httpx.AsyncHTTPTransport:
-        """Connections. A client on top would look for cookies, redirects and logins every turn."""
+        """Return connections; a client on top would look for cookies and redirects every turn."""
         loop = asyncio.get_running_loop()
         pool = self._pools.get(loop)
         if pool is None:
@@ -142,7 +142,7 @@ class Transport:
     async def _body(
         self, response: httpx.Response, assembly: Assembly, show: ShowText | None
     ) -> tuple[Any, bool]:
-        """A complete body, a stream's or not whatever it is called, and whether text was shown."""
+        """Return a complete body and whether text was shown; content tells if it is a stream."""
         events, plain, size, streamed, told = Events(), bytearray(), 0, False, False
         try:
             async for chunk in _chunks(response):
@@ -164,7 +164,7 @@ class Transport:
         return _ended(assembly), told
 
     def _joined(self, data: Any, assembly: Assembly) -> Any:
-        """A complete body; some servers send the events of a stream as one list."""
+        """Return a complete body; some servers send the events of a stream as one list."""
         listed = isinstance(data, list) and len(cast("list[Any]", data)) > 0
         for event in cast("list[Any]", data if listed else [data]):
             if failure := of_error_body(event, self._endpoint.key_advice):
@@ -174,7 +174,7 @@ class Transport:
         return _ended(assembly) if listed else cast("Any", data)
 
     def _take(self, events: list[bytes], assembly: Assembly, show: ShowText | None) -> bool:
-        """Take the data of events in, and whether it brought text; an empty object says nothing."""
+        """Assemble the data of events and return whether any held text; `{}` is skipped."""
         told = False
         for event in events:
             if event == b"[DONE]":
@@ -190,19 +190,19 @@ class Transport:
 
 
 class Events:
-    """Server-sent events out of bytes, however these are cut."""
+    """A parser of server-sent events that takes bytes in chunks of any size."""
 
     def __init__(self) -> None:
         self._rest: list[bytes] = []
         self._data: list[bytes] = []
-        self._half = False  # whether the last line ended in the first half of CR LF
+        self._half = False  # whether the last chunk ended in CR, which may be half of CR LF
 
     def feed(self, chunk: bytes) -> list[bytes]:
-        """Data of the events that are complete with this chunk; none where it is empty."""
+        """Return the data of the events that this chunk completes, without empty ones."""
         one = chunk[:5] == b"data:" and chunk.find(b"\n\n") == chunk.find(b"\n") == len(chunk) - 2
         if one and b"\r" not in chunk and not (self._rest or self._data):
             self._half = False
-            return [data] if (data := chunk[5:].strip()) else []  # nearly always: one event, whole
+            return [data] if (data := chunk[5:].strip()) else []  # the usual case: one whole event
         if self._half:
             chunk = chunk.removeprefix(b"\n")
         self._half = chunk.endswith(b"\r")
@@ -224,12 +224,12 @@ class Events:
         return [event for event in events if event]
 
     def end(self) -> list[bytes]:
-        """Data of an event that ended with the connection, and not in its midst."""
+        """Return the data of an event that ended with the connection, unless it was cut off."""
         return [event for event in self.feed(b"\n\n") if event == b"[DONE]" or _is_json(event)]
 
 
 def _proxy(url: httpx.URL) -> str | None:
-    """The proxy that the environment names for an address: HTTPS_PROXY, NO_PROXY and the like."""
+    """Return the proxy that the environment names for a URL: HTTPS_PROXY, NO_PROXY and the like."""
     if proxy_bypass(url.host):
         return None
     known = getproxies()
@@ -239,12 +239,12 @@ def _proxy(url: httpx.URL) -> str | None:
 
 @cache
 def _tls() -> ssl.SSLContext:
-    """Reading the certificates takes longer than most of a turn; clients share them."""
+    """Return a TLS context; cached, as reading certificates takes longer than most of a turn."""
     return httpx.create_ssl_context()
 
 
 def _chunks(response: httpx.Response) -> AsyncIterator[bytes]:
-    """The body as it comes, without the layers that only a compressed one needs."""
+    """Return the body as it comes, without the layers that only a compressed one needs."""
     if "content-encoding" in response.headers:
         return response.aiter_bytes()
     assert isinstance(response.stream, httpx.AsyncByteStream)
@@ -261,10 +261,10 @@ async def _whole_body(response: httpx.Response) -> bytes:
 
 
 def _bounded_size(size: int) -> int:
-    """The size of an answer so far, bytes.
+    """Return the size of an answer so far, bytes.
 
     Raises:
-        AskError: no model answers at such length.
+        AskError: it is longer than any model's answer.
     """
     if size > MAX_BYTES:
         advice = "is the base URL right?"
@@ -287,7 +287,7 @@ def _parsed_json(body: bytes) -> Any:
 
 
 def _ended(assembly: Assembly) -> Any:
-    """The complete body of a stream that has ended."""
+    """Return the complete body of a stream that has ended."""
     if not assembly.done:
         raise _dropped_connection()
     return assembly.whole()
@@ -298,13 +298,13 @@ def _dropped_connection() -> AskError:
 
 
 def _bad_proxy() -> AskError:
-    """What the environment names is no proxy; it is not repeated: it may hold a password."""
+    """Return the error for an unusable proxy, which is not quoted: it may hold a password."""
     advice = "name one such as http://127.0.0.1:3128 (SOCKS needs the package socksio)"
     return AskError("cannot be asked through the proxy that the environment names", advice)
 
 
 def _network_failure(error: httpx.HTTPError) -> AskError:
-    """What the network did. No request is repeated in the text: it holds the key."""
+    """Return the error for a network failure; it quotes no request, since that holds the key."""
     if isinstance(error, httpx.ConnectTimeout):
         what = f"could not be reached within {CONNECT_S:.0f} s"
         return AskError(what, "is the address right, and the network up?", "unless-same")
@@ -320,7 +320,7 @@ def _network_failure(error: httpx.HTTPError) -> AskError:
 
 
 def _pause(failure: AskError, tries: int) -> float:
-    """Seconds until the next try: what the server asks for, else doubling; never in step."""
+    """Return seconds to the next try: as the server asks, else doubling; with random jitter."""
     if failure.wait is not None:
         return failure.wait * (1 + 0.1 * random.random())
     return FIRST_PAUSE * 2 ** (tries - 1) * (0.5 + 0.5 * random.random())

@@ -1,4 +1,4 @@
-"""What every adapter needs: the protocol of one, messages written once, tokens counted."""
+"""What all adapters share: their protocols, a cache of rendered messages, token counts."""
 
 import base64
 import json
@@ -18,78 +18,78 @@ from .prices import Price
 T = TypeVar("T")
 Body = TypeVar("Body", bound=BaseModel)
 MOST_TOKENS = 10**12
-"""No request counts so many; a server that says so does not know."""
+"""No request uses so many tokens; a server that reports them is not believed."""
 _JPEG = b"\xff\xd8"
 
 
 class Assembly(Protocol):
-    """Puts the events of a stream together to what would have come unstreamed."""
+    """Assembles the events of a stream into what would have come unstreamed."""
 
     events: ClassVar[str]
-    """What the events are part of, for messages."""
+    """What the events are part of, for error messages."""
     done: bool = False
-    """Whether the reply is complete, whatever the connection does from here."""
+    """Whether the reply is complete, whatever happens to the connection afterwards."""
 
     def add(self, event: Any) -> str:
-        """Take an event in; the text it brings, for display.
+        """Add an event and return the text it brings, for display.
 
         Raises:
-            AskError: it is none of this provider's.
+            AskError: it is not one of this provider's events.
         """
-        # Read by hand: there are hundreds of these a reply. What they make up is validated whole.
+        # Not validated: a reply has hundreds of events. The body they make up is validated.
         try:
             return self.take(event)
         except (AttributeError, LookupError, OverflowError, TypeError, ValueError):
             raise unexpected(f"a stream of something else than {self.events}") from None
 
     def take(self, event: Any) -> str:
-        """As `add`, with any builtin error for what is not this provider's."""
+        """Do what `add` does, with any built-in error for an event that is not this provider's."""
         ...
 
     def whole(self) -> Any:
-        """The complete body."""
+        """Return the complete body."""
         ...
 
 
 class Wire(Protocol):
-    """One provider's language, made of a model as the server calls it and the price of its tokens.
+    """One provider's wire format, made from the server's name for a model and its token prices.
 
     It does no I/O. A third argument, the owner, says whose replies it may send back as they came.
     """
 
     assembly: type[Assembly]
-    """Takes the events of one stream in."""
+    """Assembles the events of one stream."""
 
     def path(self, *, stream: bool) -> str:
-        """What follows the base URL, with the version of the interface if it has one."""
+        """Return what follows the base URL, with the version of the API if it has one."""
         ...
 
     def headers(self, key: str | None) -> dict[str, str]:
-        """What it wants beside the body: the key, where there is one."""
+        """Return the headers that the provider wants: the key, where there is one."""
         return {"authorization": f"Bearer {key}"} if key else {}
 
     def body(self, request: Request, *, stream: bool) -> bytes:
-        """A request as JSON."""
+        """Return a request as JSON."""
         ...
 
     def reply(self, body: Any, request: Request) -> Reply:
-        """What a complete body answers to a request.
+        """Return the reply that a complete body holds.
 
         Raises:
-            AskError: it is no reply that may be acted on.
+            AskError: it holds no reply that may be acted on.
         """
         ...
 
     def gives_up(self, refusal: str) -> bool:
-        """Do without what a server refused in these words; False if there is no such thing."""
+        """Drop what a server refused in these words; return False if there is nothing to drop."""
         return False
 
 
 class MessageCache(Generic[T]):
-    """Renders each message once, and forgets it together with the message.
+    """A cache of rendered messages, each forgotten together with its message.
 
-    Histories are tuples of frozen messages that grow at their end, so that the next turn finds
-    all but the last two here.
+    Histories are tuples of frozen messages that grow at their end, so the next request finds all
+    but the last two here.
     """
 
     def __init__(self, render: Callable[[User | Reply | Result], T]) -> None:
@@ -97,7 +97,7 @@ class MessageCache(Generic[T]):
         self._known: dict[int, tuple[weakref.ref[User | Reply | Result], T]] = {}
 
     def __call__(self, message: User | Reply | Result) -> T:
-        """The message as rendered before, or now."""
+        """Return the message as rendered, rendering it if it is new."""
         key = id(message)
         known = self._known.get(key)
         if known is None:
@@ -110,20 +110,20 @@ _ENCODER = json.JSONEncoder(separators=(",", ":"))
 
 
 def dumped(value: object) -> bytes:
-    """Compact JSON; ASCII, so that no text whatever fails."""
+    """Return compact JSON, in ASCII so that no text can fail."""
     return _ENCODER.encode(value).encode()
 
 
 def described(tools: Iterable[Tool], schema: str) -> list[dict[str, Any]]:
-    """Tools as providers list them; `schema` is what this one calls that of the parameters."""
+    """Return tools as providers list them; `schema` is this one's name for the parameters'."""
     return [{"name": t.name, "description": t.description, schema: t.offered} for t in tools]
 
 
 def validated(body: Any, form: type[Body], noun: str) -> Body:
-    """A complete body in the form that the interface promises.
+    """Return a complete body in the form that the API promises.
 
     Raises:
-        AskError: it is no `noun`.
+        AskError: the body is no `noun`.
     """
     try:
         return form.model_validate(body)
@@ -132,27 +132,27 @@ def validated(body: Any, form: type[Body], noun: str) -> Body:
 
 
 def media_type(image: bytes) -> str:
-    """Of a PNG or JPEG file."""
+    """Return the media type of a PNG or JPEG file."""
     return "image/jpeg" if image.startswith(_JPEG) else "image/png"
 
 
 def base64_text(image: bytes) -> str:
-    """A file as text."""
+    """Return a file as base64 text."""
     return base64.b64encode(image).decode()
 
 
 def data_url(image: bytes) -> str:
-    """A PNG or JPEG file as a URL that holds it."""
+    """Return a PNG or JPEG file as a data URL."""
     return f"data:{media_type(image)};base64,{base64_text(image)}"
 
 
 def safe_name(name: str) -> str:
-    """A name that no server refuses, for models make up others."""
+    """Return a name that no server refuses; models make up others."""
     return re.sub(r"[^a-zA-Z0-9_-]", "_", name)[:64] or "unnamed"
 
 
 def count(usage: object, *path: str) -> int:
-    """A number of tokens somewhere in a usage object; 0 where servers leave it out."""
+    """Return the token count at a path in a usage object; 0 where it is missing or implausible."""
     value = usage
     for name in path:
         value = cast("dict[str, Any]", value).get(name) if isinstance(value, dict) else None
@@ -160,7 +160,7 @@ def count(usage: object, *path: str) -> int:
 
 
 def usage_of(price: Price, *, fresh: int, cached: int, written: int = 0, output: int) -> Usage:
-    """Tokens and their cost; input is fresh, read from a cache (cached) or written to one."""
+    """Return tokens and cost; input is fresh, read from a cache (cached) or written to one."""
     return Usage(
         input_tokens=fresh + cached + written,
         cached_tokens=cached,

@@ -9,16 +9,16 @@ from .protocol import Event, Store, StoredSession, files_named, owner_of
 def fork(
     store: Store, source: StoredSession, turn: int | None = None, name: str = ""
 ) -> StoredSession:
-    """A new session that begins with the turns of another.
+    """Create a session that begins with the turns of another.
 
     Args:
-        store: where it is made.
-        source: whose turns; not written to.
-        turn: the last one taken, from 1; None for all there are.
-        name: what a person calls it.
+        store: where it is created.
+        source: the session to copy, which is not written to.
+        turn: the last turn to copy, from 1; None for all.
+        name: what a person calls the new session.
 
     Raises:
-        InputError: there is no such turn, or it cannot be read or written.
+        InputError: there is no such turn, or a session cannot be read or written.
     """
     events = source.events()
     events = events if turn is None else up_to_turn(events, turn)
@@ -26,10 +26,10 @@ def fork(
 
 
 def up_to_turn(events: Sequence[Event], turn: int) -> tuple[Event, ...]:
-    """The events of the first so many turns.
+    """Return the events up to the end of a turn, counted from 1.
 
     Raises:
-        InputError: there are fewer.
+        InputError: there is no such turn.
     """
     starts = [place for place, event in enumerate(events) if event.kind == "turn"]
     if not 1 <= turn <= len(starts):

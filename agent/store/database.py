@@ -1,8 +1,8 @@
 """Sessions in a database: SQLite in the user's data folder, or PostgreSQL by its URL.
 
 Each event is a transaction of its own, which says after which event it comes: a writer that does
-not know of the last one is refused. Whoever writes a session holds a lock that the system takes
-back when the process ends.
+not know of the last one is refused. Whoever writes a session holds a lock that the system frees
+when the process ends.
 """
 
 import hashlib
@@ -47,12 +47,12 @@ class DatabaseStore:
 
     Raises:
         InputError: the URL is neither, or needs an extra that is not installed.
-        StorageError: the database cannot be used, or what it holds is not this formup's.
+        StorageError: the database cannot be used, or its tables are not those of this formup.
     """
 
     def __init__(self, url: str) -> None:
         self._engine = engine_of(url)
-        address = self._engine.url.set(query={})  # which may hold a password
+        address = self._engine.url.set(query={})  # the query may hold a password
         self.label = address.render_as_string(hide_password=True)
         try:
             with self._as_storage_errors():
@@ -118,12 +118,12 @@ class DatabaseStore:
             connection.execute(delete(SESSIONS).where(SESSIONS.c.id == session))
 
     def close(self) -> None:
-        """See `Store.close`; what a thread still reads with is closed when it has done."""
+        """See `Store.close`; a connection that a thread still reads with is closed afterwards."""
         listen(self._engine.pool, "checkin", _invalidate)
         self._engine.dispose()
 
     def lock(self, name: str) -> ExitStack | None:
-        """See `Store.lock`; each session's only writer has the one of its id."""
+        """See `Store.lock`; a session's only writer has the lock named by its id."""
         stack = ExitStack()
         with self._as_storage_errors():
             if self._engine.dialect.name == "sqlite":
@@ -132,7 +132,7 @@ class DatabaseStore:
             connection = stack.enter_context(self._engine.connect())
             number = _lock_number(name)
             taken = connection.scalar(select(func.pg_try_advisory_lock(number)))
-            connection.commit()  # the lock is the connection's, and gone when that is
+            connection.commit()  # the lock belongs to the connection and ends with it
             if not taken:
                 stack.close()
                 return None
@@ -144,7 +144,7 @@ class DatabaseStore:
         if self._engine.dialect.name == "sqlite":
             return read_holder(self._lock_file(name))
         with self.reading() as connection:
-            # as PostgreSQL shows the two halves of an advisory lock's number
+            # PostgreSQL shows the number of an advisory lock as two halves
             return str(connection.scalar(text(_HOLDER), {"number": _lock_number(name)}) or "")
 
     def _lock_file(self, name: str) -> Path:
@@ -152,13 +152,13 @@ class DatabaseStore:
 
     @contextmanager
     def reading(self) -> Generator[Connection]:
-        """A connection within a transaction that reads."""
+        """Yield a connection within a transaction that reads."""
         with self._as_storage_errors(), self._engine.connect() as connection, connection.begin():
             yield connection
 
     @contextmanager
     def writing(self) -> Generator[Connection]:
-        """A connection within a transaction that is there as a whole or not at all."""
+        """Yield a connection within a transaction that takes effect as a whole or not at all."""
         engine = self._engine.execution_options(writes=True)
         with self._as_storage_errors(), engine.begin() as connection:
             yield connection
@@ -169,7 +169,7 @@ class DatabaseStore:
             yield
         except (SQLAlchemyError, sqlite3.Error, OSError) as error:
             cause = error.orig if isinstance(error, DBAPIError) else error
-            first = str(cause).strip().partition("\n")[0]  # further lines may show what was said
+            first = str(cause).strip().partition("\n")[0]  # further lines may quote what was said
             raise StorageError(f"{self.label} cannot be used: {first}.") from None
 
 
@@ -187,7 +187,7 @@ class DatabaseSession:
         chosen = select(*wanted).where(EVENTS.c.session == self.id, EVENTS.c.number > after)
         with self._store.reading() as connection:
             rows = connection.execute(chosen.order_by(EVENTS.c.number)).all()
-        if not rows and not self.last():  # which says so where it was deleted
+        if not rows and not self.last():  # `last` raises if it was deleted
             raise StorageError(f"{self.label} was broken off before anything began; run again.")
         numbers, kinds, seconds, texts = zip(*rows, strict=True) if rows else ((), (), (), ())
         try:
@@ -213,7 +213,7 @@ class DatabaseSession:
         return DatabaseLog(self._store, self, lock, after)
 
     def last(self) -> int:
-        """The number of its last event.
+        """Return the number of the session's last event.
 
         Raises:
             StorageError: the session is not there.
@@ -229,7 +229,7 @@ class DatabaseSession:
 
 
 class DatabaseLog:
-    """The events of a session, open to be written on."""
+    """The events of a session, open for appending."""
 
     def __init__(
         self, store: DatabaseStore, session: DatabaseSession, lock: ExitStack, last: int
@@ -314,7 +314,7 @@ def _put(connection: Connection, session: str, data: bytes) -> None:
 
 
 def _insert(connection: Connection, session: str, events: Sequence[Event]) -> None:
-    """Write events, and what lists say of them."""
+    """Write events, and what lists of sessions show of them."""
     rows = [
         {
             "session": session,
@@ -346,19 +346,19 @@ def _picture_of(event: Event) -> str | None:
 
 
 def _storable(words: object) -> str:
-    """Words as PostgreSQL takes them as text, which has no zeros."""
+    """Return words as text that PostgreSQL takes, which has no NUL characters."""
     return str(words or "").replace("\0", "\N{REPLACEMENT CHARACTER}")
 
 
 def _lock_number(name: str) -> int:
-    """A lock's number among the advisory locks of PostgreSQL."""
+    """Return a lock's number among the advisory locks of PostgreSQL."""
     return int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big", signed=True)
 
 
 _PUT = """
     INSERT INTO formup_files (session, sha256, data) VALUES (:session, :sha256, :data)
     ON CONFLICT DO NOTHING
-"""  # as another process or thread may put the same at once
+"""  # another process or thread may put the same file at the same time
 _HOLDER = """
     SELECT application_name FROM pg_locks JOIN pg_stat_activity USING (pid)
     WHERE locktype = 'advisory' AND granted AND objsubid = 1
@@ -370,4 +370,4 @@ def _unlock(connection: Connection, number: int) -> None:
     try:
         connection.scalar(select(func.pg_advisory_unlock(number)))
     except SQLAlchemyError:
-        connection.invalidate()  # nobody shall be given it with the lock
+        connection.invalidate()  # so that nobody gets it from the pool with the lock

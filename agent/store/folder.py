@@ -1,7 +1,7 @@
 """A session in a folder: trace.jsonl, one event a line, and pictures/, named by their hashes.
 
-Every line is written at once, and what a call did to the world before the call's result: a process
-that is killed loses at most what it was doing. Keys and times of day are not in it.
+Every line is written at once, and what a call changed in the world before the call's result, so a
+process that is killed loses at most what it was doing. Keys and times of day are not in it.
 """
 
 import hashlib
@@ -29,10 +29,10 @@ class FolderLog:
 
     Args:
         path: of the file.
-        begin: whether it is begun anew; else it is gone on with after its last whole event.
+        begin: whether to start it anew; else it continues after its last whole event.
 
     Raises:
-        StorageError: it cannot be written there, is damaged, or another process writes it.
+        StorageError: the file cannot be written, is damaged, or is written by another process.
     """
 
     def __init__(self, path: Path, *, begin: bool = False) -> None:
@@ -59,7 +59,7 @@ class FolderLog:
         return self._next - 1
 
     def _cut_to_whole_events(self) -> tuple[Event, ...]:
-        """The events there are; a line that was broken off is cut away."""
+        """Return the events there are, and cut off a last line that was broken off."""
         data = self._file.read()
         whole = data[: data.rfind(b"\n") + 1]
         events = _read_events(whole, self.path)
@@ -75,7 +75,7 @@ class FolderLog:
         line = event_line(Event(self._next, kind, seconds, data))
         try:
             end = self._file.seek(0, os.SEEK_END)
-            if self._file.write(line) != len(line):  # the disk filled in the middle of it
+            if self._file.write(line) != len(line):  # the disk filled up in the middle of it
                 self._file.truncate(end)
                 raise OSError(28, os.strerror(28))
         except OSError as error:
@@ -120,7 +120,7 @@ class FolderArtefacts:
         return data
 
     def name(self, sha256: str) -> str | None:
-        """The file's path relative to the folder's parent, if it is there."""
+        """Return the file's path relative to the folder's parent, or None if it is not there."""
         path = self._path(sha256)
         return None if path is None else f"{self.folder.name}/{path.name}"
 
@@ -133,13 +133,13 @@ class FolderArtefacts:
 
 
 def read_events(path: Path) -> tuple[Event, ...]:
-    """The whole events of a log; a last line that was broken off is left out.
+    """Return the whole events of a log; a last line that was broken off is left out.
 
     Args:
         path: of the file, or of a folder with a trace.jsonl.
 
     Raises:
-        StorageError: missing, unreadable, or no log that formup wrote.
+        StorageError: the log is missing, unreadable, or not one that formup wrote.
     """
     try:
         data = log_path(path).read_bytes()
@@ -153,7 +153,7 @@ def read_events(path: Path) -> tuple[Event, ...]:
 
 
 def log_path(path: Path) -> Path:
-    """The log of a folder; of a log itself, that."""
+    """Return the path of the log in a folder; a path of a log is returned as it is."""
     return path / NAME if path.is_dir() else path
 
 
@@ -175,12 +175,12 @@ def _event(line: dict[str, Any]) -> Event:
 
 
 def event_line(event: Event) -> bytes:
-    """An event as a line of a log."""
+    """Return an event as a line of a log."""
     facts = {"n": event.number, "type": event.kind, "seconds": event.seconds}
     return to_json(facts | dict(event.data)) + b"\n"
 
 
 def suffix_of(data: bytes) -> str:
-    """What a file is called after its first bytes."""
+    """Return the suffix of a file's name, by the file's first bytes."""
     kinds = {b"\xff\xd8": "jpg", b"\x89PNG": "png", b"{": "json"}
     return next((kind for head, kind in kinds.items() if data.startswith(head)), "bin")

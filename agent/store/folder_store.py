@@ -27,14 +27,14 @@ from .protocol import (
 )
 
 FACTS = "session.json"
-"""Its name and when it was made; without it, it has no name."""
+"""The file with a session's name and when it was made; a session without it has no name."""
 
 
 class FolderSession:
     """A session in a folder.
 
     Args:
-        path: of its log.
+        path: path of its log.
     """
 
     def __init__(self, path: Path) -> None:
@@ -61,7 +61,7 @@ class FolderSession:
 
 
 class FolderStore:
-    """Folders in a folder, which is made where it is not there."""
+    """A store of one folder per session, in a folder that is made if it is not there."""
 
     def __init__(self, root: Path) -> None:
         self.root, self.label = root, str(root)
@@ -108,7 +108,7 @@ class FolderStore:
     def delete(self, session: str) -> None:
         """See `Store.delete`."""
         path = self._log(session)
-        FolderLog(path).close()  # nobody else writes it
+        FolderLog(path).close()  # fails while another process writes it
         with _as_storage_errors(path):
             shutil.rmtree(path.parent)
 
@@ -148,7 +148,7 @@ def write_session(folder: Path, events: Sequence[Event], files: Sequence[bytes])
 
 
 def _listed(path: Path) -> tuple[SessionFacts, list[str]]:
-    """What a list says of a session, and what was said in it."""
+    """Return a session as it is listed, and what was said in it."""
     name, created = _named(path.parent)
     picture, said = None, list[str]()
     with path.open("rb") as file:
@@ -160,13 +160,13 @@ def _listed(path: Path) -> tuple[SessionFacts, list[str]]:
                 elif b'"type":"session"' in head:
                     picture = str(from_json(line)["picture"]["facts"]["sha256"])
             except (KeyError, TypeError, ValueError):
-                break  # broken off or damaged: what is before it is told
+                break  # broken off or damaged: what comes before is listed
     last = said[-1] if said else ""
     return SessionFacts(path.parent.name, name, created, len(said), last, picture), said
 
 
 def _named(folder: Path) -> tuple[str, str]:
-    """A session's name, and when it was made; of a folder that has no word of it, what it shows."""
+    """Return a session's name and when it was made; if not stored, "" and when its log changed."""
     try:
         facts = from_json((folder / FACTS).read_bytes())
         return str(facts["name"]), str(facts["created"])

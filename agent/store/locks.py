@@ -1,4 +1,4 @@
-"""Locks among processes as files, which say who has them; the system takes them back at an end."""
+"""Locks among processes, as files that name the holder; the system frees them when it ends."""
 
 import time
 from collections.abc import Callable
@@ -11,11 +11,11 @@ from .protocol import PROCESS
 
 T = TypeVar("T")
 MOMENT = 0.1
-"""Seconds that a writer asks again for a lock, which who only looks whether it is free has too."""
+"""Seconds for which a writer retries a lock; a mere check whether it is free takes it briefly."""
 
 
 def taken(take: Callable[[], T]) -> T:
-    """What a lock gives, asked for again for a moment while it gives nothing."""
+    """Take a lock, retrying for a moment, and return what taking it gave."""
     until = time.monotonic() + MOMENT
     while not (had := take()) and time.monotonic() < until:
         time.sleep(MOMENT / 20)
@@ -23,17 +23,17 @@ def taken(take: Callable[[], T]) -> T:
 
 
 def lock_file(path: Path) -> ExitStack | None:
-    """The lock that a file is; None while another has it.
+    """Take a file as a lock; return None while another process has it.
 
     Raises:
-        OSError: it cannot be made there.
+        OSError: the file cannot be made there.
     """
     file = try_lock(path)
     if file is None:
         return None
     stack = ExitStack()
     stack.callback(file.close)
-    stack.callback(_unlink, path)  # first, so that nobody has a lock on a file that is gone
+    stack.callback(_unlink, path)  # runs first, so that nobody locks a file that is gone
     file.truncate(0)
     file.write(PROCESS.encode())
     file.flush()
@@ -41,12 +41,12 @@ def lock_file(path: Path) -> ExitStack | None:
 
 
 def read_holder(path: Path) -> str:
-    """Which process has a lock, as far as its file says."""
-    with suppress(OSError):  # Windows reads no locked file
+    """Return which process has a lock, as far as its file says."""
+    with suppress(OSError):  # Windows cannot read a locked file
         return path.read_text(encoding="utf-8", errors="replace")
     return ""
 
 
 def _unlink(path: Path) -> None:
-    with suppress(OSError):  # Windows deletes no open file; it may lie there
+    with suppress(OSError):  # Windows cannot delete an open file; it may stay
         path.unlink()

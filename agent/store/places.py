@@ -1,4 +1,4 @@
-"""Which store an address means, and where sessions lie by default."""
+"""The store that an address means, and where sessions lie by default."""
 
 import os
 import sys
@@ -9,15 +9,15 @@ from .protocol import Store
 
 
 def store_at(address: str | Path | None = None) -> Store:
-    """The store at an address.
+    """Return the store at an address.
 
     Args:
         address: a folder, `sqlite:///FILE`, or `postgresql://USER:PASSWORD@HOST/DATABASE`; None
             for the database in the user's data folder.
 
     Raises:
-        InputError: it is none of them, or needs an extra that is not installed.
-        StorageError: it cannot be used.
+        InputError: the address is none of these, or needs an extra that is not installed.
+        StorageError: the store cannot be used.
     """
     if address is None:
         address = default_store()
@@ -29,12 +29,12 @@ def store_at(address: str | Path | None = None) -> Store:
 
 
 def default_store() -> str:
-    """The address of the database in the user's data folder."""
+    """Return the address of the database in the user's data folder."""
     return f"sqlite:///{data_folder() / 'sessions.db'}"
 
 
 def data_folder() -> Path:
-    """The folder for what formup keeps of a user's, by the custom of the system."""
+    """Return the folder for formup's data of a user, by the convention of the system."""
     home = Path.home()
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData/Local")

@@ -1,7 +1,7 @@
-"""What conversations are stored in: append-only logs of numbered events, many to a store.
+"""How conversations are stored: as append-only logs of numbered events, many to a store.
 
-State is folded from the events, so that undo, crashes and replays follow from the log alone. Files
-that events name by their hash lie beside it, as `Artefacts`.
+State is folded from the events, so undo, recovery and replay follow from the log alone. Files that
+events name by their hash lie beside it, as `Artefacts`.
 """
 
 import os
@@ -23,9 +23,10 @@ EventKind = Literal[
     "session", "turn", "picture", "resume", "world", "message", "approval", "moving", "end"
 ]
 """session: who decides, by which prompts, within which limits, and the picture; turn: what the
-person says, with the settings; picture: another one from now on; resume: the turn goes on, perhaps
-in another process; world: what has changed in it; message: of the conversation; approval: a
-person's yes or no to a call; moving: robots are about to move; end: how the turn ended."""
+person says, with the settings; picture: another picture from now on; resume: the turn goes on,
+perhaps in another process; world: what has changed in the world; message: one of the conversation;
+approval: a person's yes or no to a call; moving: robots are about to move; end: how the turn
+ended."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Event:
 
 
 class EventLog(Protocol):
-    """The events of one session; whoever has it open for writing is the only one."""
+    """The events of one session, open for writing in one place at a time."""
 
     @property
     def last(self) -> int:
@@ -61,11 +62,11 @@ class EventLog(Protocol):
         ...
 
     def events(self, after: int = 0) -> tuple[Event, ...]:
-        """The events with greater numbers than that, in order."""
+        """Return the events with numbers greater than `after`, in order."""
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the log."""
         ...
 
 
@@ -73,21 +74,21 @@ class Files(Artefacts, Protocol):
     """The files of one session."""
 
     def __contains__(self, sha256: str) -> bool:
-        """Whether there is a file of this hash."""
+        """Return whether there is a file of this hash."""
         ...
 
 
 class StoredSession(Protocol):
-    """One session where it is stored: read by anyone, written by one at a time."""
+    """One session in a store: read by anyone, written by one process at a time."""
 
     @property
     def id(self) -> str:
-        """What its store knows it by."""
+        """Its id in the store."""
         ...
 
     @property
     def label(self) -> str:
-        """What errors call it, such as the path of its log."""
+        """Its name in error messages, such as the path of its log."""
         ...
 
     @property
@@ -96,35 +97,35 @@ class StoredSession(Protocol):
         ...
 
     def events(self, after: int = 0) -> tuple[Event, ...]:
-        """The events with greater numbers than that, in order.
+        """Return the events with numbers greater than `after`, in order.
 
         Raises:
-            StorageError: it is not there, or is no whole session that formup wrote.
+            StorageError: the session is missing, or not a whole one as written by formup.
         """
         ...
 
     def write(self, after: int) -> EventLog:
-        """Its log, to be written on and then closed.
+        """Open the log for appending; the caller closes it.
 
         Args:
             after: how many events the writer knows of.
 
         Raises:
-            StorageError: it is not there (`missing`); another process writes it (`busy`), or it
-                has gone on since (`gone_on`): the text says what happened meanwhile.
+            StorageError: the session is missing (`missing`), another process writes it (`busy`), or
+                it has gone on since (`gone_on`); the text says what happened meanwhile.
         """
         ...
 
 
 @dataclass(frozen=True)
 class SessionFacts:
-    """What a list says of a session.
+    """A session as it is listed.
 
     Attributes:
         name: given by a person; may be empty.
-        created: when, ISO 8601 in UTC.
-        turns: how many things were said.
-        words: the last of them.
+        created: when it was created, ISO 8601 in UTC.
+        turns: how many turns it has.
+        words: what the person said in the last turn.
         picture: SHA-256 of the picture it began with; None before it has begun.
     """
 
@@ -141,7 +142,7 @@ class Store(Protocol):
 
     @property
     def label(self) -> str:
-        """What errors call it: its address without secrets."""
+        """Its name in error messages: its address without secrets."""
         ...
 
     def create(
@@ -151,13 +152,13 @@ class Store(Protocol):
         files: Sequence[bytes] = (),
         owner: str = "",
     ) -> StoredSession:
-        """A new session, whole or not at all.
+        """Create a session, whole or not at all.
 
         Args:
             name: what a person calls it.
-            events: that it begins with, such as those of another.
-            files: that these name.
-            owner: whose it is: small letters, digits and underscores, with which its id begins.
+            events: the events it begins with, such as those of another session.
+            files: the files that these name.
+            owner: who owns it: lower-case letters, digits and underscores, which begin its id.
 
         Raises:
             StorageError: it cannot be written.
@@ -165,7 +166,7 @@ class Store(Protocol):
         ...
 
     def open(self, session: str) -> StoredSession:
-        """The session with an id.
+        """Return the session with an id.
 
         Raises:
             StorageError: there is none (`missing`).
@@ -173,11 +174,11 @@ class Store(Protocol):
         ...
 
     def sessions(self, text: str = "") -> tuple[SessionFacts, ...]:
-        """All sessions whose names or words have that text in them, the newest first."""
+        """Return all sessions whose names or words contain a text, the newest first."""
         ...
 
     def rename(self, session: str, name: str) -> None:
-        """Call a session otherwise.
+        """Give a session another name.
 
         Raises:
             StorageError: there is none (`missing`), or it cannot be written.
@@ -193,54 +194,54 @@ class Store(Protocol):
         ...
 
     def lock(self, name: str) -> ExitStack | None:
-        """A lock among all processes that use the store, which ends with its process.
+        """Take a lock among all processes that use the store; it ends with the process.
 
         Returns:
-            What lets go of it; None while another has it.
+            A stack that releases the lock when closed; None while another process has it.
 
         Raises:
-            StorageError: it cannot be had.
+            StorageError: the lock cannot be taken.
         """
         ...
 
     def holder(self, name: str) -> str:
-        """Which process has a lock, as HOST:PID; empty where that is not known."""
+        """Return which process has a lock, as HOST:PID; empty where that is not known."""
         ...
 
     def close(self) -> None:
-        """Let go of what is open."""
+        """Close what is open."""
         ...
 
 
 MAX_NAME = 200
-"""Characters of a session's name."""
+"""Most characters of a session's name."""
 _HASH = re.compile(rb'"([0-9a-f]{64})"')
 
 
 PROCESS = f"{socket.gethostname()}:{os.getpid()}"[-63:]
-"""This process, as others are told of it, as long as PostgreSQL keeps such a name."""
+"""This process as others see it, no longer than PostgreSQL allows for such a name."""
 
 
 def new_id(owner: str = "") -> str:
-    """The id of a new session, which says whose it is."""
+    """Return the id of a new session, which begins with its owner if it has one."""
     return f"{owner}-{secrets.token_hex(5)}" if owner else secrets.token_hex(5)
 
 
 def owner_of(session: str) -> str:
-    """Whose a session is."""
+    """Return the owner of a session, from its id."""
     return session.rpartition("-")[0]
 
 
 def now() -> str:
-    """The time as a session's facts have it."""
+    """Return the time as a session's facts have it: ISO 8601 in UTC, to the millisecond."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def checked_name(name: str) -> str:
-    """A session's name, in one line.
+    """Return a session's name as one line.
 
     Raises:
-        InputError: too long, or no text.
+        InputError: the name is too long, or not printable.
     """
     line = " ".join(name.split())
     if len(line) > MAX_NAME or not line.isprintable():
@@ -252,31 +253,31 @@ def checked_name(name: str) -> str:
 
 
 def matches(facts: SessionFacts, said: Sequence[str], text: str) -> bool:
-    """Whether a text is in a session's name or in what was said in it, large or small letters."""
+    """Return whether a session's name or the words said in it contain a text, in any case."""
     wanted = text.casefold()
     return any(wanted in part.casefold() for part in (facts.name, *said))
 
 
 def files_named(events: Sequence[Event], files: Files) -> tuple[bytes, ...]:
-    """The files that events name by their hash.
+    """Return the files that events name by their hash.
 
     Raises:
-        StorageError: one was changed since.
+        StorageError: a file was changed since.
     """
     hashes = dict.fromkeys(h.decode() for e in events for h in _HASH.findall(to_json(e.data)))
     return tuple(files.get(sha256) for sha256 in hashes if sha256 in files)
 
 
 def missing(label: str) -> StorageError:
-    """The error where a session is not in its store."""
+    """Return the error for a session that is not in its store."""
     return StorageError(
         f"{label} is not there; formup sessions list names those that are.", "missing"
     )
 
 
 def busy(label: str, meanwhile: Sequence[Event] = (), holder: str = "") -> StorageError:
-    """The error where another process writes a session; with what it has written by now."""
-    happened = f" Meanwhile {_told(meanwhile)}." if meanwhile else ""
+    """Return the error for a session that another process writes, with what it wrote meanwhile."""
+    happened = f" Meanwhile {_turns_text(meanwhile)}." if meanwhile else ""
     who = f"another process ({holder})" if holder else "another process"
     return StorageError(
         f"{label} is being written by {who}; wait for it to end, or stop it.{happened}",
@@ -285,8 +286,8 @@ def busy(label: str, meanwhile: Sequence[Event] = (), holder: str = "") -> Stora
 
 
 def gone_on(label: str, meanwhile: Sequence[Event]) -> StorageError:
-    """The error where a session has gone on elsewhere; with what happened there."""
-    happened = f": {_told(meanwhile)}" if meanwhile else ""
+    """Return the error for a session that has gone on elsewhere, with what happened there."""
+    happened = f": {_turns_text(meanwhile)}" if meanwhile else ""
     return StorageError(
         f"{label} has gone on since it was opened{happened}. Nothing was written; open it again "
         "to go on from there.",
@@ -294,8 +295,8 @@ def gone_on(label: str, meanwhile: Sequence[Event]) -> StorageError:
     )
 
 
-def _told(events: Sequence[Event]) -> str:
-    """What was said and how it ended, in a clause; the last few turns of many."""
+def _turns_text(events: Sequence[Event]) -> str:
+    """Return what was said and how it ended as a clause, of many turns only the last few."""
     parts: list[str] = []
     for event in events:
         if event.kind == "turn":

@@ -1,7 +1,7 @@
 """The tables of a database with sessions, and the engine that reaches them.
 
-One schema with its version: made where there is none of it, refused where it is another or only a
-part of it. SQLite waits its turn before it reads (BEGIN IMMEDIATE), PostgreSQL by locked rows.
+The schema has a version: it is made where there is none, and refused where it is another or
+incomplete. Writers wait before they read in SQLite (BEGIN IMMEDIATE), on locked rows in PostgreSQL.
 """
 
 import sqlite3
@@ -36,9 +36,9 @@ from .protocol import PROCESS
 
 VERSION = 1
 PATIENCE = 10
-"""Seconds to wait for a database that others write, or that does not answer."""
+"""Seconds to wait for a database that others are writing, or that does not answer."""
 MAKING = 0x666F726D7570
-"""The lock on PostgreSQL under which tables are made: no two processes make them at once."""
+"""The lock in PostgreSQL under which tables are made, so that no two processes do it at once."""
 
 METADATA = MetaData()
 SCHEMA = Table("formup_schema", METADATA, Column("version", Integer, primary_key=True))
@@ -66,7 +66,7 @@ EVENTS = Table(
     Column("seconds", Float, nullable=False),
     Column("data", Text, nullable=False),
 )
-TURNS = Table(  # what is said in `turn` events, for lists
+TURNS = Table(  # the words of `turn` events, for lists
     "formup_turns",
     METADATA,
     _of_session(),
@@ -83,13 +83,13 @@ FILES = Table(
 
 
 def engine_of(url: str) -> Engine:
-    """The engine for a database.
+    """Return the engine for a database.
 
     Args:
         url: `sqlite:///PATH` or `postgresql://...`.
 
     Raises:
-        InputError: it is neither, or needs an extra that is not installed.
+        InputError: the URL is neither, or needs an extra that is not installed.
     """
     try:
         address = make_url(url)
@@ -119,7 +119,7 @@ def _sqlite(address: URL) -> Engine:
 
     @event.listens_for(engine, "connect")
     def connected(connection: Any, record: object) -> None:
-        connection.isolation_level = None  # transactions begin as `begun` says
+        connection.isolation_level = None  # `begun` begins transactions instead
         connection.execute("PRAGMA foreign_keys = ON")
         connection.execute(
             "PRAGMA synchronous = NORMAL"
@@ -140,16 +140,16 @@ def _postgresql(address: URL) -> Engine:
         address,
         hide_parameters=True,
         pool_pre_ping=True,
-        max_overflow=-1,  # each session that is written holds one
+        max_overflow=-1,  # each session that is being written holds a connection
         connect_args=waits,
     )
 
 
 def prepare(engine: Engine, label: str) -> None:
-    """Make the tables where there are none.
+    """Make the tables if there are none.
 
     Raises:
-        StorageError: there are others, or only some of them.
+        StorageError: the tables are of another version, or incomplete.
         SQLAlchemyError, sqlite3.Error: the database cannot be used.
     """
     if engine.dialect.name == "sqlite":
@@ -164,7 +164,11 @@ def prepare(engine: Engine, label: str) -> None:
 
 
 def _is_whole(connection: Connection, label: str) -> bool:
-    """Whether all tables are there; False where none is."""
+    """Return whether all tables are there, False if there are none.
+
+    Raises:
+        StorageError: the tables are of another version, or incomplete.
+    """
     tables = inspect(connection)
     there = {name for name in tables.get_table_names() if name.startswith("formup_")}
     if not there:
@@ -190,7 +194,7 @@ def _is_whole(connection: Connection, label: str) -> bool:
 
 
 def _write_ahead(engine: Engine) -> None:
-    """Readers then do not wait for a writer; others that open a new file do the same just now."""
+    """Log writes ahead, so that readers need not wait; retried, as others may do this just now."""
     until = time.monotonic() + PATIENCE
     while True:
         try:

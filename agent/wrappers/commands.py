@@ -1,4 +1,4 @@
-"""A person's command in a model's place: calls they gave themselves, such as undo, and no words."""
+"""A person's own calls, such as undo, in a model's place."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -11,11 +11,11 @@ from ..offline.followup import Followup
 
 
 class Commands:
-    """Makes the calls it is given, in one reply, then says what came of them.
+    """A model that makes the calls it is given, in one reply, then says what came of them.
 
     Args:
         calls: names of tools and their arguments.
-        text: what is said where there are no calls.
+        text: what it says if there are no calls.
     """
 
     name = "person"
@@ -24,12 +24,12 @@ class Commands:
         self._calls, self._text = calls, text
 
     async def reply(self, request: Request) -> Reply:
-        """The calls, or the sentence that ends the turn."""
+        """Return the calls, or once they are answered the sentence that ends the turn."""
         turn = turn_of(request.messages)
         results = [m for m in turn if isinstance(m, Result)]
         if results:
             asked = {c.id: c.arguments for m in turn if isinstance(m, Reply) for c in m.calls}
-            return Reply(text=" ".join(_said(m, asked[m.call_id]) for m in results))
+            return Reply(text=" ".join(_result_text(m, asked[m.call_id]) for m in results))
         number = sum(isinstance(m, Reply) for m in request.messages) + 1
         calls = (
             Call(id=f"command-{number}-{k}", name=name, arguments=arguments)
@@ -38,8 +38,8 @@ class Commands:
         return Reply(text=self._text, calls=tuple(calls))
 
 
-def _said(result: Result, arguments: Mapping[str, Any]) -> str:
-    """What a person is told of one call's result."""
+def _result_text(result: Result, arguments: Mapping[str, Any]) -> str:
+    """Return what the person reads about one call's result."""
     if result.error:
         return str((result.facts or {}).get("plain", result.text))
     data = json.loads(result.text)

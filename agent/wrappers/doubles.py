@@ -1,4 +1,4 @@
-"""Models for tests: replies written down beforehand, or a function in a model's place."""
+"""Models for tests: scripted replies, or a function in a model's place."""
 
 from collections.abc import Callable, Sequence
 
@@ -8,7 +8,7 @@ from ..model import Request
 
 
 class ScriptedModel:
-    """Gives its replies one after another; `requests` keeps what it was asked."""
+    """A model that gives its replies one after another; `requests` holds what it was asked."""
 
     def __init__(self, replies: Sequence[Reply], name: str = "scripted") -> None:
         self.name = name
@@ -16,7 +16,7 @@ class ScriptedModel:
         self.requests: list[Request] = []
 
     async def reply(self, request: Request) -> Reply:
-        """The next reply.
+        """Return the next reply.
 
         Raises:
             ModelError: there is none left.
@@ -33,12 +33,12 @@ class ScriptedModel:
 
 
 class FunctionModel:
-    """A function is the model."""
+    """A model that calls a function."""
 
     def __init__(self, function: Callable[[Request], Reply], name: str = "function") -> None:
         self.name = name
         self._function = function
 
     async def reply(self, request: Request) -> Reply:
-        """What the function says."""
+        """Return what the function returns."""
         return self._function(request)

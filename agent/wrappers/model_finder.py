@@ -1,7 +1,7 @@
 """The detector `vlm`: the model that decides, asked where the things are that a noun names.
 
-A tool waits for it in its thread, the request runs in the turn's event loop. What it answers is a
-proposal like any other detector's: boxes that code measures, and no more sure than it says.
+A tool waits for it in its thread while the request runs in the turn's event loop. The answer is a
+proposal like any other detector's: boxes, which code measures, no more certain than it says.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ from .two_stages import prompt_named
 
 PROMPT = "find"
 MOST = 0.65
-"""No outline within its boxes is believed more than this: robots are not sent there unlooked."""
+"""Most confidence in an outline within its boxes, so that robots are not sent there unseen."""
 
 
 class _Thing(BaseModel):
@@ -47,9 +47,9 @@ class ModelFinder(VlmDetector):
     """A model as a detector, within a running event loop.
 
     Args:
-        model: one that sees.
+        model: a model that sees.
         library: where its prompt is taken from.
-        seconds: how long a reply may take; None is as long as it likes.
+        seconds: how long a reply may take; None is no limit.
     """
 
     def __init__(self, model: Model, library: PromptLibrary, seconds: float | None) -> None:
@@ -61,15 +61,15 @@ class ModelFinder(VlmDetector):
         self._over = False
 
     def find(self, pixels: Pixels, phrase: str) -> tuple[Detection, ...]:
-        """See `Finder.find`; not from the event loop's own thread.
+        """See `Finder.find`; not to be called from the event loop's own thread.
 
         Raises:
             ModelError: there is no reply.
-            ToolError: it cannot be read, or names places that are none; or the turn is over.
+            ToolError: the reply cannot be read or has no box in the picture, or the turn is over.
         """
         picture = picture_from_array(pixels)
         image = draw_view(picture, World.of(picture))
-        if self._over:  # the tool was given up, and works on
+        if self._over:  # the tool was given up, but still works
             return super().find(pixels, phrase)
         height, width = pixels.shape[:2]
         text = f"Find: {json.dumps(phrase, ensure_ascii=False)}\nPicture: {width} x {height} px"
@@ -93,14 +93,14 @@ class ModelFinder(VlmDetector):
         return tuple(made)
 
     def taken(self) -> tuple[Aside, ...]:
-        """What was asked since the last time; what is still waited for is given up."""
+        """Return what was asked since the last time, and give up what is still waited for."""
         for asking in self._waiting:
             asking.cancel()
         asked, self._asked, self._waiting = tuple(self._asked), [], set()
         return asked
 
     def close(self) -> None:
-        """Ask nothing any more: the turn is over."""
+        """Stop asking: the turn is over."""
         self._over = True
         self.taken()
 
@@ -124,8 +124,8 @@ class ModelFinder(VlmDetector):
 def asking(
     context: Context, model: Model, library: PromptLibrary, seconds: float | None
 ) -> Generator[ModelFinder | None]:
-    """The model as the detector of a turn, if it is to be; see `ModelFinder`."""
-    finder = ModelFinder(model, library, seconds) if _asks(context.settings) else None
+    """Yield the model as a turn's detector if the settings want that, else None."""
+    finder = ModelFinder(model, library, seconds) if _uses_model_finder(context.settings) else None
     try:
         yield finder
     finally:
@@ -134,17 +134,17 @@ def asking(
 
 
 def check_sees(settings: Settings, model: Model) -> None:
-    """Refuse a detector that asks a model which does not see.
+    """Refuse a detector that asks the model if the model does not see.
 
     Raises:
-        InputError: saying so.
+        InputError: the settings have such a detector, and the model does not see.
     """
-    if _asks(settings) and not getattr(model, "sees", False):
+    if _uses_model_finder(settings) and not getattr(model, "sees", False):
         raise InputError(
             f"The detector {VlmDetector.name!r} asks the model that decides, and {model.name} sees "
             "no picture; choose a model such as openai:NAME, or another detector."
         )
 
 
-def _asks(settings: Settings) -> bool:
+def _uses_model_finder(settings: Settings) -> bool:
     return settings.detector.removeprefix(BESIDE) == VlmDetector.name

@@ -12,11 +12,11 @@ from ..session import model_name, prompt_name
 from ..session_start import read_session
 
 LONGEST = 120
-"""Characters of a message that an error repeats."""
+"""Most characters of a message that an error quotes."""
 
 
 class ReplayModel:
-    """Gives the replies of a trace, and refuses to where the conversation is another one.
+    """A model that gives the replies of a trace, and fails where the conversation is another one.
 
     Attributes:
         name: of the model that gave them.
@@ -38,10 +38,10 @@ class ReplayModel:
         self.sees = bool(self._lines and self._lines[0]["images"])
 
     async def reply(self, request: Request) -> Reply:
-        """The recorded reply to the same messages.
+        """Return the recorded reply to the same messages.
 
         Raises:
-            ModelError: they are others, or the recording ends here.
+            ModelError: the messages differ, or the recording ends here.
         """
         if request.aside:
             return self._aside(request)
@@ -57,7 +57,7 @@ class ReplayModel:
         return Reply.model_validate(facts)
 
     def _aside(self, request: Request) -> Reply:
-        """The recorded reply to what a tool asked."""
+        """Return the recorded reply to what a tool asked."""
         (message,) = request.messages
         text = getattr(message, "text", "")
         for line in self._lines:
@@ -81,8 +81,8 @@ class ReplayModel:
 
 
 def _facts(line: Mapping[str, Any]) -> dict[str, Any]:
-    """What two messages must share, as far as a model sees it: of images the number alone, for
-    libraries that draw and compress write other bytes in other versions."""
+    """Return what two messages must share, as far as a model sees it: of images only the number,
+    since libraries that draw and compress write other bytes in other versions."""
     facts = {
         k: v for k, v in line.items() if k not in ("cause", "facts", "asides") and v is not None
     }

@@ -1,7 +1,7 @@
-"""OpenTelemetry spans of a run by the GenAI semantic conventions, for who watches many of them.
+"""OpenTelemetry spans of a run by the GenAI semantic conventions, to watch many runs.
 
-They say what ran, how long, at what cost and how it ended, never what was said: no messages,
-instructions, arguments, results or keys, and of errors the kind alone, since their sentences
+They say what ran, for how long, at what cost and how it ended, never what was said: no messages,
+instructions, arguments, results or keys, and of errors only the kind, since their sentences may
 repeat what was said. The trace of the run holds all that.
 """
 
@@ -26,17 +26,17 @@ if TYPE_CHECKING:
     from opentelemetry.trace import Span, Tracer
 
 NAME = "formup"
-"""Of the agent, the service and the instrumentation."""
+"""Name of the agent, the service and the instrumentation."""
 _PROVIDERS = {"openai-responses": "openai", "gemini": "gcp.gemini"}
-"""What the conventions call a provider, where that is another name than ours."""
+"""The conventions' names of providers, where they differ from ours."""
 _ENDPOINTS = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
 _LACKING = "OpenTelemetry is not installed; pip install 'formup[otel]'."
 
-Told = Callable[[Outcome, Report], None]
+RecordEnd = Callable[[Outcome, Report], None]
 
 
 def traced_model(model: Model, tracer: "Tracer") -> Model:
-    """The model, with a span around each reply; its `prompt`, `aclose` and so on stay its own."""
+    """Return the model with a span around each reply; `prompt`, `aclose` and so on stay its own."""
     return _TracedModel(model, tracer)
 
 
@@ -49,7 +49,7 @@ class _TracedModel:
         return self._model.name
 
     async def reply(self, request: Request) -> Reply:
-        asked = _asked(self.name)
+        asked = _model_attributes(self.name)
         with _span(self._tracer, "chat", asked["gen_ai.request.model"], asked) as span:
             reply = await self._model.reply(request)
             span.set_attributes(_usage((reply,)))
@@ -60,10 +60,10 @@ class _TracedModel:
 
 
 def traced_tool(tool: Tool, tracer: "Tracer") -> Tool:
-    """The tool, with a span around each time it works.
+    """Return the tool with a span around each time it works.
 
-    A call that is refused, or against the schema, does not come so far and has none; neither has
-    a plain function that was given up and never ends.
+    A call that is refused or violates the schema does not get that far and has no span; neither
+    has a plain function that was given up and never ends.
     """
     facts = {
         "gen_ai.tool.name": tool.name,
@@ -72,7 +72,7 @@ def traced_tool(tool: Tool, tracer: "Tracer") -> Tool:
     }
     function: Callable[..., Any] = tool.function
     if not inspect.iscoroutinefunction(function):
-        spanned = _span(tracer, "execute_tool", tool.name, facts)  # a new one for each call
+        spanned = _span(tracer, "execute_tool", tool.name, facts)  # opens a new span for each call
         return replace(tool, function=spanned(function))
 
     @functools.wraps(function)
@@ -84,17 +84,19 @@ def traced_tool(tool: Tool, tracer: "Tracer") -> Tool:
 
 
 @contextmanager
-def traced_run(tracer: "Tracer | None", model: str, before: History) -> Generator[Told, None, None]:
-    """A span around a whole run, which is told how it ended; without a tracer nothing is done.
+def traced_run(
+    tracer: "Tracer | None", model: str, before: History
+) -> Generator[RecordEnd, None, None]:
+    """Open a span around a whole run and yield what records its end; do nothing without a tracer.
 
     Args:
-        model: its name.
-        before: messages that were there already. What they used counted in the run they were of.
+        model: the model's name.
+        before: messages of earlier runs, which have counted what these used.
     """
     if tracer is None:
         yield lambda outcome, report: None
         return
-    facts = _asked(model) | {"gen_ai.agent.name": NAME}
+    facts = _model_attributes(model) | {"gen_ai.agent.name": NAME}
     with _span(tracer, "invoke_agent", NAME, facts) as span:
 
         def told(outcome: Outcome, report: Report) -> None:
@@ -115,12 +117,12 @@ def traced_run(tracer: "Tracer | None", model: str, before: History) -> Generato
 
 @contextmanager
 def environment_tracer() -> "Generator[Tracer | None, None, None]":
-    """A tracer as OpenTelemetry's environment variables have it; None where they ask for none.
+    """Yield the tracer that OpenTelemetry's environment variables ask for, or None.
 
-    What it has seen is sent at the end, at the latest.
+    What it has recorded is sent at the end, at the latest.
 
     Raises:
-        InputError: the extra is missing, or they ask for an exporter there is not.
+        InputError: the extra is missing, or the variables ask for an unknown exporter.
     """
     if (kind := _exporter_wanted()) is None:
         yield None
@@ -161,7 +163,7 @@ def _exporter(kind: Literal["otlp", "console"]) -> "SpanExporter":
     if kind == "console":
         from opentelemetry.sdk.trace.export import ConsoleSpanExporter
 
-        return ConsoleSpanExporter(out=sys.stderr)  # a program may be reading what is printed
+        return ConsoleSpanExporter(out=sys.stderr)  # a program may be reading stdout
     from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
 
     return OTLPSpanExporter()
@@ -171,7 +173,7 @@ def _exporter(kind: Literal["otlp", "console"]) -> "SpanExporter":
 def _span(
     tracer: "Tracer", operation: str, what: str, facts: Mapping[str, str]
 ) -> "Generator[Span, None, None]":
-    """A span as the conventions name and mark them, without the words of an error."""
+    """Open a span named and marked as the conventions say, without the text of an error."""
     from opentelemetry.trace import SpanKind
 
     with tracer.start_as_current_span(
@@ -183,7 +185,7 @@ def _span(
     ) as span:
         try:
             yield span
-        except BaseException as error:  # being cancelled, too, is an end to be seen
+        except BaseException as error:  # a cancellation has to be seen as well
             _failed(span, type(error).__qualname__)
             raise
 
@@ -195,8 +197,8 @@ def _failed(span: "Span", kind: str) -> None:
     span.set_status(StatusCode.ERROR)
 
 
-def _asked(name: str) -> dict[str, str]:
-    """Provider and model of a model's name; one without a provider runs in this process."""
+def _model_attributes(name: str) -> dict[str, str]:
+    """Return provider and model by a model's name; without a provider it runs in this process."""
     provider, colon, model = name.partition(":")
     return {
         "gen_ai.provider.name": _PROVIDERS.get(provider, provider) if colon else NAME,

@@ -1,8 +1,8 @@
 """Two models as one: the first sees and says what is meant, the second plans without a picture.
 
-That is the paper's way: a vision model gives the object of interest O and the pattern instruction
-PI, another model makes the formation. That one also changes the plan that stands, unseen as long as
-it can. Whose turn it is follows from the history alone, which can be resumed and replayed.
+This is the paper's method: a vision model gives the object of interest O and the pattern
+instruction PI, another model makes the formation. The latter also changes the current plan, unseen
+if it can. Whose turn it is follows from the history alone, which can be resumed and replayed.
 """
 
 import json
@@ -19,7 +19,7 @@ STANDARD = frozenset(tool.name for tool in TOOLS)
 
 
 def offered(tools: tuple[Tool, ...], prompt: Prompt | None) -> tuple[Tool, ...]:
-    """The tools a prompt wants its model to be told of; those it does not know are kept."""
+    """Return the tools that a prompt names, and those that are not built in."""
     if prompt is None or not prompt.tools:
         return tools
     chosen = [t for t in tools if t.name in prompt.tools or t.name not in STANDARD]
@@ -35,8 +35,8 @@ class TwoStages:
         planner: is given what the person said, the pattern, and what was measured; no pictures.
         look: the looker's prompt.
         plan: the planner's prompt.
-        repair: the planner's prompt where what it proposed last is not certified.
-        revise: the planner's prompt where a plan stands.
+        repair: the planner's prompt after a proposal of its own that is not certified.
+        revise: the planner's prompt when there is a current plan.
     """
 
     sees = True
@@ -57,25 +57,25 @@ class TwoStages:
         self._look, self._plan, self._repair, self._revise = look, plan, repair, revise
 
     async def reply(self, request: Request) -> Reply:
-        """The reply of whose turn it is.
+        """Return the reply of the model whose turn it is.
 
         Raises:
-            ModelError: it cannot.
+            ModelError: that model cannot answer.
         """
         if request.aside:
             return await self._looker.reply(request)
         tools, turn = request.tools, tuple(turn_of(request.messages))
-        found, stands = measuring(turn), _plan_stands(turn)
+        found, stands = first_measuring_reply(turn), _plan_stands(turn)
         if found is None and (not stands or _is_to_look(turn)):
             seen = Request(self._look.render(), request.messages, offered(tools, self._look))
             return await self._looker.reply(seen)
         usual = self._revise if stands else self._plan
         prompt = self._repair if _uncertified(turn) else usual
-        told = Request(prompt.render(), _handed_over(turn, found), offered(tools, prompt))
+        told = Request(prompt.render(), _planner_history(turn, found), offered(tools, prompt))
         return await self._planner.reply(told)
 
     async def aclose(self) -> None:
-        """Close what either keeps open."""
+        """Close what either model keeps open."""
         for model in (self._looker, self._planner):
             close = getattr(model, "aclose", None)
             if close is not None:
@@ -83,10 +83,10 @@ class TwoStages:
 
 
 def prompt_named(library: PromptLibrary, name: str) -> Prompt:
-    """The prompt of a name, which a run gives no values.
+    """Return the prompt of a name, which must not need values.
 
     Raises:
-        InputError: there is none, or it wants values.
+        InputError: there is none, or it needs values.
     """
     try:
         prompt = library.load(name)
@@ -99,7 +99,7 @@ def prompt_named(library: PromptLibrary, name: str) -> Prompt:
 def staged(
     looker: Model, planner: Model, plan: str, library: PromptLibrary
 ) -> tuple[TwoStages, tuple[Prompt, ...]]:
-    """Two models as one, and their prompts.
+    """Return two models as one, and their prompts.
 
     Raises:
         InputError: an unknown prompt, or a model that reads none.
@@ -115,8 +115,8 @@ def staged(
     return TwoStages(looker, planner, **prompts), tuple(prompts.values())
 
 
-def measuring(messages: History) -> int | None:
-    """The place of the first reply all of whose things came out as segmented, if there is one."""
+def first_measuring_reply(messages: History) -> int | None:
+    """Return the index of the first reply whose `segment` calls all succeeded, or None."""
     failed: dict[str, bool] = {}
     for message in messages:
         if isinstance(message, Result) and message.name == "segment":
@@ -130,12 +130,12 @@ def measuring(messages: History) -> int | None:
 
 
 def _plan_stands(turn: History) -> bool:
-    """Whether the person speaks of a plan that there is."""
+    """Return whether there was a current plan when the turn began."""
     return read_task(turn[0].text).standing is not None
 
 
 def _is_to_look(turn: History) -> bool:
-    """Whether the planner has asked for what it cannot see."""
+    """Return whether the planner has asked for a look at the picture, which it cannot see."""
     return any(isinstance(m, Result) and m.name == "look" for m in turn)
 
 
@@ -145,8 +145,8 @@ def _uncertified(messages: History) -> bool:
     return last is not None and (last.error is not None or not json.loads(last.text)["certified"])
 
 
-def _handed_over(messages: History, found: int | None) -> History:
-    """In place of what the looker said and did, what came of it, as one message of the person's.
+def _planner_history(messages: History, found: int | None) -> History:
+    """Return the history with the looker's part replaced by its outcome in the person's message.
 
     A planner that read the pattern as its own words might go on as if it had seen the picture.
     """

@@ -22,7 +22,7 @@ from ..geometry.cages.budget import cut_short, search_budget
 from ..perception.target_prompt import Point, TargetPrompt
 from ..tool import FilledBy, ToolResult, in_thread, tool
 from ..world import PlanNode, ShownCandidate, Target, World
-from .others import held_off, with_others
+from .others import with_hard_keep_outs, with_others
 from .robots import drive_to, with_observed, with_robots
 from .seeing import sighting
 from .targets import (
@@ -39,7 +39,7 @@ from .targets import (
 MAX_FINDINGS = 12
 """Findings spelled out in a reply; the rest are counted."""
 SLACK_SHARE, SLACK_PX = 0.25, 3.0
-"""How far off an outline may be, as a share of the distance kept from it, and at least."""
+"""How far off an outline may be, as a share of the distance kept from it, but at least this, px."""
 SHOW_PARTIAL = "To show it to the person, pass its plan_id to report_impossible."
 """Ends the answer to what cannot be met in full; for a model, not for the person."""
 
@@ -68,7 +68,7 @@ async def propose_formation(
         raise ToolError("propose_formation: give positions or samples, not both.")
     stated = contract_in_pixels(contract, context.world.metres_per_pixel)
     _check_against_words(context, stated)
-    held = held_off(_held_to(stated, context.settings), context.world)
+    held = with_hard_keep_outs(_with_fixed_settings(stated, context.settings), context.world)
     targets = with_pointed(context.world, targets, held.target_ids)
 
     def work() -> tuple[World, PlanNode | PlacementError, Plan | None]:
@@ -100,7 +100,7 @@ def _proposed(
     offered: dict[str, Any],
     tell: str | None,
 ) -> ToolResult:
-    """The answer to a proposal that has come to a plan, the current one of the next world."""
+    """Return the result of a proposal that has come to a plan, the latest of the next world."""
     node = world.latest
     data = proposal_data(world, node.plan) | corrections(context.world, world, targets) | offered
     return tell_of(context, world, node, data, targets, tell)
@@ -114,10 +114,10 @@ def tell_of(
     targets: Sequence[TargetPrompt],
     tell: str | None,
 ) -> ToolResult:
-    """What a tool that made a plan gives back: what to look at first, or the turn's last word."""
+    """Return the result of a tool that made a plan: what to look at first, or the last word."""
     now, message, certified = context.at(world), None, node.plan.verdict.certified
     looked = tuple(_seen(t) if t.id in node.unseen else t for t in world.targets)
-    if certified and (advice := _to_see(now, node)):
+    if certified and (advice := _look_first_advice(now, node)):
         data |= {"look_first": advice}
     elif certified and not context.settings.may_deploy:
         message = tell or None
@@ -126,12 +126,12 @@ def tell_of(
 
 
 def _seen(target: Target) -> Target:
-    """A target whose outline has been shown."""
+    """Return a target marked as one whose outline has been shown."""
     return target if target.seen else target.model_copy(update={"seen": True})
 
 
 def _check_against_words(context: Context, contract: Contract) -> None:
-    """Hold the contract, in px, against the number of robots and the words of the person."""
+    """Check the contract, in px, against the number of robots and the words of the person."""
     settings, asked = context.settings, context.settings.robots
     if asked is not None and contract.robots != asked:
         raise ToolError(
@@ -160,7 +160,7 @@ def _check_against_words(context: Context, contract: Contract) -> None:
 def _planned(
     context: Context, held: Contract, places: Any
 ) -> tuple[PlanNode | PlacementError, Plan | None]:
-    """The plan of a contract or why there is none and, if it is not certified, the best partial."""
+    """Return a contract's plan or why there is none, and the best partial plan if not certified."""
     world = context.world
     site, version = world.site(held), world.version_of(held)
     with search_budget():
@@ -182,14 +182,14 @@ def _planned(
 
 
 def _refusal(error: PlacementError, partial: dict[str, str]) -> ToolError:
-    """Why robots cannot all be placed, with the partial plan that there is instead."""
+    """Return the error for robots that cannot all be placed, with the partial plan instead."""
     plain = f"{error} {partial['sentence']}"
     facts = error.facts | {"partial_plan": partial["plan_id"], "plain": plain}
     return ToolError(f"{plain} {SHOW_PARTIAL}", error.kind, **facts)
 
 
 def _unseen(world: World, held: Contract) -> tuple[str, ...]:
-    """Targets whose outlines have to be seen before robots move."""
+    """Return the targets whose outlines have to be seen before robots move."""
     measured_from = {n for g in held.groups if g.clearance is not None for n in g.targets}
     named = (t for t in world.targets if t.id in held.target_ids and not t.seen)
     return tuple(t.id for t in named if doubtful(t) or t.id in measured_from)
@@ -212,7 +212,7 @@ async def deploy(
     plan_id, made = plan_id or _standing_id(context), context.proposed
     node = context.world.plan(plan_id or made)
     _check_may_move(context, node.plan)
-    if plan_id is None and (advice := _to_see(context, node)):
+    if plan_id is None and (advice := _look_first_advice(context, node)):
         return ToolResult({"deployed": False, "why": f"Look first: {advice}"})
     arrival, world, moved = await drive_to(context, node, follow)
     worst = int(np.argmax(arrival.residual_px))
@@ -234,10 +234,10 @@ async def deploy(
 
 
 def _standing_id(context: Context) -> str | None:
-    """The plan of an earlier turn that stands, where nothing was proposed since.
+    """Return the id of the current plan if it is of an earlier turn; None if this reply made one.
 
     Raises:
-        ToolError: there is none, and none was made in this reply.
+        ToolError: there is no such plan, and none was made in this reply.
     """
     world = context.world
     if context.proposed is not None:
@@ -250,10 +250,10 @@ def _standing_id(context: Context) -> str | None:
 
 
 def _check_may_move(context: Context, plan: Plan) -> None:
-    """Refuse to move robots to what is not certified, or not approved as it is.
+    """Refuse to move robots to a plan that is not certified, or not approved as it is.
 
     Raises:
-        ToolError: saying why.
+        ToolError: the plan is not certified, or partial and not approved, or nothing may be moved.
     """
     if not plan.verdict.certified:
         raise ToolError(f"Plan {plan.id} is not certified; repair its findings and propose again.")
@@ -318,14 +318,14 @@ def report_impossible(
 
 
 def _offer(plan: Plan) -> dict[str, str]:
-    """A partial plan's id, and what there is to say of it."""
+    """Return a partial plan's id, and what there is to say of it."""
     assert plan.partial is not None
     sentence = f"Plan {plan.id} is certified as partial: {plan.partial.sentence}"
     return {"plan_id": plan.id, "sentence": sentence}
 
 
-def _to_see(context: Context, node: PlanNode) -> str:
-    """What has to be looked at before a plan nobody has seen is carried out, if anything."""
+def _look_first_advice(context: Context, node: PlanNode) -> str:
+    """Return what has to be looked at before an unseen plan is carried out, or ""."""
     if not node.unseen:
         return ""
     world = context.world
@@ -342,7 +342,7 @@ def _to_see(context: Context, node: PlanNode) -> str:
 
 
 def _doubt(target: Target, scale: float | None) -> str:
-    """Why a target has to be looked at."""
+    """Return why a target has to be looked at."""
     if not doubtful(target):
         return "has an edge that a named distance is measured from"
     if not (missed := well_missed(target)):
@@ -352,14 +352,14 @@ def _doubt(target: Target, scale: float | None) -> str:
 
 
 def _slack(plan: Plan, name: str) -> float:
-    """How far off an outline may be without harm, px: a quarter of the distance to be kept."""
+    """Return how far off an outline may be without harm, px: a share of the distance to keep."""
     groups = (g for g in plan.formation.contract.groups if name in g.targets)
     kept = [nominal(g.clearance) for g in groups if g.clearance is not None]
     return max(SLACK_SHARE * min(kept, default=MIN_CLEARANCE), SLACK_PX)
 
 
-def _held_to(contract: Contract, settings: Settings) -> Contract:
-    """The contract with what the person fixed: robot radius and clearance."""
+def _with_fixed_settings(contract: Contract, settings: Settings) -> Contract:
+    """Return the contract with what the person fixed: robot radius and clearance."""
     groups = tuple(_with_clearance(g, settings.clearance) for g in contract.groups)
     radius = settings.robot_radius
     fixed = {} if radius is None else {"robot_radius": radius}
@@ -380,7 +380,7 @@ def _sampled(world: World, samples: tuple[str, ...]) -> Any:
 
 
 def proposal_data(world: World, plan: Plan) -> dict[str, Any]:
-    """What a reply says of a plan."""
+    """Return what a reply says of a plan."""
     verdict, contract = plan.verdict, plan.formation.contract
     findings = [f.sentence for f in verdict.findings]
     more = len(findings) - MAX_FINDINGS

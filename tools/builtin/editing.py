@@ -1,4 +1,4 @@
-"""Tools that change the plan that stands: edit_formation and undo.
+"""Tools that change the current plan: edit_formation and undo.
 
 Whatever an edit does not name stays as it is, and every robot keeps its number.
 """
@@ -28,16 +28,16 @@ from .robots import with_robots
 from .targets import doubtful, measured_all, with_pointed
 
 MOST_MOVES = 12
-"""Robots of a reply whose ways are listed; of the others the number and the longest."""
+"""Most robots whose ways a reply lists; of all it gives the number and the longest way."""
 SHARES = (0.75, 0.5, 0.25)
-"""Of a way that there is no room for, those that are tried."""
+"""Shares that are tried of a way for which there is no room."""
 STAYS = 0.05
 """A robot whose place is nearer than this to the one it had, px, stays."""
 SHORT: dict[str, Any] = {
     "type": "array",
     "items": {"type": "object", "properties": {"id": {}, "label": {}, "outline": {}, "box": {}}},
 }
-"""Schema of targets that models are offered; the whole one is told with propose_formation."""
+"""Schema of targets that models are offered; the whole one comes with propose_formation."""
 NOT_MOVED = "robots stay where they are until deploy"
 
 
@@ -88,10 +88,10 @@ async def edit_formation(
 
 
 def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]) -> Edited:
-    """The certified plan after edits.
+    """Return the certified plan after edits.
 
     Raises:
-        ToolError: an edit makes no sense, or what comes of it is not certified: nothing changed.
+        ToolError: an edit makes no sense, or its result is not certified; nothing has changed.
     """
     made = edited(plan, edits, world.whole_site, world.version_of, stay)
     verdict = made.plan.verdict
@@ -109,7 +109,7 @@ def _edited(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]
 
 
 def _possible(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[int]) -> str:
-    """How much of a move that is refused would do, as a sentence; "" where none is known to."""
+    """Return how much of a refused move would do, as a sentence; "" if none is known to."""
     for share in SHARES:
         less = [_lessened(edit, share) for edit in edits]
         with suppress(ToolError):
@@ -120,7 +120,7 @@ def _possible(world: World, plan: Plan, edits: Sequence[Edit], stay: Sequence[in
 
 
 def _lessened(edit: Edit, share: float) -> Edit:
-    """An edit that moves by a share of the way that another one does."""
+    """Return an edit that moves by a share of the way that another one does."""
     if isinstance(edit, Shift):
         return edit.model_copy(update={"dx": edit.dx * share, "dy": edit.dy * share})
     if isinstance(edit, Place) and edit.by is not None:
@@ -131,7 +131,7 @@ def _lessened(edit: Edit, share: float) -> Edit:
 
 
 def previewed(world: World, edits: Sequence[Edit], plan_id: str | None = None) -> Plan:
-    """What edits would make of a plan, certified or with findings; nothing is changed.
+    """Return what edits would make of a plan, certified or with findings; nothing is changed.
 
     Raises:
         ToolError: there is no such plan, or an edit makes no sense.
@@ -146,12 +146,12 @@ def previewed(world: World, edits: Sequence[Edit], plan_id: str | None = None) -
 
 
 def _edit_facts(edit: Edit) -> dict[str, Any]:
-    """An edit as JSON, with all that it says."""
+    """Return an edit as JSON, with all that it says."""
     return edit.model_dump(mode="json", exclude_none=True)
 
 
 def _named(edits: Sequence[Edit]) -> set[str]:
-    """What edits name that may be ids of things."""
+    """Return what edits name that may be ids of things."""
     named: set[Any] = set()
     for edit in edits:
         facts = edit.model_dump()
@@ -162,7 +162,7 @@ def _named(edits: Sequence[Edit]) -> set[str]:
 
 
 def moves(before: Plan, after: Plan) -> dict[str, Any]:
-    """Who has another place than before and how far it is from the old one, by robots' ids."""
+    """Return which robots have another place than before and how far it is from the old one."""
     old = dict(zip(before.formation.robots, before.formation.positions, strict=False))
     new = dict(zip(after.formation.robots, after.formation.positions, strict=False))
     ways = {n: float(np.hypot(*np.subtract(new[n], old[n]))) for n in new if n in old}
@@ -208,7 +208,7 @@ def undo(
 
 
 def _line_of_plans(context: Context) -> list[Step]:
-    """The steps undo goes through, the one that this turn has made among them."""
+    """Return the steps that undo goes through, including the one that this turn has made."""
     world, steps = context.world, list(context.steps)
     if world.undone == 0 and (not steps or steps[-1].current != world.current):
         steps.append(world.step)
@@ -216,10 +216,10 @@ def _line_of_plans(context: Context) -> list[Step]:
 
 
 def _place_of(line: Sequence[Step], to: str) -> int:
-    """Where a plan stands in the line of plans.
+    """Return the index of a plan in the line of plans.
 
     Raises:
-        ToolError: it is not there.
+        ToolError: the plan is not in it.
     """
     for place, step in enumerate(line):
         if step.current is not None and to in ("first", step.current):

@@ -1,4 +1,4 @@
-"""What a deployment does where a thing moves: robots follow it, or are kept from where it was."""
+"""What a deployment does if a thing moves: robots follow it, or are kept from where it was."""
 
 from collections.abc import Sequence
 
@@ -27,10 +27,10 @@ def watch_target(context: Context, plan: Plan, fleet: Fleet) -> None:
 
 
 async def stands_about(context: Context, plan: Plan, fleet: Fleet, follow: Follow | None) -> bool:
-    """Whether what a plan is about has moved, and its robots stand about it as they are to.
+    """Return whether a plan's target has moved, but its robots stand around it as planned.
 
     Raises:
-        ToolError: it has moved, and they do not, or are not to follow it.
+        ToolError: it has moved, and they do not stand so, or are not to follow it.
     """
     world, contract = context.world, plan.formation.contract
     for name in contract.target_ids:
@@ -54,7 +54,10 @@ async def stands_about(context: Context, plan: Plan, fleet: Fleet, follow: Follo
 async def followed(
     context: Context, plan: Plan, fleet: Fleet, arrival: Arrival, follow: Follow
 ) -> tuple[Arrival, World]:
-    """What came of following the thing that robots stand about; where they were seen is kept.
+    """Follow the thing that robots stand around; where they were seen last is recorded.
+
+    Returns:
+        What was observed, and the world after it.
 
     Raises:
         FleetError: robots failed or were stopped on the way.
@@ -80,7 +83,7 @@ async def followed(
             )
     finally:
         context.observed(world.having(robots=last))
-    arrival = await _filmed(context, arrival.model_copy(update={"follow": came}), seen)
+    arrival = await _with_follow_track(context, arrival.model_copy(update={"follow": came}), seen)
     world = world.having(robots=last).with_arrival(plan.id, arrival)
     if came.ended in ("stopped", "failed"):
         context.observed(world)
@@ -88,10 +91,10 @@ async def followed(
     return arrival, world
 
 
-async def _filmed(
+async def _with_follow_track(
     context: Context, arrival: Arrival, seen: Sequence[tuple[tuple[Pose, ...], Rigid]]
 ) -> Arrival:
-    """An arrival whose track goes on with what was seen of a follow."""
+    """Return an arrival whose track goes on with what was seen while robots followed."""
     if arrival.track is None or not seen:
         return arrival
     track = read_track(context.services.artefacts.get(arrival.track))
@@ -104,6 +107,6 @@ async def _filmed(
 
 
 def by_place(plan: Plan, robots: Sequence[str]) -> list[str]:
-    """Robots in the order of a plan's positions as those in the order of its places."""
+    """Return robots, given in the order of a plan's positions, in the order of its places."""
     order = [i for group in plan.formation.members for i in group]
     return [robots[i] for i in order] if order else list(robots)

@@ -137,7 +137,7 @@ def _described(outline: Outline, descriptor: Descriptor) -> dict[str, Any]:
 
 
 def _matrix(outline: Outline) -> dict[str, Any]:
-    """The region as rows of 0 and 1, with the cell size that maps it back to pixels."""
+    """Return the region as rows of 0 and 1, with the cell size that maps it back to pixels."""
     x0, y0, x1, y1 = outline.bounds
     cell = max(x1 - x0, y1 - y0) / MATRIX_SIDE
     columns, rows = max(round((x1 - x0) / cell), 1), max(round((y1 - y0) / cell), 1)

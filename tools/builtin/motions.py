@@ -1,4 +1,4 @@
-"""How the robots of a plan would get to their places, planned and certified before it stands."""
+"""How the robots of a plan would get to their places: planned and certified with the plan."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Going:
         robots: ids; robot i takes place i.
         gap: share of the summed squared ways another assignment could save at most; None where
             the least was found.
-        paths: (k, 2) px by id; none where there is no way, as a deployment says.
+        paths: (k, 2) px by id; none if there is no way, which a deployment then says.
         verdict: of the motion; None where there is none.
         radius: of a body, px.
     """
@@ -46,10 +46,10 @@ class Going:
 
 
 def paths_to(context: Context, plan: Plan) -> dict[str, FloatArray]:
-    """How robots would get to a plan's places from where they were seen last.
+    """Return how robots would get to a plan's places from where they were seen last.
 
     Returns:
-        (k, 2) px by the robot's id; none where no fleet is in use yet, or there is no way.
+        (k, 2) px by the robot's id; none if no fleet is in use yet, or there is no way.
 
     Raises:
         ToolError: robots that keep places stand in each other's way.
@@ -69,12 +69,12 @@ def going(
     taking: Sequence[str | None] | None,
     share: bool = False,
 ) -> Going:
-    """How robots get to a plan's places from where they were seen.
+    """Plan how robots get to a plan's places from where they were seen.
 
     Args:
         taking: the robot that keeps each place, None for one more; left out, robots are
             interchangeable.
-        share: whether they may take each other's places where they find no order otherwise.
+        share: whether they may take each other's places if they find no order otherwise.
 
     Raises:
         ToolError: too few robots, or those that keep places stand in each other's way.
@@ -82,7 +82,7 @@ def going(
     points, contract = plan.formation.points, plan.formation.contract
     ground = Ground(named_obstacles(contract, world.site(contract)), world.site(contract))
     radius = body_radius(fleet, contract, points)
-    robots, gap = _who(poses, points, taking, ground, radius)
+    robots, gap = _assigned_robots(poses, points, taking, ground, radius)
     at = {pose.id: (pose.x, pose.y) for pose in poses}
     team = Team(
         ids=robots,
@@ -106,21 +106,21 @@ def going(
 
 
 def met_by(world: World, plan: Plan, found: Going | None) -> tuple[Encounter, ...]:
-    """The other things that robots of a plan stand on or, on their ways, drive over."""
+    """Return the other things that robots of a plan stand on or, on their ways, drive over."""
     site = world.site(plan.formation.contract)
     if found is None:
         return encounters_of(plan, site, {}, plan.formation.contract.robot_radius)
     return encounters_of(plan, site, found.paths, found.radius)
 
 
-def _who(
+def _assigned_robots(
     poses: tuple[Pose, ...],
     points: FloatArray,
     taking: Sequence[str | None] | None,
     ground: Ground,
     radius: float,
 ) -> tuple[tuple[str, ...], float | None]:
-    """Who takes which place, and what another assignment could save."""
+    """Return who takes which place, and what another assignment could save."""
     try:
         if taking is None:
             return _interchangeable(poses, points, ground, radius)

@@ -14,15 +14,15 @@ from ..world import KeepOut, World
 from .targets import measured_all
 
 FAINT = 0.4
-"""Candidates that are less salient are none."""
+"""Candidates that are less salient do not count as things."""
 SPECK, GROUND = 2e-4, 0.33
 """What covers less of the picture may be dirt; what covers more is the ground."""
 DETAIL, DECIMALS = 1.0, 1
-"""By how much the outlines of other things are simplified, and places they are rounded to, px."""
+"""How much the outlines of other things are simplified, px, and decimals they are rounded to."""
 
 
 def with_others(context: Context) -> World:
-    """The world with what stands out in its picture as things that robots keep off."""
+    """Return the world with what stands out in its picture as things that robots keep off."""
     world, found = context.world, list[KeepOut]()
     if any(not k.hard for k in world.keep_out):
         return world
@@ -38,13 +38,13 @@ def with_others(context: Context) -> World:
 
 
 def with_keep_outs(context: Context, prompts: Sequence[TargetPrompt]) -> World:
-    """The world with regions that no robot may enter, k1, k2, ...
+    """Return the world with regions that no robot may enter, k1, k2, ...
 
     A box or an outline is the region itself; at a point the thing is measured, and a candidate is
     taken as it was found.
 
     Raises:
-        InputError: one is not in the picture, or cannot be measured.
+        InputError: a region is not in the picture, or cannot be measured.
     """
     world = context.world
     for prompt in prompts:
@@ -72,8 +72,8 @@ def _region(context: Context, prompt: TargetPrompt) -> Outline:
     return measured_all(context, (prompt,)).target(prompt.id).outline
 
 
-def held_off(contract: Contract, world: World) -> Contract:
-    """The contract with the regions in it that no robot may enter."""
+def with_hard_keep_outs(contract: Contract, world: World) -> Contract:
+    """Return the contract with the world's regions that no robot may enter in its `keep_out`."""
     hard = (k.id for k in world.keep_out if k.hard)
     return contract.model_copy(
         update={"keep_out": tuple(dict.fromkeys((*contract.keep_out, *hard)))}

@@ -39,7 +39,7 @@ from .motions import Going, going, met_by
 from .tracks import with_track
 
 MOST_NAMED = 12
-"""Idle robots that a note names."""
+"""Most idle robots that a note names."""
 
 
 async def with_robots(
@@ -48,17 +48,17 @@ async def with_robots(
     taking: Sequence[str | None] | None = None,
     share: bool = False,
 ) -> World:
-    """The world with a plan as the latest one and, if it is certified, robots for its places.
+    """Return the world with a plan as the latest one and, if certified, robots for its places.
 
     Args:
         taking: the robot that keeps each place, in the order of the groups, None for one more;
             left out, the least sum of squared ways decides.
-        share: whether they may take each other's places where they find no order otherwise.
+        share: whether they may take each other's places if they find no order otherwise.
 
     Raises:
         ToolError: a real fleet has too few robots.
         FleetError: the fleet cannot be observed.
-        InputError: starting positions that cannot be.
+        InputError: impossible starting positions.
     """
     world, plan = context.world, node.plan
     if not plan.verdict.certified:
@@ -73,7 +73,7 @@ async def with_robots(
     )
     try:
         fleet = await _team(context, contract, taking or ())
-    except FleetSizeError:  # more than can be driven can still be planned
+    except FleetSizeError:  # more robots than can be driven can still be planned for
         return world.with_plan(_noted(world, node, told, None))
     check_turns(plan, fleet)
     poses = await fleet.observe(max_age=MAX_AGE)
@@ -86,7 +86,7 @@ async def with_robots(
 
 
 def _noted(world: World, node: PlanNode, notes: list[str], found: Going | None) -> PlanNode:
-    """The plan with notes, and with what its robots stand on and drive over."""
+    """Return the plan with notes, and with what its robots stand on and drive over."""
     plan = node.plan
     met = met_by(world, plan, found)
     more = (*plan.verdict.notes, *notes, *notes_of(met))
@@ -95,7 +95,7 @@ def _noted(world: World, node: PlanNode, notes: list[str], found: Going | None) 
 
 
 def _notes(found: Going, poses: tuple[Pose, ...]) -> list[str]:
-    """What is to be said of who takes which place."""
+    """Return notes on which robots take which places."""
     notes: list[str] = []
     if found.gap is not None:
         notes.append(
@@ -116,12 +116,12 @@ def _notes(found: Going, poses: tuple[Pose, ...]) -> list[str]:
 async def drive_to(
     context: Context, node: PlanNode, follow: Follow | None = None
 ) -> tuple[Arrival, World, bool]:
-    """Drive the robots of a plan to their places, and say what was observed.
+    """Drive the robots of a plan to their places, and return what was observed.
 
-    Where they stand at its end is kept also if it fails or is cancelled.
+    Where they stand at the end is recorded even if the drive fails or is cancelled.
 
     Args:
-        follow: leave to follow the thing that the plan is about from then on.
+        follow: permission to follow the thing that the plan is about from then on.
 
     Returns:
         What was observed, the world after it, and whether robots moved: those that are there
@@ -161,7 +161,7 @@ async def drive_to(
 
 
 async def _arrived(context: Context, plan: Plan, fleet: Fleet) -> tuple[Arrival, World]:
-    """What was observed after a deployment, and the world then."""
+    """Deploy a plan and return what was observed, and the world after it."""
     made = await _deployed(context, plan, fleet)
     arrival = _in_robot_order(made.arrival, plan)
     arrival = await with_track(context, arrival, made.track)
@@ -173,7 +173,7 @@ async def _arrived(context: Context, plan: Plan, fleet: Fleet) -> tuple[Arrival,
 
 
 def with_observed(tell: str | None, arrival: Arrival, world: World) -> str | None:
-    """The model's words and, after them, what was observed."""
+    """Return the model's words and, after them, what was observed; None if there are no words."""
     if not tell:
         return None
     count, worst = len(arrival.observed), max(arrival.residual_px)
@@ -185,7 +185,7 @@ def with_observed(tell: str | None, arrival: Arrival, world: World) -> str | Non
 
 
 async def trajectories_to(context: Context, plan: Plan) -> Trajectories:
-    """How robots with two wheels would drive to a plan's places from where they are seen.
+    """Return how robots with two wheels would drive to a plan's places from where they are seen.
 
     Raises:
         ToolError, FleetError: as of `drive_to`.
@@ -203,7 +203,7 @@ async def trajectories_to(context: Context, plan: Plan) -> Trajectories:
 
 
 async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
-    """What came of a deployment; where robots were seen last is kept however it ends."""
+    """Deploy a plan; where robots were seen last is recorded however that ends."""
     last: tuple[Pose, ...] = ()
 
     def watch(poses: tuple[Pose, ...]) -> None:
@@ -225,7 +225,7 @@ async def _deployed(context: Context, plan: Plan, fleet: Fleet) -> Deployment:
 
 
 async def _team(context: Context, contract: Contract, taking: Sequence[str | None] = ()) -> Fleet:
-    """The robots, as many as a contract wants if they are simulated, those who keep places too."""
+    """Return the fleet; a simulated one has robots for the contract and all that keep places."""
     settings, world, fleets = context.settings, context.world, context.services.fleets
     held = fleets.get(settings.fleet)
     ids = {pose.id for pose in world.robots}
@@ -260,7 +260,7 @@ async def _team(context: Context, contract: Contract, taking: Sequence[str | Non
 
 
 def _opened(name: str, request: FleetRequest, others: Sequence[Other]) -> Fleet:
-    """A fleet; robots that are set down stand off other things too where there is room."""
+    """Open a fleet; robots that are set down stand off other things too where there is room."""
     load = fleet_named(name)
     if others:
         solid = shapely.union_all([request.solid, *(thing.region for thing in others)])
@@ -270,7 +270,7 @@ def _opened(name: str, request: FleetRequest, others: Sequence[Other]) -> Fleet:
 
 
 def _are_there(poses: tuple[Pose, ...], plan: Plan, arrival: Arrival) -> bool:
-    """Whether all robots of a plan stand where they had arrived."""
+    """Return whether all robots of a plan stand where they had arrived."""
     seen = {pose.id: (pose.x, pose.y) for pose in poses}
     wanted = zip(arrival.robots, plan.formation.positions, strict=True)
     by_id = {pose.id: pose for pose in poses}
@@ -285,7 +285,7 @@ def _are_there(poses: tuple[Pose, ...], plan: Plan, arrival: Arrival) -> bool:
 
 
 def _in_robot_order(arrival: Arrival, plan: Plan) -> Arrival:
-    """An arrival by places as one by robots, as the plan's positions are."""
+    """Return an arrival ordered by places as one ordered by robots, as the plan's positions are."""
     place_of = {robot: place for place, robot in enumerate(arrival.robots)}
     for failed, other in reversed(arrival.replaced.items()):
         place_of[failed] = place_of[other]

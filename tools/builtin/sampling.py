@@ -191,7 +191,7 @@ def _rings(
     step: float | None,
     rings: int | None,
 ) -> ToolResult:
-    """Robots on several rings, or in the holes where `rings` is None, innermost first."""
+    """Sample positions on several rings, innermost first, or in the holes if `rings` is None."""
     outline, picture = context.world.target(name).outline, context.picture
     radius = context.settings.robot_radius or 0.0
     room = (float(picture.width), float(picture.height))

@@ -16,13 +16,13 @@ from ..tool import ToolResult, tool, violations
 from .targets import closer_views, corrections, framed, measured_all, summary
 
 MOST_SHOWN = 40
-"""Candidates that a reply or a picture holds."""
+"""Most candidates in a reply or a picture."""
 LEAST_SHARE = 0.1
 """Colours that fewer of a thing's pixels have are left out of replies."""
 
 
 def sighting(candidate: Candidate, reasons: tuple[str, ...] = ()) -> dict[str, Any]:
-    """What a reply says of a candidate."""
+    """Return what a reply says of a candidate."""
     seen = candidate.attributes
     data: dict[str, Any] = {
         "id": candidate.id,
@@ -137,7 +137,7 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
 
 
 def _hinted(query: Query, candidates: tuple[Candidate, ...]) -> bool:
-    """Whether some thing, however faint, shows a little of the colour asked for."""
+    """Return whether some thing, however faint, shows a little of the colour asked for."""
     shares = (
         sum(share for name, share in c.attributes.colours if name in query.colours)
         for c in candidates
@@ -195,7 +195,11 @@ def segment(
 
 
 def parse_prompt(values: dict[str, Any]) -> TargetPrompt:
-    """A TargetPrompt, its violations as a ToolError."""
+    """Return values as a TargetPrompt.
+
+    Raises:
+        ToolError: they are against its schema.
+    """
     try:
         return TargetPrompt.model_validate(values)
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""The plan that stands as numbers: places, distances, and whether a ring closes."""
+"""The current plan in numbers: places, distances, and whether a ring closes."""
 
 import math
 from typing import Any
@@ -14,13 +14,13 @@ from ..geometry.sampling import nearest
 from ..world import World
 
 PLAN = "plan"
-"""What `measure` is asked for to be told of the plan that stands."""
+"""What `measure` is given in place of an id to measure the current plan."""
 MOST_ROBOTS = 60
-"""Robots a reply lists one by one."""
+"""Most robots that a reply lists one by one."""
 
 
 def _place_of_robot(world: World, name: str) -> tuple[float, float] | None:
-    """Where a robot stands, or shall stand where it was never driven; None for no robot's name."""
+    """Return where a robot stands, or is to stand if never driven; None for an unknown name."""
     robot = name.removeprefix("r")
     driven = {pose.id: (pose.x, pose.y) for pose in world.robots if pose.seen > 0}
     if robot in driven:
@@ -33,7 +33,7 @@ def _place_of_robot(world: World, name: str) -> tuple[float, float] | None:
 
 
 def standing_data(context: Context) -> dict[str, Any]:
-    """What `measure` says of the plan that stands."""
+    """Return what `measure` says of the current plan."""
     world = context.world
     plan = world.plan().plan
     robots = [
@@ -52,7 +52,7 @@ def standing_data(context: Context) -> dict[str, Any]:
 
 
 def robot_data(context: Context, name: str) -> dict[str, Any]:
-    """What `measure` says of one robot, by r and its id; its place where it has one."""
+    """Return what `measure` says of one robot, such as r3, and its place if it has one."""
     world, robot = context.world, name.removeprefix("r")
     plan = world.plan().plan
     groups = range(len(plan.formation.contract.groups))
@@ -65,7 +65,7 @@ def robot_data(context: Context, name: str) -> dict[str, Any]:
 
 
 def _members(plan: Plan, k: int) -> tuple[list[str], FloatArray]:
-    """Ids and places, (n, 2) px, of the robots of a group, counted from 0."""
+    """Return ids and places, (n, 2) px, of the robots of group `k`, counted from 0."""
     groups = plan.formation.contract.groups
     first = sum(group.robots for group in groups[:k])
     mine = slice(first, first + groups[k].robots)
@@ -73,7 +73,7 @@ def _members(plan: Plan, k: int) -> tuple[list[str], FloatArray]:
 
 
 def _robot_rows(world: World, plan: Plan, k: int) -> list[dict[str, Any]]:
-    """Each robot of a group: its place, and how far it is from its thing and its neighbour."""
+    """Return for each robot of a group its place, and how far that is from thing and neighbour."""
     contract, (names, points) = plan.formation.contract, _members(plan, k)
     group, everybody = contract.groups[k], plan.formation.points
     apart, other = nearest(everybody, points, min(2, len(everybody)))
@@ -97,7 +97,7 @@ def _robot_rows(world: World, plan: Plan, k: int) -> list[dict[str, Any]]:
 
 
 def _group_facts(world: World, plan: Plan, k: int) -> dict[str, Any]:
-    """A group's arrangement and, around one thing, how closed it is."""
+    """Return a group's arrangement and, around one thing, how closed it is."""
     contract, (names, points) = plan.formation.contract, _members(plan, k)
     group = contract.groups[k]
     data: dict[str, Any] = {"relation": group.relation, "targets": group.targets}
@@ -112,7 +112,7 @@ def _group_facts(world: World, plan: Plan, k: int) -> dict[str, Any]:
 
 
 def arrival_facts(world: World, plan: Plan) -> dict[str, Any]:
-    """Whether robots were seen at the places of a plan where they stand last, and how many were."""
+    """Return whether robots were last seen at the places of a plan, and how many were."""
     seen = {pose.id: (pose.x, pose.y) for pose in world.robots if pose.seen > 0}
     arrival = world.arrivals.get(plan.id)
     robots = arrival.robots if arrival is not None else plan.formation.robots
@@ -131,7 +131,7 @@ def arrival_facts(world: World, plan: Plan) -> dict[str, Any]:
 
 
 def robot_named(world: World, name: str) -> tuple[float, float]:
-    """Where a robot is, by r and its id, such as r3.
+    """Return where a robot is, named by r and its id, such as r3.
 
     Raises:
         ToolError: there is none of that name.

@@ -26,13 +26,13 @@ AROUND = 0.3
 
 
 def framed(world: World, more: str = "") -> dict[str, Any]:
-    """What a reply says of its coordinates and lengths: the frame, and the scale if it is known."""
+    """Return what a reply says of coordinates and lengths: frame, and scale if it is known."""
     scale = world.metres_per_pixel
     return {"frame": FRAME + more} | ({} if scale is None else {"metres_per_pixel": scale})
 
 
 def summary(target: Target) -> dict[str, Any]:
-    """What a reply says of a target."""
+    """Return what a reply says of a target."""
     data = {
         "id": target.id,
         "label": target.label,
@@ -54,7 +54,7 @@ def _rounded_parts(parts: Iterable[Deviation]) -> list[dict[str, int]]:
 def with_pointed(
     world: World, prompts: Sequence[TargetPrompt], named: Collection[str]
 ) -> tuple[TargetPrompt, ...]:
-    """Prompts and, of what the person pointed at, what is named and not measured yet.
+    """Return prompts and, of what the person pointed at, what is named and not measured yet.
 
     Args:
         named: ids that a contract, edits or a question name.
@@ -64,17 +64,17 @@ def with_pointed(
 
 
 def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
-    """The world with the things that prompts point at as targets.
+    """Return the world with the things that prompts point at as targets.
 
-    Those measured before one that is refused are kept, as is the doubtful mask of that one.
+    If one is refused, those measured before it stay, and its doubtful mask is stored.
 
     Raises:
-        ToolError: a prompt does not fit the picture, or its mask is not to be believed, with a
-            picture of it.
+        ToolError: a prompt does not fit the picture, or its mask is too doubtful, in which case the
+            error has a picture of it.
     """
     for given in prompts:
         context, target, threshold = measured(context, given)
-        if target.confidence < threshold and not _believed(context.world, target):
+        if target.confidence < threshold and not _is_confirmed(context.world, target):
             context.observed(context.world.having(doubted=target))
             shown = closer_view(context, target)
             raise _insufficient(target.confidence, threshold, target.prompt).showing(shown)
@@ -84,10 +84,13 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
 
 
 def measured(context: Context, given: TargetPrompt) -> tuple[Context, Target, float]:
-    """What a prompt points at, however doubtful, and the least confidence it is used at.
+    """Measure what a prompt points at, however doubtful.
+
+    Returns:
+        The context after that, the target, and the least confidence it is used at.
 
     Raises:
-        ToolError: the prompt does not fit the picture, or nothing is to be seen there.
+        ToolError: the prompt does not fit the picture, or nothing can be measured there.
     """
     prompt = _correcting(context.world, given)
     if prompt.text is not None:
@@ -95,15 +98,15 @@ def measured(context: Context, given: TargetPrompt) -> tuple[Context, Target, fl
     return context, _measured(context, prompt), _threshold(context, prompt.how)
 
 
-def _believed(world: World, target: Target) -> bool:
-    """Whether a person has agreed to that very outline, however doubtful."""
+def _is_confirmed(world: World, target: Target) -> bool:
+    """Return whether a person has agreed to that very outline, however doubtful."""
     return any(t.id == target.id and t.outline == target.outline for t in world.targets)
 
 
 def _found_by_text(
     context: Context, prompt: TargetPrompt, text: str
 ) -> tuple[Context, TargetPrompt]:
-    """A prompt by text as one by the candidate that it names, with that among the candidates.
+    """Return a context with what a text names among its candidates, and a prompt by that one.
 
     Raises:
         ToolError: nothing finds things by words, or not exactly one such thing was found.
@@ -156,9 +159,9 @@ def _measured(context: Context, prompt: TargetPrompt) -> Target:
 
 
 def _correcting(world: World, prompt: TargetPrompt) -> TargetPrompt:
-    """The prompt, with the outline that its points correct if it has no way of its own.
+    """Return the prompt, combined with the outline that its points correct if it has only points.
 
-    What a person gave a mask of is that, however a model points at it.
+    A thing that a person gave a mask of stays that, however a model points at it.
     """
     pointed = next((p for p in world.pointed if p.id == prompt.id), None)
     known = next((t.source for t in world.targets if t.id == prompt.id), None)
@@ -183,7 +186,7 @@ def _correcting(world: World, prompt: TargetPrompt) -> TargetPrompt:
 
 
 def _threshold(context: Context, how: str) -> float:
-    """The least confidence a mask pointed at in that way is used at."""
+    """Return the least confidence at which a mask pointed at in that way is used."""
     if how == "mask":
         return 0.0
     chosen = context.settings.threshold
@@ -214,17 +217,17 @@ def _insufficient(confidence: float, threshold: float, how: str) -> ToolError:
 
 
 def doubtful(target: Target) -> bool:
-    """Whether a mask has to be looked at before robots are sent there."""
+    """Return whether a mask has to be looked at before robots are sent there."""
     return target.confidence < CLEAR or bool(well_missed(target))
 
 
 def well_missed(target: Target) -> list[Deviation]:
-    """What was drawn and is left out by more than a rough outline is off."""
+    """Return the parts that were drawn but are left out by more than a rough outline is off."""
     return [part for part in target.missed if part[2] > MISSED * target.outline.size]
 
 
 def corrections(before: World, world: World, prompts: Iterable[TargetPrompt]) -> dict[str, Any]:
-    """What a reply says of outlines that points have corrected: what that has changed."""
+    """Return what a reply says of outlines that points have corrected: the areas that changed."""
     known = {t.id: t.outline.polygon for t in before.targets}
     pairs = {
         p.id: (known[p.id], world.target(p.id).outline.polygon)
@@ -245,12 +248,12 @@ def closer_views(
     plan: Plan | None = None,
     unseen: Collection[str] = (),
 ) -> tuple[bytes, ...]:
-    """Pictures of the outlines that are to be looked at.
+    """Return pictures of the outlines that are to be looked at.
 
     Args:
         context: with the world as it is now.
         before: the world before anything was measured.
-        prompts: what was measured: the small, the doubtful, and what points were given for.
+        prompts: what was measured; what is small, doubtful or was given points is shown.
         unseen: ids that are to be looked at in any case.
     """
     measured = {p.id: bool(p.points or p.negative) for p in prompts}
@@ -272,10 +275,10 @@ def _is_small(context: Context, target: Target) -> bool:
 def closer_view(
     context: Context, target: Target, plan: Plan | None = None, before: Target | None = None
 ) -> bytes:
-    """The target's outline on a part of the picture, as a JPEG file.
+    """Return the target's outline on a part of the picture, as a JPEG file.
 
     Args:
-        before: as it was before it was corrected, dashed.
+        before: the target before it was corrected, drawn dashed.
     """
     x0, y0, x1, y1 = target.box
     out = AROUND * max(x1 - x0, y1 - y0) + 2

@@ -1,4 +1,4 @@
-"""Where robots were on their way, as files: what films are made of."""
+"""Files of where robots were on their way, from which films are made."""
 
 import json
 from contextlib import suppress
@@ -15,7 +15,7 @@ from ..world import World
 
 
 async def with_track(context: Context, arrival: Arrival, track: Track) -> Arrival:
-    """An arrival with its track stored, where it can be: a film is not worth failing for."""
+    """Return the arrival with its track stored, if it can be: a film is not worth failing for."""
     file, put = _track_file(track), context.services.artefacts.put
     with suppress(StorageError):
         stored = await to_its_end(lambda: put(file))
@@ -24,21 +24,21 @@ async def with_track(context: Context, arrival: Arrival, track: Track) -> Arriva
 
 
 def _track_file(track: Track) -> bytes:
-    """Robots on their way as JSON, to a tenth of a pixel."""
+    """Return robots on their way as JSON, to a tenth of a pixel."""
     content = {"robots": track.ids, "points": np.round(track.points, 1).tolist()}
     content |= {"moved": np.round(track.moved, 3).tolist()} if len(track.moved) else {}
     return json.dumps(content, separators=(",", ":")).encode()
 
 
 def read_track(data: bytes) -> Track:
-    """The track of a file that a deployment left."""
+    """Return the track in a file that a deployment left."""
     content = json.loads(data)
     moved = np.asarray(content.get("moved", ()), dtype=float).reshape(-1, 3)
     return Track(tuple(content["robots"]), np.asarray(content["points"], dtype=float), moved)
 
 
 def moved_of(world: World, arrival: Arrival, track: Track) -> list[Rigid]:
-    """How the thing that robots followed had moved at the last moments of a track."""
+    """Return how the thing that robots followed had moved at the last moments of a track."""
     if arrival.follow is None:
         return []
     name = arrival.follow.target

@@ -1,1 +1,1 @@
-"""Poses and a plan to paths that robots drive."""
+"""From poses and a plan to the paths that robots drive."""

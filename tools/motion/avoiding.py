@@ -1,7 +1,7 @@
 """Paths that also keep off the other things in a picture, as far as there is a way around them.
 
-What a robot starts or ends beside it leaves by the shortest way; what it starts or ends on is not
-in its way, and what would wall it off is driven over: less certain things before certain ones.
+A robot leaves what it starts or ends beside by the shortest way. What it starts or ends on does not
+count, and what would wall it off is driven over: less certain things before certain ones.
 """
 
 from collections import defaultdict
@@ -21,11 +21,11 @@ from .routes import NOBODY, NoRouteError, routes
 BESIDE = 1.1
 """A robot whose centre is no further from a thing than so many radii leaves it before it drives."""
 ROOM_SHARES = (1.0, 0.3, 0.0)
-"""How much of the room beside things is kept: less where there is no other way."""
+"""Shares of the room beside things that are tried in turn: less where there is no other way."""
 NEAR_END = 0.5
 """Things grow towards starts and goals by no more than this share of the way."""
 DETAIL = 0.1
-"""By how much they are simplified, as a share of what they grow."""
+"""How much things are simplified, as a share of how much they grow."""
 
 Indices = NDArray[np.intp]
 
@@ -40,7 +40,7 @@ def routes_off(
     idle: FloatArray = NOBODY,
     ends: FloatArray | None = None,
 ) -> list[FloatArray]:
-    """Shortest paths as of `routes`, that also keep off the site's other things.
+    """Return shortest paths as `routes` does, which also keep off the site's other things.
 
     Args:
         ends: (k, 2) as of `routes`.
@@ -52,7 +52,7 @@ def routes_off(
     near = np.concatenate([starts, goals]) if ends is None else ends
 
     def route(robots: Indices, things: Sequence[Other], share: float) -> Indices:
-        """Find paths past things; return the robots that none leads past them."""
+        """Find paths past things; return the robots that have none."""
         left = _with_room(things, share, site, near, radius)
         around, walled = solid, robots[:0]
         while len(robots):
@@ -89,9 +89,9 @@ def _too_near(
     goals: FloatArray,
     radius: float,
 ) -> NDArray[np.bool_]:
-    """Which paths, (n,), come nearer to the obstacles than ends and radius do: off things by them.
+    """Return which paths, (n,), come nearer to the obstacles than both a radius and their ends.
 
-    The short way off a thing is straight, whatever lies there.
+    That happens because the short way off a thing is straight, whatever lies there.
     """
     ends = np.minimum(distances(solid, starts), distances(solid, goals))
     return np.asarray(shapely.distance(solid, lines) < 0.98 * np.minimum(ends, radius))
@@ -100,7 +100,7 @@ def _too_near(
 def _with_room(
     things: Sequence[Other], share: float, site: Site, ends: FloatArray, radius: float
 ) -> NDArray[np.object_]:
-    """Things with a share of their room around them, less where a path ends near, not at, them."""
+    """Return things grown by a share of their room, less where a path ends near but not at them."""
 
     def grown(thing: Other) -> BaseGeometry:
         off = distances(thing.region, ends)
@@ -115,7 +115,7 @@ def _with_room(
 def _by_things_stood_on(
     starts: FloatArray, goals: FloatArray, others: Sequence[Other]
 ) -> list[tuple[Indices, list[Other]]]:
-    """Robots with the things that each can keep off: none that its centre starts or ends on."""
+    """Group robots by the things they can keep off: none that a centre starts or ends on."""
     groups: defaultdict[bytes, list[int]] = defaultdict(list)
     ends = np.concatenate([starts, goals])
     near = [distances(thing.region, ends).reshape(2, -1).min(axis=0) for thing in others]

@@ -1,4 +1,4 @@
-"""Paths cut into short cells, and which cells of two robots are too near for both to be in.
+"""Paths cut into short cells, and which cells of two robots are too near to be used at once.
 
 Frame: image pixels; lengths along paths in px.
 """
@@ -13,20 +13,20 @@ from ..geometry.outline import FloatArray
 from .motion import Indices, arc_lengths
 
 SEGMENT_ROWS = 2_000_000
-"""Pairs of cells that are measured at a time, which bounds the memory it takes."""
+"""Pairs of cells that are measured at a time, to bound the memory this takes."""
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Parts of paths, c of them, one path's after the other's.
+    """The c cells of n paths, one path after the other.
 
-    The first of a path is its start and the last its goal, both of no length.
+    The first cell of a path is its start and the last its goal, both of no length.
 
     Attributes:
-        robot: (c,) whose it is.
+        robot: (c,) the robot that drives each cell.
         begin, end: (c, 2) px.
         enter, leave: (c,) arc length where it begins and ends along all that its robot drives, px.
-        first: (n + 1,) where the cells of each path begin, and the last one's end.
+        first: (n + 1,) index of the first cell of each path, and c at the end.
     """
 
     robot: Indices
@@ -38,16 +38,16 @@ class Cells:
 
     @property
     def starts(self) -> Indices:
-        """(n,) each path's start."""
+        """Index of each path's start, (n,)."""
         return self.first[:-1]
 
     @property
     def goals(self) -> Indices:
-        """(n,) each path's goal."""
+        """Index of each path's goal, (n,)."""
         return self.first[1:] - 1
 
     def of(self, path: int) -> slice:
-        """The cells of a path."""
+        """Return the slice of a path's cells."""
         return slice(int(self.first[path]), int(self.first[path + 1]))
 
 
@@ -55,7 +55,8 @@ def cut(paths: Sequence[FloatArray], owners: Indices, step: float) -> Cells:
     """Cut polylines, (k, 2) px each, at their vertices and into cells no longer than a step.
 
     Args:
-        owners: the robot that drives each path; a second path of one leads to its first.
+        owners: (n,) the robot that drives each path. A path whose own index differs from that is a
+            first leg, driven before the path of its robot's index.
     """
     knots: list[FloatArray] = []
     for path in paths:
@@ -89,7 +90,7 @@ def _points(path: FloatArray, along: FloatArray) -> FloatArray:
 
 
 def conflicts(cells: Cells, apart: float, step: float) -> Indices:
-    """Pairs of cells of two robots that come nearer to each other than `apart` px.
+    """Return the pairs of cells of two robots that come nearer to each other than `apart` px.
 
     Args:
         step: greatest length of a cell, less than `apart`.
@@ -111,7 +112,10 @@ def conflicts(cells: Cells, apart: float, step: float) -> Indices:
 
 
 def _distance(cells: Cells, pairs: Indices) -> FloatArray:
-    """How near two cells come, (p,) px, unless they cross: where they do they are shorter."""
+    """Return how near the cells of each pair come, (p,) px, by their ends alone.
+
+    For crossing cells this exceeds 0, but stays below any distance kept, since cells are shorter.
+    """
     one, other = pairs.T
     ends = [
         _to_segment(cells.begin[one], other, cells),
@@ -123,7 +127,7 @@ def _distance(cells: Cells, pairs: Indices) -> FloatArray:
 
 
 def _to_segment(points: FloatArray, segment: Indices, cells: Cells) -> FloatArray:
-    """Distance of points, (p, 2), to the cell of the same row, (p,)."""
+    """Return the distance of points, (p, 2), to the cell of the same row, (p,)."""
     begin, along = cells.begin[segment], cells.end[segment] - cells.begin[segment]
     square = np.einsum("ij,ij->i", along, along)
     dot = np.einsum("ij,ij->i", points - begin, along)

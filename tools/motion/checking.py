@@ -1,6 +1,6 @@
-"""Whether robots that follow a motion keep apart and off obstacles, from the motion alone.
+"""Checks from a motion alone whether robots that follow it keep apart and off obstacles.
 
-Shares nothing with the planner: closest approaches are exact, from the times of the motion; that
+It shares nothing with the planner. Closest approaches are exact, from the times of the motion; that
 the order of passage keeps robots apart when they are late is checked at points along the paths.
 """
 
@@ -20,14 +20,15 @@ from .motion import Indices, Motion, Passages, arc_lengths, as_line
 ROUNDING = 1e-6
 """Distances may fall short of what is demanded by so much, px."""
 AS_NEAR = 0.98
-"""Robots that start or end too near to an obstacle come no nearer than this share of that."""
+"""Robots that start or end too near to an obstacle may come to this share of that distance."""
 DETOUR = 3.0
-"""Robots that start or end too near to an obstacle are so for so many times the shortest way out
-and a radius at most."""
+"""Robots that start or end too near to an obstacle may stay so for at most so many times the sum of
+the shortest way out and a radius."""
 FINDINGS = 12
 """Most findings of a kind."""
 SAMPLE_SHARE, MOST_SAMPLES = 0.25, 60_000
-"""Paths are looked at every so many of what is demanded, more coarsely where that is too many."""
+"""Paths are sampled at this share of the demanded distance, more coarsely if that would take more
+points than this."""
 
 
 class MotionFinding(Value):
@@ -98,7 +99,7 @@ def check_motion(
 
 
 class _Pieces:
-    """Parts of the way in which each robot drives straight on: (k,) arrays."""
+    """The straight pieces of all robots' ways, as (k,) arrays."""
 
     def __init__(self, motion: Motion, idle: Mapping[str, tuple[float, float]]) -> None:
         end = motion.makespan + 1.0
@@ -120,7 +121,7 @@ class _Pieces:
         self.span = np.concatenate(spans)
 
     def approach(self, pairs: Indices) -> FloatArray:
-        """The least distance of two pieces at one time, (p,) px; infinite where they share none."""
+        """Return the least distance of pieces at one time, (p,) px; infinite if they share none."""
         one, other = pairs.T
         lo = np.maximum(self.span[one, 0], self.span[other, 0])
         hi = np.minimum(self.span[one, 1], self.span[other, 1])
@@ -133,7 +134,7 @@ class _Pieces:
         return np.where(hi >= lo, found, np.inf)
 
     def at(self, piece: Indices, time: FloatArray) -> FloatArray:
-        """Where robots are in the course of a piece, (p, 2) px."""
+        """Return where robots are at a time during a piece, (p, 2) px."""
         return self.begin[piece] + (time - self.span[piece, 0])[:, None] * self._speed(piece)
 
     def _speed(self, piece: Indices) -> FloatArray:
@@ -145,7 +146,7 @@ class _Pieces:
 def _closest_approach(
     motion: Motion, idle: Mapping[str, tuple[float, float]], demanded: float
 ) -> tuple[float | None, tuple[MotionFinding, ...]]:
-    """How near two robots come at most, px, and who comes too near."""
+    """Return the least distance of two robots, px, and who comes too near."""
     if len(motion.paths) + len(idle) < 2 or not motion.paths:
         return None, ()
     pieces = _Pieces(motion, idle)
@@ -186,7 +187,7 @@ def _closest_approach(
 def _clearances(
     motion: Motion, radius: float, obstacles: Mapping[str, BaseGeometry]
 ) -> tuple[float | None, tuple[MotionFinding, ...]]:
-    """How near robots come to obstacles, px, and who touches one."""
+    """Return how near robots come to obstacles, px, and who touches one."""
     least, found = np.inf, list[MotionFinding]()
     for name, region in obstacles.items():
         if region.is_empty:
@@ -214,10 +215,10 @@ def _clearances(
 
 
 def _in_passing(way: BaseGeometry, region: BaseGeometry, radius: float) -> float:
-    """How near a way comes to a region beside where it leaves and enters its surroundings, px.
+    """Return how near a way comes to a region, px, aside from leaving and entering its vicinity.
 
-    Where it starts or ends nearer than is allowed, it comes hardly nearer than that there, and
-    goes out or in by nearly the shortest way.
+    A way that starts or ends nearer than is allowed is only leaving or entering while it comes
+    hardly nearer than there and goes out or in by nearly the shortest way.
     """
     least, body = np.inf, region.buffer(radius - ROUNDING)
     for part in _pieces_of(shapely.intersection(way, body)):
@@ -241,7 +242,7 @@ def _ends(way: BaseGeometry) -> list[Point]:
 
 
 def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
-    """Pairs of robots that could touch if one of them were late."""
+    """Return the pairs of robots that could touch if one of them were late."""
     from scipy.spatial import cKDTree
 
     lengths = [float(arc_lengths(path)[-1]) for path in motion.paths.values()]
@@ -254,8 +255,8 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
     pairs = pairs[robot[pairs[:, 0]] != robot[pairs[:, 1]]]
     s = np.concatenate(along)
     one, other = pairs.T
-    kept = _held(motion.passages, robot[one], s[one], robot[other], s[other])
-    kept = kept | _held(motion.passages, robot[other], s[other], robot[one], s[one])
+    kept = _is_held_back(motion.passages, robot[one], s[one], robot[other], s[other])
+    kept = kept | _is_held_back(motion.passages, robot[other], s[other], robot[one], s[one])
     ids = list(motion.paths)
     loose = sorted({(int(min(i, j)), int(max(i, j))) for i, j in robot[pairs[~kept]]})[:FINDINGS]
     return tuple(
@@ -271,12 +272,12 @@ def _unordered(motion: Motion, demanded: float) -> tuple[MotionFinding, ...]:
     )
 
 
-def _held(
+def _is_held_back(
     rows: Passages, waiting: Indices, at: FloatArray, first: Indices, past: FloatArray
 ) -> NDArray[np.bool_]:
-    """Whether a robot is held before a point as long as another has not gone past one of its own.
+    """Return whether a robot is held before a point until another has passed a point of its own.
 
-    The arguments are (p,) columns; so is what comes back, of truth values.
+    The arguments are (p,) columns, and so is the result, which is boolean.
     """
     if not len(rows):
         return np.zeros(len(waiting), dtype=bool)

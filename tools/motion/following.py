@@ -6,9 +6,9 @@ from ..geometry.outline import FloatArray
 from .motion import Indices, Motion, arc_lengths
 
 EXACT = 1e-6
-"""A robot has come to a point of its path within so many px."""
+"""Within so many px a robot counts as having come to a point of its path."""
 NEAR = 0.05
-"""A robot that is seen so near to a vertex of its path has come to it, px."""
+"""Seen within so many px of a vertex of its path, a robot counts as having come to it."""
 
 
 class Following:
@@ -21,18 +21,18 @@ class Following:
         lengths: (n,) px of their paths.
         turns: by how much the paths bend at their vertices, one path after the other, radians;
             pi at their ends.
-        legs_before: px from the vertex before to each of them.
+        legs_before: length of the leg that ends at each vertex, px.
     """
 
     def __init__(self, motion: Motion) -> None:
         self.ids = tuple(motion.paths)
         lengths = [arc_lengths(path) for path in motion.paths.values()]
         self.lengths = np.array([s[-1] for s in lengths])
-        kept = [_apart(s) for s in lengths]
+        kept = [_distinct_vertices(s) for s in lengths]
         sizes = np.array([len(rows) for rows in kept], dtype=np.intp)
         self._ends = np.cumsum(sizes)
         self._begins = self._ends - sizes
-        # One table for all: what comes before a robot is shorter, what comes after it longer.
+        # One sorted table for all paths: the arc lengths of each are offset past those before it.
         self._base = np.concatenate([[0.0], np.cumsum(self.lengths + 1.0)[:-1]])
         self._along = np.concatenate(
             [s[k] + base for s, k, base in zip(lengths, kept, self._base, strict=True)]
@@ -46,7 +46,7 @@ class Following:
         self._last = np.searchsorted(motion.passages.waiting, robots, side="right")
 
     def _shape(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Unit vectors of the legs from vertices on, lengths of those before, and turns."""
+        """Return unit vectors of the legs after vertices, lengths of those before, and turns."""
         legs = np.diff(self._points, axis=0, append=self._points[-1:])
         size = np.linalg.norm(legs, axis=1)
         size[self._ends - 1] = 0.0
@@ -58,7 +58,7 @@ class Following:
         return along, np.roll(size, 1), turns
 
     def at(self, progress: FloatArray) -> FloatArray:
-        """Points of the paths, (n, 2) px."""
+        """Return the points of the paths at a progress, (n, 2) px."""
         after = self._after(progress)
         before = after - 1
         length = self._along[after] - self._along[before]
@@ -68,7 +68,7 @@ class Following:
         return begin + np.clip(share, 0.0, 1.0)[:, None] * (end - begin)
 
     def limits(self, progress: FloatArray) -> FloatArray:
-        """How far along its path each robot may go now, (n,) px; it never goes back."""
+        """Return how far along its path each robot may go now, (n,) px; it never gets less."""
         rows, self._next = self._passages, self._open(progress)
         limits = self.lengths.copy()
         held = np.flatnonzero(self._next < self._last)
@@ -76,7 +76,7 @@ class Following:
         return limits
 
     def waits_for(self, progress: FloatArray, slack: float = EXACT) -> dict[str, str]:
-        """Robots within `slack` px of a closed passage, by id, and whom each waits for."""
+        """Return robots within `slack` px of a closed passage, by id, and whom each waits for."""
         held = np.flatnonzero(self._next < self._last)
         rows = self._next[held]
         there = progress[held] >= self._passages.at[rows] - slack
@@ -84,29 +84,29 @@ class Following:
         return {self.ids[i]: self.ids[j] for i, j in pairs}
 
     def stops(self, rooms: FloatArray) -> FloatArray:
-        """How far a robot may go at most, by the vertex it comes to next; for `room`.
+        """Return how far a robot may go at most, by the vertex it comes to next; for `room`.
 
         Args:
-            rooms: how far past each vertex a robot may come to a stand that passes it as fast as
-                it may, px, in the order of `turns`.
+            rooms: how far past each vertex a robot may come to a stop if it passes the vertex as
+                fast as it may, px, in the order of `turns`.
         """
         return np.minimum.accumulate((self._along + rooms)[::-1])[::-1]
 
     def room(self, progress: FloatArray, stops: FloatArray) -> FloatArray:
-        """How far on each robot has to be able to stand, for the bends before it, (n,) px."""
+        """Return the distance in which each robot must be able to stop for bends ahead, (n,) px."""
         return stops[self._after(progress)] - self._base - progress
 
     def directions(self, progress: FloatArray) -> FloatArray:
-        """Unit vectors along the legs that robots are on, (n, 2); zero at the end."""
+        """Return unit vectors along the legs that robots are on, (n, 2); zero at the end."""
         along = self._directions[self._after(progress) - 1]
         along[progress >= self.lengths - EXACT] = 0.0
         return along
 
     def advance(self, points: FloatArray, progress: FloatArray, near: float = NEAR) -> FloatArray:
-        """How far along its path each robot seen at a point, (n, 2) px, is, (n,) px.
+        """Return how far along its path each robot seen at a point, (n, 2) px, is, (n,) px.
 
-        That is where the leg it is on comes nearest; vertices within `near` px have been come to,
-        and the next leg is begun there. Nobody's progress goes back.
+        That is where the leg it is on comes nearest; a vertex within `near` px counts as reached,
+        and the next leg begins there. Progress never goes back.
         """
         progress, rows = progress.copy(), np.arange(len(progress))
         while len(rows):
@@ -121,7 +121,7 @@ class Following:
         return progress
 
     def _open(self, progress: FloatArray) -> Indices:
-        """The first passage of each robot that is not open yet, (n,)."""
+        """Return the first passage of each robot that is not open yet, (n,)."""
         rows, upcoming = self._passages, self._next.copy()
         checked = np.flatnonzero(upcoming < self._last)
         while len(checked):
@@ -133,13 +133,16 @@ class Following:
         return upcoming
 
     def _after(self, progress: FloatArray, rows: Indices | slice = slice(None)) -> Indices:
-        """The vertex that each robot comes to next, (n,)."""
+        """Return the vertex that each robot comes to next, (n,)."""
         place = self._base[rows] + progress + EXACT / 2
         found = np.searchsorted(self._along, place, side="right")
         return np.clip(found, self._begins[rows] + 1, self._ends[rows] - 1)
 
 
-def _apart(lengths: FloatArray) -> Indices:
-    """Vertices that are not where the one before is, and the last: robots do not turn on them."""
+def _distinct_vertices(lengths: FloatArray) -> Indices:
+    """Return the vertices that are not where the one before is, and the last one.
+
+    At the others, which repeat a place, robots do not turn.
+    """
     moved = np.flatnonzero(np.diff(lengths) > EXACT) + 1
     return np.array([0, *moved[:-1], len(lengths) - 1], dtype=np.intp)

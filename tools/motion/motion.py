@@ -26,10 +26,10 @@ class Passages:
     """Who waits for whom: g rows, in the order of `waiting` and then of `at`.
 
     Attributes:
-        waiting: (g,) the robot that waits, by its place among the paths of a motion.
-        at: (g,) arc length along its path, px, that it may not pass before
-        first: (g,) this robot
-        past: (g,) has come to this arc length along its own path, px.
+        waiting: (g,) the robot that waits, as its index among the paths of a motion.
+        at: (g,) arc length along its path where it waits, px.
+        first: (g,) the robot that it waits for, likewise.
+        past: (g,) arc length along that robot's path, px, which that one has to reach first.
     """
 
     waiting: Indices = field(default_factory=_none)
@@ -67,10 +67,10 @@ class Motion:
 
 
 def as_line(path: FloatArray) -> BaseGeometry:
-    """A polyline, (k, 2), as a geometry: a point where it has no length, which lines must have."""
+    """Return a polyline, (k, 2), as a line, or as a point if it lacks the length of a line."""
     return LineString(path) if (path != path[0]).any() else Point(path[0])
 
 
 def arc_lengths(path: FloatArray) -> FloatArray:
-    """How far along a polyline, (k, 2), each of its vertices is, (k,), px."""
+    """Return how far along a polyline, (k, 2), each of its vertices is, (k,), px."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])

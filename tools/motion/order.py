@@ -1,7 +1,7 @@
 """Who has to go before whom: off its start before others pass it, past goals before they are taken.
 
-Where that goes in a circle, interchangeable robots are matched anew: those that leave first take
-the places that are filled first. After Turpin et al. (2014), for robots with bodies.
+Where that makes a cycle, interchangeable robots are matched anew: those that leave first take the
+places that are filled first. After Turpin et al. (2014), for robots with bodies.
 """
 
 import heapq
@@ -18,16 +18,17 @@ from .motion import Indices, arc_lengths, as_line
 from .routes import NOBODY, NoRouteError
 
 REACHES, SPOKES, SPOTS = (1.2, 2.0, 3.0, 4.5, 7.0, 10.0), 12, 8
-"""Robots wait so many times as far from their starts as they stay apart, in so many directions;
-so many of those spots are tried."""
+"""Robots wait at these multiples of the distance they keep, away from their starts, in so many
+directions; at most so many of those spots are tried."""
 PARKED, REROUTED, ASIDE = 100, 12, 40
 """Most robots whose starts and goals others are led around, most such ways that are tried, and most
 robots that are asked to step aside."""
 ROUNDS, SWAPS = 12, 200
-"""Most times that robots in circles are matched anew, and most pairs that are exchanged."""
+"""Most times that robots in cycles are matched anew, and most pairs whose exchange is tried."""
 
 Ways = Callable[[FloatArray, FloatArray, FloatArray], list[FloatArray]]
-"""Paths from starts, (n, 2), to goals, (n, 2), past parked robots, (m, 2); NoRouteError if none."""
+"""Finds paths from starts, (n, 2), to goals, (n, 2), past parked robots, (m, 2), or raises
+NoRouteError."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +36,14 @@ class Matched:
     """Robots with their goals, and the order their paths demand.
 
     Attributes:
-        robots: (n,) who goes to each goal, by its row among the starts.
-        paths: for each goal; then first legs of those that step aside, whose path leads on from
-            there.
+        robots: (n,) the robot that goes to each goal, by its row among the starts.
+        paths: one for each goal; then first legs of robots that step aside, whose paths lead on
+            from there.
         aside: the goal whose robot drives each first leg.
-        leaving: (k, 2) goals whose robots leave in this order, one having to pass the other's
-            start.
-        arriving: (k, 2) goals that are taken in this order.
+        leaving: (k, 2) paths, the first of which has to leave its start before the second passes
+            there.
+        arriving: (k, 2) paths, the first of which has to pass the second one's goal before that is
+            taken.
     """
 
     robots: Indices
@@ -52,7 +54,7 @@ class Matched:
 
     @property
     def before(self) -> Indices:
-        """(k, 2) all pairs of paths of which the first has to be driven before the second."""
+        """All pairs of paths of which the first has to be driven before the second, (k, 2)."""
         count = len(self.robots)
         legs = [(count + k, goal) for k, goal in enumerate(self.aside)]
         then = np.array(legs, dtype=np.intp).reshape(-1, 2)
@@ -60,19 +62,19 @@ class Matched:
 
     @property
     def owners(self) -> Indices:
-        """The goal whose robot drives each path."""
+        """The goal whose robot drives each path, (k,)."""
         return np.array([*range(len(self.robots)), *self.aside], dtype=np.intp)
 
     @property
-    def circles(self) -> list[Indices]:
-        """Goals whose robots have each to go before the others, in groups."""
-        return circles(self.before, len(self.paths))
+    def cycles(self) -> list[Indices]:
+        """Groups of paths each of which would have to be driven before the others."""
+        return cycles(self.before, len(self.paths))
 
 
 def match(
     robots: Indices, paths: list[FloatArray], apart: float, aside: tuple[int, ...] = ()
 ) -> Matched:
-    """Robots on paths with the order these demand of bodies that keep `apart` px."""
+    """Return robots on paths, with the order these demand of robots that stay `apart` px apart."""
     lines = shapely.STRtree([as_line(path) for path in paths])
     starts = shapely.points(np.stack([path[0] for path in paths]))
     goals = shapely.points(np.stack([path[-1] for path in paths]))
@@ -83,8 +85,8 @@ def match(
     return Matched(robots, paths, leaving, arriving, aside)
 
 
-def circles(before: Indices, count: int) -> list[Indices]:
-    """The strongly connected components of more than one of `count` nodes."""
+def cycles(before: Indices, count: int) -> list[Indices]:
+    """Return the strongly connected components, of more than one node each, among `count` nodes."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -94,7 +96,7 @@ def circles(before: Indices, count: int) -> list[Indices]:
 
 
 def ordered(before: Indices, lengths: Sequence[float]) -> list[int]:
-    """All robots, each after those that have to go before it; of those free the farthest first."""
+    """Return all paths, each after those that go before it; of those free the longest first."""
     waits: Counter[int] = Counter(before[:, 1].tolist())
     after: defaultdict[int, list[int]] = defaultdict(list)
     for one, other in before.tolist():
@@ -112,16 +114,16 @@ def ordered(before: Indices, lengths: Sequence[float]) -> list[int]:
     return order
 
 
-def matched_anew(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
-    """Interchangeable robots with other goals, where that leaves fewer circles or none.
+def rematched(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
+    """Match interchangeable robots to other goals, where that leaves fewer demands in cycles.
 
     Args:
         starts: (n, 2) of all robots.
     """
     for _ in range(ROUNDS):
         better = found
-        for circle in found.circles:
-            goals = _by_order(better, circle)
+        for cycle in found.cycles:
+            goals = _by_order(better, cycle)
             better = _best(better, _exchanged(better, *goals, starts, ways, apart))
         if better is found:
             break
@@ -130,13 +132,13 @@ def matched_anew(found: Matched, starts: FloatArray, ways: Ways, apart: float) -
 
 
 def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
-    """Robots in circles on ways around the starts and goals of the others, where it helps."""
+    """Lead robots in cycles around the starts and goals of the others, where that helps."""
     everyone, left = list(range(len(found.paths))), REROUTED
     for _ in range(ROUNDS):
         better = found
-        for circle in found.circles:
-            for i in map(int, circle):
-                for others in (everyone, [int(j) for j in circle]):
+        for cycle in found.cycles:
+            for i in map(int, cycle):
+                for others in (everyone, [int(j) for j in cycle]):
                     if len(others) > PARKED or not left:
                         continue
                     left -= 1
@@ -145,7 +147,7 @@ def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
                     if other is not None:
                         better = _best(better, other)
                         break
-        if better is found or not better.circles:
+        if better is found or not better.cycles:
             return better
         found = better
     return found
@@ -154,14 +156,14 @@ def rerouted(found: Matched, ways: Ways, apart: float) -> Matched:
 def stepped_aside(
     found: Matched, ways: Ways, apart: float, free: Callable[[FloatArray], NDArray[np.bool_]]
 ) -> Matched:
-    """Some robots of circles wait beside the ways of the others, and go on when those have gone.
+    """Let some robots in cycles wait beside the ways of the others and go on when those have gone.
 
     Args:
-        free: which of some points, (k, 2), robots can wait at.
+        free: tells at which of some points, (k, 2), robots can wait, (k,).
     """
     tried: set[int] = set()
-    while found.circles:
-        inside = Counter(int(i) for circle in found.circles for i in circle)
+    while found.cycles:
+        inside = Counter(int(i) for cycle in found.cycles for i in cycle)
         demands = Counter(found.before.ravel().tolist())
         left = [i for i in inside if i < len(found.robots) and i not in {*tried, *found.aside}]
         if not left or len(tried) == ASIDE:
@@ -179,7 +181,7 @@ def stepped_aside(
 def _spots(
     found: Matched, robot: int, apart: float, free: Callable[[FloatArray], NDArray[np.bool_]]
 ) -> FloatArray:
-    """Where a robot could wait off all other paths, (k, 2), the nearest to its start first."""
+    """Return spots to wait at off all other paths, (k, 2), the nearest to the start first."""
     angle = np.linspace(0, 2 * np.pi, SPOKES, endpoint=False)
     reach = apart * np.array(REACHES)[:, None, None]
     around = reach * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -192,7 +194,7 @@ def _spots(
 def _by_way_of(
     found: Matched, robot: int, spot: FloatArray, ways: Ways, apart: float
 ) -> Matched | None:
-    """As it is but for one robot, which first drives to a spot; None if it cannot."""
+    """Return the match with one robot first driving to a spot, or None if it cannot."""
     begin, end = found.paths[robot][[0, -1]]
     try:
         first, second = ways(np.stack([begin, spot]), np.stack([spot, end]), NOBODY)
@@ -203,29 +205,32 @@ def _by_way_of(
 
 
 def _best(found: Matched, other: Matched | None) -> Matched:
-    """That which leaves fewer demands in circles."""
-    return found if other is None or _worth(other) >= _worth(found) else other
+    """Return the one that leaves fewer demands in cycles."""
+    return found if other is None or _cyclic_demands(other) >= _cyclic_demands(found) else other
 
 
-def _worth(found: Matched) -> int:
-    """How many demands lie in circles."""
+def _cyclic_demands(found: Matched) -> int:
+    """Return how many demands lie in cycles: the fewer the better."""
     number = np.full(len(found.paths), -1)
-    for k, circle in enumerate(found.circles):
-        number[circle] = k
+    for k, cycle in enumerate(found.cycles):
+        number[cycle] = k
     one, other = number[found.before].T
     return int(((one == other) & (one >= 0)).sum())
 
 
-def _by_order(found: Matched, circle: Indices) -> tuple[list[int], list[int]]:
-    """Goals of a circle as they are filled, and those whose robots, as they leave, take them."""
-    length = {i: float(arc_lengths(found.paths[i])[-1]) for i in map(int, circle)}
+def _by_order(found: Matched, cycle: Indices) -> tuple[list[int], list[int]]:
+    """Return the goals of a cycle in the order they are filled, and in the order robots leave.
+
+    The first to leave takes the goal that is filled first, and so on.
+    """
+    length = {i: float(arc_lengths(found.paths[i])[-1]) for i in map(int, cycle)}
     leaving = _sorted(found.leaving, length)
     filled = _sorted(found.arriving, {i: -way for i, way in length.items()})
     return filled, leaving
 
 
 def _sorted(before: Indices, value: dict[int, float]) -> list[int]:
-    """Nodes in an order that breaks as few demands as it can; the least value first of the free."""
+    """Order nodes greedily to break few demands; of the free the one of least value comes first."""
     demands = [(one, other) for one, other in before.tolist() if one in value and other in value]
     left, order = set(value), list[int]()
     while left:
@@ -243,7 +248,7 @@ def _exchanged(
     ways: Ways,
     apart: float,
 ) -> Matched | None:
-    """As it is but for some goals, to which those go who went to others; None if none can."""
+    """Return the match with the robots of `taken` going to `goals`, or None if they cannot."""
     robots, paths = found.robots.copy(), list(found.paths)
     robots[list(goals)] = found.robots[list(taken)]
     ends = np.stack([found.paths[i][-1] for i in goals])
@@ -259,7 +264,7 @@ def _exchanged(
 def _past(
     found: Matched, robot: int, parked: FloatArray, ways: Ways, apart: float
 ) -> Matched | None:
-    """As it is but for one robot, whose way keeps off parked ones; None if none does."""
+    """Return the match with one robot's way past parked ones, or None if there is none."""
     begin, end = found.paths[robot][[0, -1]]
     try:
         (path,) = ways(begin[None], end[None], parked)
@@ -270,10 +275,10 @@ def _past(
 
 
 def _pairs_exchanged(found: Matched, starts: FloatArray, ways: Ways, apart: float) -> Matched:
-    """Exchange goals of pairs in circles while that leaves fewer demands in circles."""
+    """Exchange the goals of pairs in cycles, wherever that leaves fewer demands in cycles."""
     tried: set[tuple[int, ...]] = set()
     while len(tried) < SWAPS:
-        inside = {int(i): k for k, circle in enumerate(found.circles) for i in circle}
+        inside = {int(i): k for k, cycle in enumerate(found.cycles) for i in cycle}
         pairs = (
             tuple(sorted(pair))
             for pair in found.before.tolist()

@@ -1,6 +1,6 @@
-"""Plans how robots get from where they are to where they shall stand without touching.
+"""Plans how robots get from where they are to where they are to stand without touching.
 
-Shortest ways, an order in which they can be driven, and the times that this order allows.
+It finds shortest ways, an order in which they can be driven, and the times that this order allows.
 Frame: image pixels.
 """
 
@@ -21,23 +21,23 @@ from .avoiding import routes_off
 from .cells import Cells, conflicts, cut
 from .checking import MotionVerdict, check_motion
 from .motion import Indices, Motion
-from .order import Matched, match, matched_anew, ordered, rerouted, stepped_aside
+from .order import Matched, match, ordered, rematched, rerouted, stepped_aside
 from .routes import NOBODY, union, way_lengths
 from .schedule import Near, NoTimeError, Schedule, passages, schedule
 
 EXACT = 1 - 1e-9
-"""Distances are kept but for so much, which rounding takes."""
+"""Factor on distances that are to be kept, for rounding."""
 CROWD, COARSEST = 100, 1.8
-"""From so many robots on paths are cut less finely, up to cells of so many radii."""
+"""With more robots than this, paths are cut less finely, into cells of at most so many radii."""
 ROOMY, MOST_ROOM = 0.5, 8.0
-"""Robots stay apart by this share of how far starts and goals are, at most so many radii, where
-they can."""
+"""Where they can, robots stay apart by this share of how far starts and goals are from each other,
+but at most by so many radii."""
 ALONG = 1e-9
 """Times and places that differ by less are the same."""
 
 
 class NoOrderError(FleetError):
-    """Robots that would have to go before each other, so that none of them can go first.
+    """Robots would have to go before each other, so that none of them can go first.
 
     Attributes:
         ids: of the robots.
@@ -60,8 +60,8 @@ class Team:
         ids: of the robots, in the order of `starts`.
         starts: (n, 2) where they stand, px.
         radius: of their bodies, px.
-        speed: greatest, px/s.
-        error: how far they may be off their paths, px; kept where starts and goals leave room.
+        speed: greatest speed, px/s.
+        error: how far they may be off their paths, px; allowed for if starts and goals leave room.
         idle: where robots stand that do not move, px, by id.
     """
 
@@ -89,14 +89,14 @@ class Ground:
 def plan_motion(
     team: Team, goals: FloatArray, ground: Ground, *, interchangeable: bool
 ) -> tuple[Motion, tuple[str, ...], MotionVerdict]:
-    """Paths, times and an order of passage onto all goals.
+    """Plan paths, times and an order of passage onto all goals.
 
     Args:
         goals: (n, 2) px, that of each robot in the team's order.
         interchangeable: whether robots may take each other's goals.
 
     Returns:
-        the motion, who takes each goal, and the certificate of the motion.
+        The motion, the robot that takes each goal, and the certificate of the motion.
 
     Raises:
         NoRouteError: no path leads to a goal.
@@ -104,8 +104,8 @@ def plan_motion(
     """
     found, apart = _matched(team, goals, ground, interchangeable)
     ids = tuple(team.ids[int(i)] for i in found.robots)
-    if found.circles:
-        shut = found.owners[np.concatenate(found.circles)]
+    if found.cycles:
+        shut = found.owners[np.concatenate(found.cycles)]
         raise NoOrderError(list(dict.fromkeys(ids[int(i)] for i in shut)))
     cells, pairs = _cut(found, apart)
     lengths = cells.leave[cells.goals] - cells.enter[cells.starts]
@@ -127,12 +127,12 @@ def plan_motion(
 
 
 def separation(starts: FloatArray, goals: FloatArray, radius: float) -> float:
-    """How far apart robots stay, px: two radii, or as near as they start or end."""
+    """Return how far apart robots stay, px: two radii, or as near as they start or end."""
     return min(2 * radius, min_spacing(starts), min_spacing(goals)) * EXACT
 
 
 def assigned(starts: FloatArray, goals: FloatArray, ground: Ground, radius: float) -> Indices:
-    """Who takes each goal, (m,), for the least sum of squared ways around the obstacles.
+    """Return who takes each goal, (m,), for the least sum of squared ways around the obstacles.
 
     Args:
         starts: (n, 2) with n >= m.
@@ -150,10 +150,10 @@ def assigned(starts: FloatArray, goals: FloatArray, ground: Ground, radius: floa
 def _matched(
     team: Team, goals: FloatArray, ground: Ground, interchangeable: bool
 ) -> tuple[Matched, float]:
-    """Robots, their goals and their ways, without circles where any way around them is found.
+    """Match robots to goals and ways, without cycles if there is any way to avoid them.
 
     Returns:
-        them, and how far apart they can stay, px.
+        The match, and how far apart the robots can stay, px.
     """
     ends, radius = np.concatenate([team.starts, goals]), team.radius + team.error
     standing = np.array([*team.idle.values()]).reshape(-1, 2)
@@ -173,12 +173,12 @@ def _matched(
         if apart == roomy < 2 * radius * EXACT:
             continue
         found = match(everyone, straight, apart)
-        if interchangeable and found.circles:
-            found = matched_anew(found, team.starts, ways, apart)
-        if found.circles and apart != roomy:
+        if interchangeable and found.cycles:
+            found = rematched(found, team.starts, ways, apart)
+        if found.cycles and apart != roomy:
             free = partial(_off, ground=ground, standing=standing, radius=radius, apart=apart)
             found = stepped_aside(rerouted(found, ways, apart), ways, apart, free)
-        if not found.circles:
+        if not found.cycles:
             break
     return found, apart
 
@@ -186,7 +186,7 @@ def _matched(
 def _off(
     spots: FloatArray, ground: Ground, standing: FloatArray, radius: float, apart: float
 ) -> NDArray[np.bool_]:
-    """Which points, (k, 2), are in the picture and off obstacles, things and idle robots."""
+    """Return which points, (k, 2), are in the picture and off obstacles, things and idle robots."""
     others = [thing.region for thing in ground.site.others]
     solid = shapely.union_all(np.array([ground.solid, *others], dtype=object))
     idle = shapely.MultiPoint(standing)
@@ -196,7 +196,7 @@ def _off(
 
 
 def _cut(found: Matched, apart: float) -> tuple[Cells, Indices]:
-    """Paths in cells, and the pairs of cells that are too near."""
+    """Return the paths as cells, and the pairs of cells that are too near."""
     coarse = min(max((len(found.robots) / CROWD) ** 0.5, 1.0), COARSEST)
     step = min(coarse / 2, 0.9) * apart
     cells = cut(found.paths, found.owners, step)
@@ -204,10 +204,10 @@ def _cut(found: Matched, apart: float) -> tuple[Cells, Indices]:
 
 
 def _knots(cells: Cells, times: Schedule, paths: list[int]) -> tuple[FloatArray, FloatArray]:
-    """What a robot drives, (k, 2), with a vertex wherever its velocity changes, and when that is.
+    """Return what a robot drives, (k, 2), with a vertex wherever its velocity changes, and when.
 
     Args:
-        paths: one after the other.
+        paths: indices of its paths, which it drives one after the other.
     """
     mine = np.concatenate([np.r_[cells.of(path)] for path in paths]).astype(np.intp)
     points = np.concatenate([cells.begin[mine], cells.end[mine][-1:]])

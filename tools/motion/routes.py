@@ -1,7 +1,7 @@
-"""From where robots are to where they shall stand: on which path.
+"""Paths from where robots are to where they are to stand.
 
-Paths are shortest ones around the targets on a visibility graph (Lozano-Perez and Wesley 1979).
-Frame: image pixels. Robots do not yet avoid each other.
+They are the shortest ones around the targets on a visibility graph (Lozano-Perez and Wesley 1979).
+Frame: image pixels. Robots do not avoid each other yet.
 """
 
 import math
@@ -22,25 +22,25 @@ from ..geometry.curves import Frame, round_join_dip
 from ..geometry.outline import FloatArray, distances
 
 MAX_NODES, EACH_NODES = 80, 12
-"""Vertices kept of obstacles, and of each further part of them: enough for a path within a percent
-of the shortest."""
+"""Most vertices kept of obstacles, and for each further part of them: enough for a path within a
+percent of the shortest."""
 Bend = tuple[int, float]
 BEND: Bend = (3, 0.01)
 CLOSE: Bend = (8, 0.001)
 FEW = 12
-"""Segments of a quarter circle around a corner, and by which share paths keep off it further than
-they must; close to it where nothing else leads through, and bodies are few enough to look."""
+"""A bend has so many segments per quarter circle around a corner, and keeps off it by this share
+more than it must. CLOSE is tried where nothing else leads through and bodies are at most FEW."""
 ROOM_SHARES = (0.7, 0.3, 0.03)
-"""How much of the smallest clearance at starts and goals paths keep: well away where there is
-room, squeezing past where not."""
+"""Shares of the smallest clearance at starts and goals that paths try to keep: well away where
+there is room, squeezing past where there is not."""
 LEAST_EXIT = 1.0
-"""Robots that stand on an obstacle go at least so far off it, px."""
+"""How far robots that stand on an obstacle at least go off it, px."""
 ROUND_SEGMENTS = 16
 """Segments of a quarter circle where distances are to be exact."""
 ROUND_DIP = math.cos(math.pi / 4 / ROUND_SEGMENTS)
-"""How near the middle of such a segment comes, as a share of the radius."""
+"""How far the middle of such a segment is from the centre, as a share of the radius."""
 SPARE = 1.02
-"""Share of a body that is left free where robots leave obstacles, so that all of it is kept off."""
+"""Factor on the radius of bodies where robots leave obstacles, so that all of a body is avoided."""
 NOBODY = np.empty((0, 2))
 NOBODIES = np.empty(0, dtype=object)
 
@@ -49,7 +49,7 @@ Indices = NDArray[np.intp]
 
 
 class NoRouteError(FleetError):
-    """Places that no path leads to: those of `robots`, indices of starts and goals."""
+    """No path leads to the places of `robots`, which are indices of starts and goals."""
 
     def __init__(self, text: str, robots: Indices) -> None:
         super().__init__(text)
@@ -57,17 +57,17 @@ class NoRouteError(FleetError):
 
 
 def obstacles(contract: Contract, site: Site) -> BaseGeometry:
-    """What robots have to drive around: targets no group of the contract stands on."""
+    """Return what robots have to drive around: targets that no group of the contract stands on."""
     return union(named_obstacles(contract, site))
 
 
 def named_obstacles(contract: Contract, site: Site) -> dict[str, BaseGeometry]:
-    """The same by the targets' ids."""
+    """Return the same as `obstacles`, by the targets' ids."""
     return {name: site.solid(name, contract) for name in contract.solid_targets}
 
 
 def union(regions: Mapping[str, BaseGeometry]) -> BaseGeometry:
-    """All regions as one; empty where there is none."""
+    """Return all regions as one; empty if there is none."""
     return shapely.union_all(np.array([*regions.values()], dtype=object)) if regions else Polygon()
 
 
@@ -81,10 +81,10 @@ def routes(
     idle: FloatArray = NOBODY,
     ends: FloatArray | None = None,
 ) -> list[FloatArray]:
-    """Shortest paths that keep robots of a radius off obstacles and idle robots, start i to goal i.
+    """Return shortest paths from start i to goal i, off obstacles and robots that do not move.
 
-    Paths stay in the frame where they can, and leave it only where there is no other way. A robot
-    that stands on an obstacle first leaves it by the shortest way.
+    Paths leave the frame only where there is no other way. A robot that stands on an obstacle first
+    leaves it by the shortest way.
 
     Args:
         starts: (n, 2).
@@ -93,7 +93,8 @@ def routes(
         radius: of a robot, px.
         frame: the picture.
         idle: (m, 2) where robots stand that do not move.
-        ends: (k, 2) all that are asked for in turn, so that what is kept off obstacles is the same.
+        ends: (k, 2) starts and goals of all calls in a row, so that all keep the same distance from
+            obstacles.
 
     Returns:
         n polylines, (k, 2) each.
@@ -123,7 +124,7 @@ def routes(
 def way_lengths(
     starts: FloatArray, goals: FloatArray, solid: BaseGeometry, radius: float, frame: Frame
 ) -> FloatArray:
-    """How long the ways around obstacles are from every start to every goal, px.
+    """Return how long the ways around obstacles are from every start to every goal, px.
 
     Args:
         starts: (n, 2).
@@ -144,7 +145,7 @@ def way_lengths(
 
 
 def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
-    """Discs, (m,), that the centres of others keep out of; smaller where a path ends near."""
+    """Return discs, (m,), that others' centres keep out of, smaller where a path ends near."""
     if not len(idle):
         return NOBODIES
     nearest = np.linalg.norm(idle[:, None] - ends, axis=2).min(axis=1)
@@ -155,7 +156,7 @@ def _bodies(idle: FloatArray, ends: FloatArray, radius: float) -> Bodies:
 
 
 def _clusters(bodies: Bodies) -> NDArray[np.intp]:
-    """The number of the cluster each body belongs to, (m,); nobody fits between its members."""
+    """Return the number of each body's cluster, (m,); no robot fits between its members."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -166,7 +167,7 @@ def _clusters(bodies: Bodies) -> NDArray[np.intp]:
 
 @dataclass(frozen=True)
 class _Ground:
-    """Obstacles, and the picture around which robots of a radius drive."""
+    """Obstacles, and the picture, in which robots of a radius drive around them."""
 
     solid: BaseGeometry
     radius: float
@@ -174,7 +175,7 @@ class _Ground:
     ends: FloatArray
 
     def exits(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> FloatArray:
-        """Starts, (n, 2), those on the obstacles moved off them as far as the goals are."""
+        """Return starts, (n, 2), those on obstacles moved off as far as the nearest goal is."""
         if self.solid.is_empty:
             return starts
         on = distances(self.solid, starts) <= self.radius
@@ -193,7 +194,7 @@ class _Ground:
         return exits
 
     def _within_reach(self, goals: FloatArray, bodies: Bodies) -> BaseGeometry:
-        """Where a robot can be that some goal can be driven to from, off obstacles and bodies."""
+        """Return the region, off obstacles and bodies, from which some goal can be driven to."""
         taken = shapely.union_all([self.solid.buffer(0.99 * self.radius), *bodies])
         ground = self.frame.box.buffer(self.far).difference(taken)
         parts = shapely.get_parts(ground)
@@ -201,7 +202,7 @@ class _Ground:
         return shapely.union_all(parts[shapely.intersects(parts, at)])
 
     def paths(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> list[FloatArray]:
-        """Shortest paths past the obstacles and those bodies that would be in the way."""
+        """Return shortest paths past the obstacles and those bodies that would be in the way."""
         paths = self._paths_around(starts, goals, bodies[:0])
         if not len(bodies) or not len(paths):
             return paths
@@ -224,7 +225,7 @@ class _Ground:
     def _paths_around(
         self, starts: FloatArray, goals: FloatArray, bodies: Bodies
     ) -> list[FloatArray]:
-        """Shortest paths around the obstacles and around all of some bodies."""
+        """Return shortest paths around the obstacles and around all given bodies."""
         ways = np.stack([starts, goals], axis=1)
         paths = list(ways)
         for group, keeps in self._groups(starts, goals):
@@ -249,9 +250,9 @@ class _Ground:
         return paths
 
     def _groups(self, starts: FloatArray, goals: FloatArray) -> list[tuple[Indices, list[float]]]:
-        """Robots, and the distances they keep from the obstacles, px, the first to try in front.
+        """Return groups of robots and the distances to keep from obstacles, px, in order of trial.
 
-        Those that start or end with their bodies on one keep less, and only they.
+        Only robots that start or end with their bodies on an obstacle keep less than their radius.
         """
         near = np.minimum(self._off(starts), self._off(goals))
         clear, free = near > self.radius, self._off(self.ends)
@@ -265,13 +266,13 @@ class _Ground:
         return [group for group in groups if len(group[0])]
 
     def _off(self, points: FloatArray) -> FloatArray:
-        """How far points, (n, 2), are from the obstacles, px; far where there are none."""
+        """Return how far points, (n, 2), are from the obstacles, px; `far` if there are none."""
         far = self.far
         return np.full(len(points), far) if self.solid.is_empty else distances(self.solid, points)
 
     @property
     def far(self) -> float:
-        """Farther off than any end, px."""
+        """A distance greater than that of any two ends, px."""
         return self.frame.width + self.frame.height
 
     def _no_route(self, robots: Indices, goals: FloatArray, bodies: Bodies) -> NoRouteError:
@@ -282,16 +283,16 @@ class _Ground:
 
 @lru_cache(maxsize=32)
 def _graph(solid: bytes, keep: float, frame: Frame | None, bend: Bend) -> "_Visibility":
-    """Around obstacles alone, which are asked for again and again."""
+    """Return the graph around obstacles alone; cached, since it is needed again and again."""
     return _graph_past(shapely.from_wkb(solid), keep, NOBODIES, frame, bend)
 
 
 def _graph_past(
     solid: BaseGeometry, keep: float, bodies: Bodies, frame: Frame | None, bend: Bend
 ) -> "_Visibility":
-    """What sees what around obstacles and bodies, within a frame if there is one.
+    """Return the visibility graph around obstacles and bodies, within a frame if there is one.
 
-    Paths must not touch the obstacles grown by nearly what is kept, nor bodies.
+    Paths must not touch bodies, nor the obstacles grown by nearly `keep`.
     """
     barrier: BaseGeometry = solid.buffer(keep * 0.999)
     if len(bodies):
@@ -304,7 +305,7 @@ def _graph_past(
 
 
 def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
-    """Where robots are when each has covered its share of its path, (n, 2)."""
+    """Return where robots are when each has covered its share of its path, (n, 2)."""
     lines = np.asarray([LineString(path) for path in paths], dtype=object)
     return shapely.get_coordinates(shapely.line_interpolate_point(lines, shares, normalized=True))
 
@@ -312,7 +313,7 @@ def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
 def _nodes(
     solid: BaseGeometry, keep: float, bodies: Bodies, barrier: BaseGeometry, bend: Bend
 ) -> FloatArray:
-    """Corners to bend around: vertices of the obstacles grown so that chords clear the barrier."""
+    """Return corners to bend around: vertices of what is grown so that chords clear the barrier."""
     segments, spare = bend
     dip = round_join_dip(segments)
     grown = solid.buffer(((1 + spare) * keep + 5 * spare) * dip, quad_segs=segments)
@@ -344,7 +345,7 @@ class _Visibility:
         self._length, self._before = shortest_path(lengths, return_predecessors=True)
 
     def path(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
-        """The shortest path, (k, 2), or None where there is none."""
+        """Return the shortest path, (k, 2), or None if there is none."""
         if not len(self._nodes):
             return None
         total = self._sight(start)[:, None] + self._length + self._sight(goal)[None, :]
@@ -357,7 +358,7 @@ class _Visibility:
         return np.concatenate([[start], self._nodes[chain[::-1]], [goal]])
 
     def lengths(self, starts: FloatArray, goals: FloatArray) -> FloatArray:
-        """Of the shortest paths from every start to every goal, (n, m) px."""
+        """Return the lengths of the shortest paths from every start to every goal, (n, m) px."""
         if not len(self._nodes):
             return np.full((len(starts), len(goals)), np.inf)
         to_goals = np.stack([self._sight(goal) for goal in goals], axis=1)
@@ -365,7 +366,7 @@ class _Visibility:
         return np.stack([np.min(self._sight(s)[:, None] + onward, axis=0) for s in starts])
 
     def _sight(self, point: FloatArray) -> FloatArray:
-        """Distance to every node that is seen from a point, infinite to the others."""
+        """Return the distance to every node that is seen from a point, infinite for the others."""
         ends = np.broadcast_to(point, self._nodes.shape)
         lines = shapely.linestrings(np.stack([ends, self._nodes], axis=1))
         distance = np.linalg.norm(self._nodes - point, axis=1)

@@ -1,7 +1,7 @@
-"""When each robot is where: one after the other, each around the times of those before it.
+"""Schedules robots one after the other, each around the times of those before it.
 
 Safe intervals (Phillips and Likhachev 2011) along a fixed path (Kant and Zucker 1986). Cells that
-are too near are never used at once, so the times give an order of passage without a circle.
+are too near are never used at once, so the times give an order of passage without a cycle.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ class NoTimeError(Exception):
     """A robot cannot get through: its goal or its way is taken for good.
 
     Attributes:
-        robot: which one.
+        robot: index of the robot.
     """
 
     def __init__(self, robot: int) -> None:
@@ -38,7 +38,7 @@ class Schedule:
 
 @dataclass(frozen=True)
 class Near:
-    """For each cell those that are too near to it, as one table.
+    """For each cell the cells that are too near to it, as one table.
 
     Attributes:
         first: (c + 1,) where the rows of each cell begin.
@@ -50,7 +50,7 @@ class Near:
 
     @classmethod
     def of(cls, pairs: Indices, count: int) -> "Near":
-        """From pairs, (p, 2), of `count` cells."""
+        """Make the table from pairs, (p, 2), of `count` cells."""
         both = np.concatenate([pairs, pairs[:, ::-1]])
         both = both[np.argsort(both[:, 0], kind="stable")]
         first = np.searchsorted(both[:, 0], np.arange(count + 1))
@@ -60,14 +60,14 @@ class Near:
 def schedule(
     cells: Cells, near: Near, order: Sequence[int], speed: float, legs: Mapping[int, int]
 ) -> Schedule:
-    """The earliest times for paths, each of which gives way to those before it in an order.
+    """Return the earliest times for paths, each of which gives way to those before it in `order`.
 
     Args:
-        speed: greatest, px/s.
-        legs: for the path of a robot that steps aside the one on which it does.
+        speed: greatest speed, px/s.
+        legs: by the path of a robot that steps aside, the path of its first leg.
 
     Raises:
-        NoTimeError: one cannot get through.
+        NoTimeError: a robot cannot get through.
     """
     enter = np.full(len(cells.robot), FOREVER)
     leave = np.full(len(cells.robot), FOREVER)
@@ -91,7 +91,7 @@ Span = tuple[float, float]
 def _blocked(
     mine: slice, near: Near, enter: FloatArray, leave: FloatArray
 ) -> dict[int, list[Span]]:
-    """When others are too near to each cell, by the cell's place on its path; merged, in order."""
+    """Return when others are too near to each cell, by its index on its path; merged, in order."""
     rows = slice(int(near.first[mine.start]), int(near.first[mine.stop]))
     counts = np.diff(near.first[mine.start : mine.stop + 1])
     place = np.repeat(np.arange(len(counts)), counts)
@@ -118,7 +118,7 @@ ALWAYS: list[Span] = [(0.0, FOREVER)]
 
 
 def _free(blocked: list[Span] | None) -> list[Span]:
-    """The times between."""
+    """Return the spans between the blocked ones."""
     if not blocked:
         return ALWAYS
     edges = [0.0, *(t for span in blocked for t in span), FOREVER]
@@ -127,7 +127,7 @@ def _free(blocked: list[Span] | None) -> list[Span]:
 
 @dataclass(frozen=True)
 class _Arrival:
-    """Being in a cell from a time on, at most until another, by way of an arrival before."""
+    """A stay in a cell from a time on, at most until another, by way of an earlier arrival."""
 
     time: float
     until: float
@@ -137,7 +137,10 @@ class _Arrival:
 def _earliest(
     seconds: FloatArray, blocked: dict[int, list[Span]], begun: float
 ) -> FloatArray | None:
-    """When a robot enters each of its cells, (k,) s, to be in the last one for good soonest."""
+    """Return when a robot enters each of its cells, (k,) s, or None if it cannot get through.
+
+    It comes to stay in the last one as soon as it can.
+    """
     free = [end for begin, end in _free(blocked.get(0)) if begin <= begun <= end]
     reached = [_Arrival(begun, end, None) for end in free]
     for k in range(1, len(seconds)):
@@ -164,7 +167,7 @@ def _earliest(
 
 
 def passages(cells: Cells, pairs: Indices, times: Schedule) -> Passages:
-    """Who waits for whom so that no two are ever too near, however late any of them is.
+    """Return who waits for whom so that no two are ever too near, however late any of them is.
 
     Args:
         pairs: (p, 2) cells that are too near.
@@ -183,7 +186,7 @@ def passages(cells: Cells, pairs: Indices, times: Schedule) -> Passages:
 
 
 def _growing(group: Indices, values: FloatArray) -> Indices:
-    """Rows whose value is greater than all before it in the same group; groups are together."""
+    """Return rows whose value is greater than all before it in its group; groups are contiguous."""
     if not len(group):
         return np.empty(0, dtype=np.intp)
     number = np.cumsum(np.diff(group, prepend=group[0]) != 0)

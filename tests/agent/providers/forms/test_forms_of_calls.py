@@ -7,7 +7,7 @@ import pytest
 from formup.agent.messages import Result, User
 from formup.agent.model import Request
 from formup.agent.providers.anthropic import Anthropic
-from formup.agent.providers.calls import arguments_of, calls_in_text, tool_meant
+from formup.agent.providers.calls import arguments_of, calls_in_text, find_tool
 from formup.agent.providers.gemini import Gemini
 from formup.agent.providers.openai_chat import OpenAIChat
 from formup.agent.providers.openai_responses import OpenAIResponses
@@ -68,7 +68,7 @@ def as_object(name: str, body: Any, arguments: dict[str, Any]) -> Any:
 
 
 def test_words_stay_words_and_needed_nulls_stay() -> None:
-    look, propose = tool_meant("segment", TOOLS), tool_meant("propose_formation", TOOLS)
+    look, propose = find_tool("segment", TOOLS), find_tool("propose_formation", TOOLS)
     assert arguments_of({"label": '{"a": 1}', "id": "[1]"}, look) == {
         "label": '{"a": 1}',
         "id": "[1]",
@@ -122,7 +122,7 @@ OTHERS = [
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_names_are_not_a_tools(name: str) -> None:
-    assert tool_meant(name, TOOLS) is None
+    assert find_tool(name, TOOLS) is None
 
 
 LOOK = '{"name": "look", "arguments": {}}'
