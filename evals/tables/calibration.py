@@ -1,4 +1,4 @@
-"""Models that write coordinates alone, each in the frame it writes them in, or why not tabled."""
+"""The frames of models that write coordinates alone, or why such a model cannot be tabled."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,10 +10,12 @@ from .definition import Entry
 
 
 def in_own_frame(entry: Entry, folder: Path) -> Entry:
-    """The entry with the frame of its model, which is asked for five marks once in a run.
+    """Return the entry with the frame of its model, which is asked for five marks once in a run.
+
+    If no known frame fits, the entry loses its method and its row says why (`missing`).
 
     Args:
-        entry: of any method; those whose model alone sees the picture are looked at.
+        entry: of any method; only models that write coordinates alone are calibrated.
         folder: of the run.
     """
     arm = entry.arm
