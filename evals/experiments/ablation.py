@@ -1,7 +1,7 @@
-"""The tools less one part of what they do, to see what it is worth: in the evaluation alone.
+"""The tools without one part of what they do, to see what it is worth; only for evaluation.
 
-They go by the same names and schemas. What is not certified reaches no fleet: where it was planned
-is taken for where it was observed, and nothing moves.
+Their names and schemas stay the same. A plan that is not certified reaches no fleet: the planned
+positions are taken for observed ones, and nothing moves.
 """
 
 from dataclasses import replace
@@ -17,12 +17,12 @@ from ...tools.fleet.arrival import Arrival
 from ...tools.tool import Tool, ToolFunction, ToolResult
 
 Part = Literal["certificate", "doubts", "look"]
-"""The certificate of a formation, the doubts of a contract, the look at an outline before robots
-move."""
+"""The certificate of a formation, the doubts about a contract, or the look at an outline before
+robots move."""
 
 
 def tools_without(part: Part | None) -> tuple[Tool, ...]:
-    """All tools, those that a part is in without it."""
+    """Return all tools, with the part left out of those that have it."""
     changed: dict[Part | None, dict[str, ToolFunction]] = {
         "certificate": {propose_formation.name: _uncertified, deploy.name: _placed},
         "doubts": {propose_formation.name: _undoubted},
@@ -33,7 +33,7 @@ def tools_without(part: Part | None) -> tuple[Tool, ...]:
 
 
 async def _done(tool: Tool, context: Context, given: dict[str, Any]) -> ToolResult:
-    """What a tool of formup's own gives back."""
+    """Call one of formup's own tools and return its result."""
     made = tool.function(context, **given)
     made = await made if isawaitable(made) else made
     assert isinstance(made, ToolResult)
@@ -41,7 +41,7 @@ async def _done(tool: Tool, context: Context, given: dict[str, Any]) -> ToolResu
 
 
 async def _uncertified(context: Context, **given: Any) -> ToolResult:
-    """A proposal of which the model hears no finding."""
+    """Propose a formation; the model is told that it is certified, whatever was found."""
     made = await _done(propose_formation, context, given)
     if made.data["certified"]:
         return made
@@ -51,7 +51,7 @@ async def _uncertified(context: Context, **given: Any) -> ToolResult:
 
 
 async def _placed(context: Context, **given: Any) -> ToolResult:
-    """A deployment of what is certified, and else what is planned, taken as observed."""
+    """Deploy a plan that is certified; else take its planned positions for observed ones."""
     node = context.world.plans.get(given["plan_id"] or context.proposed or "")
     if node is None or node.plan.verdict.certified or not context.settings.may_deploy:
         return await _done(deploy, context, given)
@@ -73,7 +73,7 @@ async def _placed(context: Context, **given: Any) -> ToolResult:
 
 
 async def _undoubted(context: Context, **given: Any) -> ToolResult:
-    """A proposal whose contract is taken for what the words say."""
+    """Propose a formation, with its contract taken for what the words say."""
     try:
         return await _done(propose_formation, context, given)
     except ToolError as error:
@@ -85,7 +85,7 @@ async def _undoubted(context: Context, **given: Any) -> ToolResult:
 
 
 def _unlooked(tool: Tool) -> ToolFunction:
-    """A tool whose first certified plan is carried out, whatever its outlines look like."""
+    """Return a tool whose first certified plan is carried out, whatever its outlines look like."""
 
     async def function(context: Context, **given: Any) -> ToolResult:
         made = await _done(tool, context, given)

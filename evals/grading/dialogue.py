@@ -1,7 +1,7 @@
-"""Grades a turn of a dialogue: whether it was right to act, ask or only answer, and what changed.
+"""Grading of a dialogue's turn: whether it was right to act, ask or only answer; what changed.
 
-States are compared as they stand, robots by their ids, on true outlines; no sentence is judged but
-by the numbers and names in it. What a turn was to leave alone must be as it was, to the plan's id.
+States are compared on true outlines, robots by their ids; sentences are judged only by the numbers
+and names in them. What a turn was to leave alone must be unchanged, down to the plan's id.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,26 +24,26 @@ STATUSES: Mapping[str, tuple[Status, ...]] = {
     "refuse": ("question", "impossible", "answered"),
     "go": ("deployed",),
 }
-"""By what is expected of a turn: a new plan, a change of the one that stands, an earlier one, words
-alone, a question, a sentence that says why not, motion."""
+"""Right statuses by what is expected of a turn: a new plan, a change of the current one, an earlier
+one, words alone, a question, a sentence that says why not, motion."""
 STILL = ("answer", "ask", "refuse")
 """Turns that change nothing."""
 BACK = "turn"
-"""Names the turn whose plan stands again."""
+"""Key of the turn whose plan becomes the current one again."""
 LONGEST = 300
-"""Characters of what is wrong with a turn."""
+"""Most characters of what is wrong with a turn."""
 ARRIVED = 2.0
-"""Observed this near to its place, px."""
+"""A robot observed this near to its place, px, has arrived."""
 
 
 @dataclass(frozen=True)
 class TurnGrade:
-    """A turn, judged.
+    """The grade of a turn.
 
     Attributes:
-        problems: what is wrong; none where it is right.
+        problems: what is wrong; none if it is right.
         still: whether it was to leave everything alone.
-        kept: whether it did; true where it was not to.
+        kept: whether nothing was changed that it was to leave alone.
     """
 
     problems: tuple[str, ...]
@@ -105,8 +105,11 @@ def _by_kind(turn: Turn, case: Case) -> Iterator[str]:
 
 
 def _new(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
-    """What holds of every new plan; an edit is of one that stood (a correction may be of an earlier
-    one) and keeps robots' ids."""
+    """Yield what is wrong with a new plan.
+
+    An edit must be of a plan that stood (a correction may be of an earlier one) and keep the ids of
+    robots.
+    """
     before, after = case.before, case.after
     if after.plan_id == before.plan_id:
         yield "the plan is the same as before"
@@ -139,7 +142,7 @@ def _off(observed: FloatArray, places: FloatArray) -> float:
 
 
 def summary(grades: Sequence[TurnGrade], turns: Sequence[Turn]) -> str:
-    """What was wrong turn by turn, a line each."""
+    """Return what was wrong, one line for each turn that was."""
     pairs = enumerate(zip(turns, grades, strict=True), start=1)
     return "".join(
         f"\n  turn {i} {turn.words!r}: {'; '.join(grade.problems)[:LONGEST]}"

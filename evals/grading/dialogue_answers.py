@@ -1,4 +1,4 @@
-"""Whether the numbers that a sentence must hold are in it, each worked out on true outlines."""
+"""Check that a sentence has the numbers it must have, each computed on true outlines."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -15,10 +15,11 @@ PX, SHARE = 3.0, 0.15
 
 
 def says(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
-    """What the message must hold.
+    """Yield what the message lacks of what it must contain.
 
-    number: it; robots: how many there are; distance: how far a robot is from its thing; gap: the
-    widest; nearest: the robot nearest to a thing; closed: yes or no; words: these, in any case.
+    number: that number; robots: how many there are; distance: how far a robot is from its thing;
+    gap: the widest; nearest: the robot nearest to a thing; closed: yes or no; words: these, in
+    upper or lower case.
     """
     text = case.after.message
     numbers = [float(n.replace(",", "")) for n in _NUMBER.findall(text)]
@@ -45,7 +46,7 @@ LENGTHS = ("distance", "gap")
 
 
 def _is(told: float, right: float, scale: float | None, *, exact: bool) -> bool:
-    """Whether a number is the one wanted: a length in px, or in metres where there is a scale."""
+    """Return whether a number is the right one: a length in px, or in metres if there's a scale."""
     if exact:
         return abs(told - right) < 1e-6
     near = [abs(told - right) <= max(PX, SHARE * right)]
@@ -64,6 +65,6 @@ def _lengths(case: Case, name: str, value: Any) -> float:
 
 
 def _nearest(case: Case, thing: str) -> list[str]:
-    """Robots that are nearest to a thing, ties within the slack of an outline."""
+    """Return the robots nearest to a thing, with ties within the slack of an outline."""
     far = distances_to(case.things[thing], case.after.positions)
     return [r for r, d in zip(case.after.robots, far, strict=True) if d <= np.min(far) + PX]

@@ -1,7 +1,7 @@
-"""Fits what the built-in segmenter's cues come to: `python -m formup.evals.perception.fit`.
+"""Fit of the built-in segmenter's confidence to its cues: `python -m formup.evals.perception.fit`.
 
 Logistic regression of whether a mask is right, with weights of 0 or more: no cue that is high
-speaks against a mask. It prints, from fits that leave the picture out, how well it does.
+speaks against a mask. It prints, from fits that leave the picture out, how reliable it is.
 """
 
 import json
@@ -24,11 +24,11 @@ CUES = {
     "outline": ("path_agreement", "agreement", "colour_separation", "prompt_fit", "compactness"),
 }
 RIDGE = 0.3
-"""How strongly weights are held small."""
+"""Strength of the ridge penalty on the weights."""
 
 
 def fitted(cues: FloatArray, right: FloatArray) -> FloatArray:
-    """The constant and the weights (k + 1,) of least loss.
+    """Return the constant and the weights (k + 1,) of least loss.
 
     Args:
         cues: (n, k), 0 to 1.
@@ -48,7 +48,7 @@ def fitted(cues: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def left_out(samples: Sequence[Sample], cues: FloatArray, right: FloatArray) -> FloatArray:
-    """The likelihood (n,) of each from a fit without its picture."""
+    """Return how likely each sample is right, (n,), from a fit without its picture."""
     pictures, likely = np.array([s.picture for s in samples]), np.zeros(len(samples))
     for picture in np.unique(pictures):
         out = pictures == picture
@@ -58,7 +58,7 @@ def left_out(samples: Sequence[Sample], cues: FloatArray, right: FloatArray) -> 
 
 
 def fit(mode: Mode) -> dict[str, float]:
-    """The weights of a way of pointing; prints how reliable the likelihoods are."""
+    """Return the weights of a way of pointing, and print how reliable the likelihoods are."""
     segmenter = GrabCutSegmenter()
     found = [s for suite in SUITES for s in measured(suite, mode, segmenter) if s.cues]
     cues = np.array([[s.cues.get(name, 1.0) for name in CUES[mode]] for s in found])

@@ -258,7 +258,10 @@ def _many(
 def _choices_for(
     random: Generator, solid: list[Choice], kind: str, count: int
 ) -> list[Choice] | None:
-    """Choose what each thing is, with those that the reference names unique in what it names."""
+    """Choose what each thing is.
+
+    The first is unique in what the kind names; none can be taken for one that the reference names.
+    """
     pool = [_some(random, solid) for _ in range(int(random.integers(2, 5)))]
     nouns, colours = {c[0].noun for c in pool if c}, {c[1] for c in pool if c}
     mixed = [c for c in solid if c[0].noun in nouns and c[1] in colours]

@@ -26,7 +26,7 @@ DEPLOYED: tuple[Status, ...] = ("deployed",)
 
 
 def read_entries(path: Path, entries: Any = None) -> list[Entry]:
-    """Return the entries of a file in the photos' format, checked; or those given, as if from it.
+    """Read and validate the entries of a file in the photos' format, or those given instead.
 
     Raises:
         InputError: no such file, not JSON, it breaks the schema, or a picture is missing.
@@ -92,8 +92,8 @@ def task_of(
         split: the one that the family is in.
         must_pass: whether it always succeeds.
 
-        Raises:
-            InputError: it names a thing that is not in the picture, or metres without a scale.
+    Raises:
+        InputError: it names a thing that is not in the picture, or metres without a scale.
     """
     expects: tuple[Status, ...] = tuple(task.get("expects", DEPLOYED))
     drawn = re.fullmatch(r"scene_([0-9]{6,})\.png", entry["image"]) if root == Path() else None

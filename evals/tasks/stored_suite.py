@@ -121,7 +121,7 @@ def join_stored(folders: Sequence[Path], into: Path) -> None:
 
 
 def _seen_from(folder: Path, picture: RenderedPicture) -> RenderedPicture:
-    """Return the path relative to the folder if inside it, as that may be moved; else absolute."""
+    """Return it with a path relative to the folder, which may be moved, or absolute if outside."""
     path = picture.path
     inside = path.is_relative_to(folder)
     return RenderedPicture(path.relative_to(folder) if inside else path.resolve(), picture.pixels)

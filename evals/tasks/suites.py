@@ -53,8 +53,8 @@ def load_suite(name: str, split: str | None = None, seeds: str | None = None) ->
         split: the only one whose tasks are read; None for all.
         seeds: a range A-B, or A, instead of the seeds of a suite of drawn scenes.
 
-        Raises:
-            InputError: there is none, it breaks the schema, or it has no such split or seeds.
+    Raises:
+        InputError: there is none, it breaks the schema, or it has no such split or seeds.
     """
     if split is not None and split not in SPLITS:
         raise InputError(f"Unknown split {split!r}. There are: {', '.join(SPLITS)}.")
