@@ -1,8 +1,8 @@
 """The gate for replacing an old version: pass, block, or inconclusive, which is not a pass.
 
 Non-inferiority: a version passes if it is shown to be no worse than the margin, and is blocked if
-it is shown to be worse. "Shown" is a one-sided bound at 95 % on new tasks, for success, invalid
-output and tokens alike, so that versions that are equal are hardly ever blocked.
+it is shown to be worse than that. "Shown" is a one-sided bound at 95 % on new tasks, for success,
+invalid output and tokens alike, so that versions that are equal are hardly ever blocked.
 """
 
 from collections.abc import Sequence
