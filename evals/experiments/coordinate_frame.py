@@ -75,7 +75,7 @@ class Frame(BaseModel, frozen=True):
 PIXELS = Frame()
 
 
-class Calibrated(BaseModel):
+class Calibration(BaseModel):
     """The frame of a model, and the largest error of its marks as a share of the diagonal."""
 
     frame: Frame
@@ -88,22 +88,22 @@ class Calibrated(BaseModel):
 
 
 class _File(BaseModel):
-    models: dict[str, Calibrated] = {}
+    models: dict[str, Calibration] = {}
 
 
-def frame_of(written: Positions) -> Calibrated:
+def frame_of(written: Positions) -> Calibration:
     """Return the frame in which marks were written: the plainest that fits, else the nearest."""
     truth = np.array(list(MARKS.values())) * SIZE
-    found = list[Calibrated]()
+    found = list[Calibration]()
     for frame in _frames(written, truth):
         off = np.linalg.norm(np.asarray(frame.pixels(written, SIZE)) - truth, axis=1)
-        found.append(Calibrated(frame=frame, error=float(off.max() / np.hypot(*SIZE))))
+        found.append(Calibration(frame=frame, error=float(off.max() / np.hypot(*SIZE))))
         if found[-1].comparable:
             return found[-1]
     return min(found, key=lambda made: made.error)
 
 
-def calibrated(agent: Agent, model: str, folder: Path) -> Calibrated:
+def calibrate(agent: Agent, model: str, folder: Path) -> Calibration:
     """Return the frame of a model, which is asked once in each run and stored in its folder.
 
     Args:

@@ -19,7 +19,7 @@ from .pointing import Pointing
 
 
 @dataclass(frozen=True)
-class Held:
+class DialogueRecord:
     """The record of a dialogue.
 
     Attributes:
@@ -58,7 +58,7 @@ def hold(
     settings: Settings,
     pointing: Pointing,
     trace: Path | None,
-) -> Held:
+) -> DialogueRecord:
     """Say every turn of a dialogue to an agent, whatever the results of those before, and grade it.
 
     Raises:
@@ -80,7 +80,7 @@ def hold(
         after = state_of(talk.run)
         grades.append(grade_turn(turn, case_of(dialogue, states, after, task.metres_per_pixel)))
         states.append(after)
-    return Held(runs, states[1:], grades)
+    return DialogueRecord(runs, states[1:], grades)
 
 
 def state_of(run: Run) -> State:

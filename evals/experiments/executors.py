@@ -120,7 +120,7 @@ class Pool:
         try:
             self._running.add(self._pool.submit(_attempt_in_worker, trial))
         except BrokenProcessPool:
-            raise _died() from None
+            raise _pool_died_error() from None
 
     def collect(self) -> list[TrialRow]:
         """Return the rows that are done; wait for the first.
@@ -132,7 +132,7 @@ class Pool:
         try:
             return [future.result() for future in done]
         except BrokenProcessPool:
-            raise _died() from None
+            raise _pool_died_error() from None
 
     def close(self) -> None:
         """Stop the processes after the trials they are at."""
@@ -223,7 +223,7 @@ def _attempt_in_worker(trial: Trial) -> TrialRow:
     return attempt(_worker[0], trial)
 
 
-def _died() -> FormupError:
+def _pool_died_error() -> FormupError:
     return FormupError(
         "A process of the pool died, perhaps for want of memory. What was done is kept; run again "
         "to go on, with fewer workers."

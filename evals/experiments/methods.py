@@ -21,7 +21,7 @@ from .ablation import Part, tools_without
 from .coordinate_frame import PIXELS, Frame
 from .pointing import Mode, can_point
 from .rate_limiter import RateLimited, rate_limiter
-from .recordings import REPLAY, Spoken, recordings
+from .recordings import REPLAY, RecordedReplies, recordings
 from .segment_only import SEGMENT_ONLY, SegmentOnly
 from .simulated_model import SIMULATED, SimulatedModel
 from .trials import USUAL, USUAL_SEGMENTER, Arm, Trial, canonical
@@ -128,7 +128,7 @@ class Method:
         name = self.model if recording is None else f"{REPLAY}{recording}"
         model: str | Model = SimulatedModel(seed) if name == SIMULATED else name
         if recording is not None and self.without:  # tools no longer answer as they were recorded
-            model = Spoken(recording)
+            model = RecordedReplies(recording)
         url = self.base_url if isinstance(model, str) and model != "offline" else None
         if self.name in WRITERS and name in ("offline", SIMULATED):
             raise InputError(f"{name} writes no coordinates alone; --model takes another.")

@@ -65,13 +65,13 @@ class Recordings:
         return int(turn.data["settings"].get("seed", 0))
 
 
-class Spoken(ReplayModel):
+class RecordedReplies(ReplayModel):
     """The recorded replies in turn, whatever is said in between; plan ids become the new ones."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         lines = [event.data for event in read_events(path) if event.kind == "message"]
-        self._said = read_messages(lines, None)
+        self._recorded = read_messages(lines, None)
 
     async def reply(self, request: Request) -> Reply:
         """Return the next recorded reply.
@@ -80,15 +80,15 @@ class Spoken(ReplayModel):
             ModelError: there is none at this place in the conversation.
         """
         count = len(request.messages)
-        said = self._said[count] if count < len(self._said) else None
-        if not isinstance(said, Reply):
+        recorded = self._recorded[count] if count < len(self._recorded) else None
+        if not isinstance(recorded, Reply):
             raise ModelError("The recorded replies fit no more.")
         named = {
             old: new
-            for then, now in zip(self._said, request.messages, strict=False)
+            for then, now in zip(self._recorded, request.messages, strict=False)
             for old, new in zip(PLAN.findall(then.text), PLAN.findall(now.text), strict=False)
         }
-        line = said.model_dump_json()
+        line = recorded.model_dump_json()
         return Reply.model_validate_json(PLAN.sub(lambda m: named.get(m[0], m[0]), line))
 
 

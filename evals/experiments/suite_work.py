@@ -22,7 +22,7 @@ from ..grading.grades import VERSION, Graded
 from ..grading.policies import POLICIES, positions
 from ..rl.policy import RL, places
 from ..tasks.task import Dialogue, Task
-from .dialogue_work import Held, hold
+from .dialogue_work import DialogueRecord, hold
 from .methods import WRITERS, Method
 from .pointing import Pointing, pointing
 from .recordings import file_name, recordings
@@ -258,7 +258,7 @@ def _write(path: Path, attempt: Attempt, graded: Graded, run: Run | None) -> Non
     write_whole(path, canonical(content))
 
 
-def _write_dialogue(path: Path, held: Held, dialogue: Dialogue) -> None:
+def _write_dialogue(path: Path, held: DialogueRecord, dialogue: Dialogue) -> None:
     """Write a dialogue in the form of an attempt: the state at its end, and all turns beside it."""
     last = held.states[-1]
     problems = summary(held.grades, dialogue.turns)

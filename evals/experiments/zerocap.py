@@ -17,7 +17,7 @@ ZEROCAP = "zerocap"
 OBJECT, PLACES = "zerocap-object", "zerocap-places"
 """The prompts of the two stages."""
 CALLED = tuple(tool for tool in TOOLS if tool.name in ("segment", "describe_shape"))
-TOLD = ("Robots", "Picture", "Metres per pixel")
+PLANNER_LINES = ("Robots", "Picture", "Metres per pixel")
 """Lines of the first message that the planner is given unchanged."""
 INSUFFICIENT = json.dumps({"positions": [], "reason": "Insufficient segmentation accuracy."})
 LONGEST = 60
@@ -64,9 +64,9 @@ class ZeroCap:
         looked = rest[0]
         assert isinstance(looked, Reply)
         pattern = json.dumps(json_object(looked.text).get("pattern"), ensure_ascii=False)
-        facts = [line for line in first.text.split("\n") if line.partition(":")[0] in TOLD]
-        told = User(text="\n".join([f"Pattern: {pattern}", *facts, f"Shape: {last.text}"]))
-        return await self._planner.reply(Request(self._place.render(), (told,), ()))
+        facts = [line for line in first.text.split("\n") if line.partition(":")[0] in PLANNER_LINES]
+        message = User(text="\n".join([f"Pattern: {pattern}", *facts, f"Shape: {last.text}"]))
+        return await self._planner.reply(Request(self._place.render(), (message,), ()))
 
     async def aclose(self) -> None:
         """Close what either model keeps open."""

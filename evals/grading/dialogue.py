@@ -63,7 +63,7 @@ def grade_turn(turn: Turn, case: Case) -> TurnGrade:
     if after.status not in wanted:
         said = f"{after.status}, {' or '.join(wanted)} was right: {after.message}"
         return TurnGrade((*changed, said), still, kept)
-    problems = [*changed, *_by_kind(turn, case)]
+    problems = [*changed, *_expectation_problems(turn, case)]
     if not problems:
         problems = [
             p
@@ -81,7 +81,7 @@ def _changes(before: State, after: State) -> Iterator[str]:
         yield "robots have other places than before"
 
 
-def _by_kind(turn: Turn, case: Case) -> Iterator[str]:
+def _expectation_problems(turn: Turn, case: Case) -> Iterator[str]:
     before, after, checks = case.before, case.after, turn.checks
     if turn.expect in STILL:
         if not after.message.strip():
@@ -90,21 +90,21 @@ def _by_kind(turn: Turn, case: Case) -> Iterator[str]:
     if after.plan_id is None:
         yield "there is no plan"
         return
-    yield from _sound(case)
+    yield from _placement_problems(case)
     if turn.expect == "go":
         if after.plan_id != before.plan_id:
             yield f"another plan was driven to than {before.plan_id}"
-        if after.observed is None or _off(after.observed, before.positions) > ARRIVED:
+        if after.observed is None or _largest_offset(after.observed, before.positions) > ARRIVED:
             yield "robots were not observed at the places of the plan"
     elif turn.expect == "back":
         then = case.past[int(checks[BACK])]
         if after.plan_id != then.plan_id or not same_places(after, then):
             yield f"the plan is not that of turn {checks['turn']}, {then.plan_id}"
     else:
-        yield from _new(turn.expect, case, {"robots", "ids", "leave"} & checks.keys())
+        yield from _new_plan_problems(turn.expect, case, {"robots", "ids", "leave"} & checks.keys())
 
 
-def _new(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
+def _new_plan_problems(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
     """Yield what is wrong with a new plan.
 
     An edit must be of a plan that stood (a correction may be of an earlier one) and keep the ids of
@@ -123,7 +123,7 @@ def _new(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
         yield f"the robots are {', '.join(after.robots)}, not {', '.join(before.robots)}"
 
 
-def _sound(case: Case) -> Iterator[str]:
+def _placement_problems(case: Case) -> Iterator[str]:
     points, (width, height) = case.after.positions, case.size
     if not len(points):
         yield "nobody is placed"
@@ -135,7 +135,7 @@ def _sound(case: Case) -> Iterator[str]:
         yield "two robots share a place"
 
 
-def _off(observed: FloatArray, places: FloatArray) -> float:
+def _largest_offset(observed: FloatArray, places: FloatArray) -> float:
     if observed.shape != places.shape:
         return np.inf
     return float(np.linalg.norm(observed - places, axis=1).max())

@@ -37,7 +37,8 @@ def says(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
         else:
             length = _lengths(case, name, value)
             if not any(
-                _is(told, length, case.scale, exact=name not in LENGTHS) for told in numbers
+                _matches(number, length, case.scale, exact=name not in LENGTHS)
+                for number in numbers
             ):
                 yield f"{length:.1f} is not in {text!r}"
 
@@ -45,13 +46,13 @@ def says(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
 LENGTHS = ("distance", "gap")
 
 
-def _is(told: float, right: float, scale: float | None, *, exact: bool) -> bool:
+def _matches(number: float, right: float, scale: float | None, *, exact: bool) -> bool:
     """Return whether a number is the right one: a length in px, or in metres if there's a scale."""
     if exact:
-        return abs(told - right) < 1e-6
-    near = [abs(told - right) <= max(PX, SHARE * right)]
+        return abs(number - right) < 1e-6
+    near = [abs(number - right) <= max(PX, SHARE * right)]
     if scale is not None:
-        near.append(abs(told - right * scale) <= max(PX * scale, SHARE * right * scale))
+        near.append(abs(number - right * scale) <= max(PX * scale, SHARE * right * scale))
     return any(near)
 
 

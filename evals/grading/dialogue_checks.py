@@ -15,8 +15,8 @@ from ...tools.geometry.outline import FloatArray
 from .dialogue_answers import says
 from .dialogue_forms import (
     angle_off,
-    arranged,
     box_direction,
+    form_problems,
     gaps_around,
     neighbour_distance,
     way_of,
@@ -52,8 +52,8 @@ def robots(case: Case, wanted: int | str) -> Iterator[str]:
     right = {"more": count > was, "fewer": count < was, "any": True}
     if not right.get(str(wanted), count == wanted):
         yield f"{count} robots after {was}, not {wanted}"
-    elif len(case.kept) < min(was, count):
-        yield f"only {len(case.kept)} robots kept their ids"
+    elif len(case.remaining) < min(was, count):
+        yield f"only {len(case.remaining)} robots kept their ids"
 
 
 def ids(case: Case, wanted: Sequence[int]) -> Iterator[str]:
@@ -71,7 +71,7 @@ def leave(case: Case, wanted: Sequence[int]) -> Iterator[str]:
 
 def stay(case: Case, wanted: Any) -> Iterator[str]:
     """Check that robots have not moved: those given, or all that were and still are there."""
-    for name in _numbered(wanted, case.kept):
+    for name in _numbered(wanted, case.remaining):
         if name not in case.after.at:
             yield f"robot {name} is gone"
         elif (far := float(np.linalg.norm(case.moved(name)))) > UNMOVED:
@@ -81,9 +81,9 @@ def stay(case: Case, wanted: Any) -> Iterator[str]:
 def move(case: Case, wanted: Sequence[int]) -> Iterator[str]:
     """Check that these robots have moved, and no others."""
     moving = [str(name) for name in wanted]
-    yield from stay(case, [name for name in case.kept if name not in moving])
+    yield from stay(case, [name for name in case.remaining if name not in moving])
     for name in moving:
-        if name not in case.kept or float(np.linalg.norm(case.moved(name))) <= UNMOVED:
+        if name not in case.remaining or float(np.linalg.norm(case.moved(name))) <= UNMOVED:
             yield f"robot {name} was to move"
 
 
@@ -97,8 +97,8 @@ def at(case: Case, wanted: Mapping[int, Sequence[float]]) -> Iterator[str]:
 
 def shift(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
     """Check that robots went `by` [dx, dy], or `towards` a side, degrees or a thing, `least` px."""
-    for name in _numbered(wanted.get("robots", "all"), case.kept):
-        if name not in case.kept:
+    for name in _numbered(wanted.get("robots", "all"), case.remaining):
+        if name not in case.remaining:
             yield f"robot {name} is gone"
             continue
         way = case.moved(name)
@@ -118,7 +118,7 @@ def shift(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
 def swap(case: Case, wanted: Sequence[int]) -> Iterator[str]:
     """Check that two robots have each other's place, and no others moved."""
     a, b = (str(name) for name in wanted)
-    yield from stay(case, [name for name in case.kept if name not in (a, b)])
+    yield from stay(case, [name for name in case.remaining if name not in (a, b)])
     for one, other in ((a, b), (b, a)):
         here, there = case.after.at.get(one), case.before.at.get(other)
         if here is None or there is None or float(np.linalg.norm(here - there)) > UNMOVED:
@@ -263,7 +263,7 @@ def without(case: Case, wanted: str) -> Iterator[str]:
 
 def turned(case: Case, wanted: Sequence[float]) -> Iterator[str]:
     """Check that robots turned about the thing or their middle by [low, high] degrees clockwise."""
-    names = case.kept
+    names = case.remaining
     now, was = (np.array([s.at[name] for name in names]) for s in (case.after, case.before))
     angles = list[float]()
     for about in (was.mean(0), *(t.outline.centre for t, _ in case.rings())):
@@ -298,7 +298,7 @@ def size(case: Case, wanted: Sequence[float]) -> Iterator[str]:
 
 def form(case: Case, wanted: str) -> Iterator[str]:
     """Check the form: inside, around, corners, centre of each thing; between two; line, circle."""
-    return arranged(case, wanted)
+    return form_problems(case, wanted)
 
 
 def heading(case: Case, wanted: Any) -> Iterator[str]:

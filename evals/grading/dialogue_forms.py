@@ -12,7 +12,7 @@ from shapely.geometry import Polygon
 from ...tools.geometry.outline import FloatArray
 from ..tasks.task import Thing
 from .dialogue_states import Case, State, distances_to
-from .slots import matched
+from .slots import match_slots
 
 SIDES = {"left": (-1, 0), "right": (1, 0), "top": (0, -1), "bottom": (0, 1)}
 GATHERED = 0.5
@@ -94,18 +94,18 @@ def neighbour_distance(state: State) -> float:
     return float((apart + np.eye(len(points)) * 1e9).min(axis=1).mean())
 
 
-def arranged(case: Case, form: str) -> Iterator[str]:
+def form_problems(case: Case, form: str) -> Iterator[str]:
     """Yield what keeps robots from standing inside, around, at the corners, ... of their things."""
     if form in BY_THEMSELVES:
         yield from BY_THEMSELVES[form](case)
         return
     for thing, points in case.rings():
-        problem = _wrong(form, thing, points)
+        problem = _form_problem(form, thing, points)
         if problem:
             yield f"{problem} of the {thing.name}: the form {form} is wanted"
 
 
-def _wrong(form: str, thing: Thing, points: FloatArray) -> str:
+def _form_problem(form: str, thing: Thing, points: FloatArray) -> str:
     off = distances_to(thing, points)
     if form == "inside":
         return f"{int((off > BORDER).sum())} robots are out" if (off > BORDER).any() else ""
@@ -119,7 +119,7 @@ def _wrong(form: str, thing: Thing, points: FloatArray) -> str:
     if form == "around":
         return "" if gaps_around(thing, points).winds else "robots do not go round the middle"
     box = shapely.get_coordinates(shapely.minimum_rotated_rectangle(thing.region))[:4]
-    held = set(matched(points, box, CORNER * thing.outline.size).tolist()) - {-1}
+    held = set(match_slots(points, box, CORNER * thing.outline.size).tolist()) - {-1}
     return "" if len(held) >= min(4, len(points)) else f"robots are at {len(held)} corners"
 
 

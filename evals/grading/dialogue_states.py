@@ -74,7 +74,7 @@ class Case:
         return self.past[-1]
 
     @cached_property
-    def kept(self) -> list[str]:
+    def remaining(self) -> list[str]:
         """Ids of robots that were there before and still are."""
         return [name for name in self.before.robots if name in self.after.at]
 

@@ -8,7 +8,7 @@ from shapely.geometry import LineString, Polygon
 from ...tools.geometry.outline import FloatArray, distances
 from ..tasks.task import Goal
 from .grades import EVEN, STRICT_SHARE, Part
-from .slots import even_along, matched
+from .slots import even_along, match_slots
 
 OFF = 0.1
 """Strict: least distance of a robot at a corner from the target, as a share of the tolerance."""
@@ -21,14 +21,14 @@ def corners(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     near = distances(goal.target.region, points)
     stands = free & (near > 0) & (near >= rule.get("min_clearance_px", 0))
     held = np.full(len(points), -1, dtype=np.intp)
-    held[stands] = matched(points[stands], slots, most)
+    held[stands] = match_slots(points[stands], slots, most)
     problems = list[str]()
     empty = len(slots) - int((held >= 0).sum())
     if empty:
         problems.append(f"{empty} of {len(slots)} corners without a robot within {most} px")
     if (near <= 0).any():
         problems.append(f"{int((near <= 0).sum())} on the target")
-    strictly = matched(points[stands & (near >= OFF * most)], slots, STRICT_SHARE * most)
+    strictly = match_slots(points[stands & (near >= OFF * most)], slots, STRICT_SHARE * most)
     short = len(slots) - int((strictly >= 0).sum())
     strict = (f"{short} corners not held within {STRICT_SHARE * most:.0f} px",) if short else ()
     return Part(held >= 0, 1.0, tuple(problems), strict)

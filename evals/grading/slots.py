@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from ...tools.geometry.outline import FloatArray
 
 
-def matched(points: FloatArray, slots: FloatArray, tolerance: float) -> NDArray[np.intp]:
+def match_slots(points: FloatArray, slots: FloatArray, tolerance: float) -> NDArray[np.intp]:
     """Match as many pairs within the tolerance as possible, with the least total distance.
 
     Args:

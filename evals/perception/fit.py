@@ -27,7 +27,7 @@ RIDGE = 0.3
 """Strength of the ridge penalty on the weights."""
 
 
-def fitted(cues: FloatArray, right: FloatArray) -> FloatArray:
+def fit_weights(cues: FloatArray, right: FloatArray) -> FloatArray:
     """Return the constant and the weights (k + 1,) of least loss.
 
     Args:
@@ -47,12 +47,14 @@ def fitted(cues: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x)
 
 
-def left_out(samples: Sequence[Sample], cues: FloatArray, right: FloatArray) -> FloatArray:
+def held_out_likelihoods(
+    samples: Sequence[Sample], cues: FloatArray, right: FloatArray
+) -> FloatArray:
     """Return how likely each sample is right, (n,), from a fit without its picture."""
     pictures, likely = np.array([s.picture for s in samples]), np.zeros(len(samples))
     for picture in np.unique(pictures):
         out = pictures == picture
-        constant, *weights = fitted(cues[~out], right[~out])
+        constant, *weights = fit_weights(cues[~out], right[~out])
         likely[out] = 1 / (1 + np.exp(-(constant + cues[out] @ weights)))
     return likely
 
@@ -63,9 +65,9 @@ def fit(mode: Mode) -> dict[str, float]:
     found = [s for suite in SUITES for s in measured(suite, mode, segmenter) if s.cues]
     cues = np.array([[s.cues.get(name, 1.0) for name in CUES[mode]] for s in found])
     right = np.array([float(s.overlap >= confidence.RIGHT) for s in found])
-    for line in reliability(left_out(found, cues, right), right):
+    for line in reliability(held_out_likelihoods(found, cues, right), right):
         print(mode, line)  # noqa: T201
-    constant, *weights = (round(float(w), 3) for w in fitted(cues, right))
+    constant, *weights = (round(float(w), 3) for w in fit_weights(cues, right))
     return {"constant": constant, **dict(zip(CUES[mode], weights, strict=True))}
 
 

@@ -9,7 +9,7 @@ from PIL import Image
 
 from ...tools.errors import ImageError
 from ...tools.perception.image import load_picture
-from ..tasks.rendered_pictures import RenderedPicture, hashed
+from ..tasks.rendered_pictures import RenderedPicture, pixel_hash
 from ..tasks.stored_suite import StoredSuite
 from ..tasks.task import Task
 
@@ -59,7 +59,7 @@ def _page_picture(folder: Path, source: RenderedPicture, task: Task, name: str) 
         picture = load_picture(folder / source.path)
     except ImageError:
         return PagePicture("", _extent(task))
-    if hashed(picture) != source.pixels:
+    if pixel_hash(picture) != source.pixels:
         return PagePicture("", picture.size)
     image = Image.fromarray(picture.pixels)
     image.thumbnail((LONG, LONG), Image.Resampling.LANCZOS)

@@ -13,7 +13,7 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from ..grading.slots import matched
+from ..grading.slots import match_slots
 from ..tasks.task import Goal, Task
 from .pictures import PagePicture
 from .run_folder import StoredAttempt
@@ -127,7 +127,7 @@ def _rule_slots(goal: Goal, attempt: StoredAttempt | None) -> list[Slot]:
     if attempt is not None:
         standing = zip(attempt.observed or (), attempt.right, strict=True)
         robots = np.asarray([point for point, right in standing if right]).reshape(-1, 2)
-        taken = matched(robots, places, most) if len(robots) else np.array([], dtype=np.intp)
+        taken = match_slots(robots, places, most) if len(robots) else np.array([], dtype=np.intp)
         held = np.isin(np.arange(len(places)), taken)
     return [
         Slot(x, y, most, full) for (x, y), full in zip(places.tolist(), held.tolist(), strict=True)

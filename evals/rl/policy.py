@@ -87,7 +87,7 @@ class Trained:
         return [category for category in CATEGORIES if category in found]
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Description in words, for the heading of a row."""
         sizes = " and ".join(sorted({str(c.robots) for c in self.checkpoints}))
         seeds = min(map(len, self.policies.values()))

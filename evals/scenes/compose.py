@@ -61,9 +61,9 @@ def compose(random: Generator, seed: int, where: Stage, kind: str, setup: str) -
     if setup == "single":
         things = _single_thing(random, where, solid)
     elif kind in HIDDEN:
-        things = _odd(random, where, solid, kind)
+        things = _place_odd_one_out(random, where, solid, kind)
     else:
-        things = _many(random, where, choices, kind)
+        things = _place_mixed(random, where, choices, kind)
     if not things:
         return None
     ground = where.ground
@@ -96,7 +96,7 @@ def _look(random: Generator, things: Sequence[Thing]) -> Look:
     )
 
 
-def _some(random: Generator, choices: Sequence[Choice]) -> Choice | None:
+def _pick(random: Generator, choices: Sequence[Choice]) -> Choice | None:
     """Choose one, each noun as likely as another; None if there are none."""
     nouns = sorted({sort.noun for sort, _ in choices})
     if not nouns:
@@ -109,7 +109,7 @@ def _some(random: Generator, choices: Sequence[Choice]) -> Choice | None:
 def _single_thing(
     random: Generator, where: Stage, solid: list[Choice]
 ) -> list[Thing] | Rows | None:
-    picked = _some(random, solid)
+    picked = _pick(random, solid)
     if picked is None:
         return None
     share = math.exp(random.uniform(math.log(0.012), math.log(0.14)))
@@ -144,12 +144,12 @@ def _arranged(
     return scatter(random, where.area, things, [base + t for t in turns], {})
 
 
-def _odd(
+def _place_odd_one_out(
     random: Generator, where: Stage, solid: list[Choice], kind: str
 ) -> list[Thing] | Rows | None:
     """Make and place things that are alike, the first one differing in what the kind names."""
     turned = kind == "askew"
-    usual = _some(random, [c for c in solid if c[0].upright or not turned])
+    usual = _pick(random, [c for c in solid if c[0].upright or not turned])
     if usual is None:
         return None
     count = int(random.integers(5, 12))
@@ -158,9 +158,9 @@ def _odd(
     sizes = size * random.uniform(0.98, 1.02, count)
     if kind == "odd_colour":
         here, own = shade(random, usual[1]), [c for c in solid if c[0] is usual[0]]
-        odd = _some(random, [c for c in own if difference(shade(random, c[1]), here) > 38])
+        odd = _pick(random, [c for c in own if difference(shade(random, c[1]), here) > 38])
     elif kind == "odd_shape":
-        odd = _some(random, [c for c in solid if _unlike(c, usual)])
+        odd = _pick(random, [c for c in solid if _unlike(c, usual)])
     elif kind == "odd_size":
         sizes[0] *= (
             random.uniform(1.45, 1.75) if random.random() < 0.6 else 1 / random.uniform(1.45, 1.7)
@@ -224,7 +224,7 @@ def _cluster(random: Generator, where: Stage, things: list[Thing]) -> list[Thing
     return [*alone, *many] if alone else None
 
 
-def _many(
+def _place_mixed(
     random: Generator, where: Stage, choices: list[Choice], kind: str
 ) -> list[Thing] | Rows | None:
     """Make and place things of a few sorts and colours, the first to be told by the kind."""
@@ -262,15 +262,15 @@ def _choices_for(
 
     The first is unique in what the kind names; none can be taken for one that the reference names.
     """
-    pool = [_some(random, solid) for _ in range(int(random.integers(2, 5)))]
+    pool = [_pick(random, solid) for _ in range(int(random.integers(2, 5)))]
     nouns, colours = {c[0].noun for c in pool if c}, {c[1] for c in pool if c}
     mixed = [c for c in solid if c[0].noun in nouns and c[1] in colours]
-    first = _some(random, [c for c in mixed if _leads(c, kind)])
+    first = _pick(random, [c for c in mixed if _can_be_target(c, kind)])
     if first is None:
         return None
-    more = [_some(random, mixed) for _ in range(_NAMED.get(kind, 0))]
+    more = [_pick(random, mixed) for _ in range(_NAMED.get(kind, 0))]
     named = [first, *filter(None, more)]
-    left = [[c for c in some if _leaves(c, first, kind)] for some in (mixed, solid)]
+    left = [[c for c in some if _can_stand_beside(c, first, kind)] for some in (mixed, solid)]
     for other in named[1:]:
         left = [[c for c in some if not _confused(c, other)] for some in left]
     rest = left[0] or left[1]
@@ -288,13 +288,13 @@ def _confused(a: Choice, b: Choice) -> bool:
     return a[0] is b[0] and (a[1] == b[1] or not a[0].by_colour)
 
 
-def _leads(choice: Choice, kind: str) -> bool:
+def _can_be_target(choice: Choice, kind: str) -> bool:
     if kind == "round":
         return make_one(choice).roundness >= 0.87
     return kind != "long" or make_one(choice).stretch >= 2.2
 
 
-def _leaves(choice: Choice, first: Choice, kind: str) -> bool:
+def _can_stand_beside(choice: Choice, first: Choice, kind: str) -> bool:
     """Return whether such a thing may be in the scene of the target."""
     if kind == "round":
         return make_one(choice).roundish <= 0.72
@@ -356,7 +356,7 @@ def _enclosed(
     random: Generator, where: Stage, choices: list[Choice], things: list[Thing], turns: list[float]
 ) -> list[Thing] | None:
     """Place the first thing within one that encloses it, the others elsewhere; None if it fails."""
-    around = _some(random, [c for c in choices if c[0].encloses])
+    around = _pick(random, [c for c in choices if c[0].encloses])
     if around is None:
         return None
     inner = things[0]

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...tools.errors import InputError
-from ..experiments.coordinate_frame import MOST, calibrated
+from ..experiments.coordinate_frame import MOST, calibrate
 from ..experiments.recordings import recordings
 from .definition import Entry
 
@@ -22,7 +22,7 @@ def in_own_frame(entry: Entry, folder: Path) -> Entry:
     if arm is None or arm.name != "alone" or recordings(arm.model):
         return entry
     try:
-        made = calibrated(arm.agent(0), arm.model, folder)
+        made = calibrate(arm.agent(0), arm.model, folder)
     except InputError as error:
         why = f"not comparable: {error}"
         return replace(entry, row=entry.row.model_copy(update={"missing": why}), arm=None)

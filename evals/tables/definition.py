@@ -161,10 +161,10 @@ def entries(
     for row in table.rows:
         count = trials or row.trials or table.trials
         if row.method == RL:
-            found += _learnt(row, checkpoints, count)
+            found += _policy_rows(row, checkpoints, count)
             taken.add(str(checkpoints))
             continue
-        chosen = [""] if row.models is None else [m for m in models if _takes(table, row, m)]
+        chosen = [""] if row.models is None else [m for m in models if _is_for_model(table, row, m)]
         taken |= {*chosen, cut.get(row.segmenter, "")}
         wants = ""
         if row.segmenter not in cut:
@@ -180,10 +180,12 @@ def entries(
             raise InputError(f"No row of this table is for the {option} {lost[0]!r}; leave it out.")
     if prompts and "prompt" not in table.factors:
         raise InputError(f"No row of this table is for the prompt {prompts[0]!r}; leave it out.")
-    return list(_varied(table, found, prompts)) if table.factors else found
+    return list(_with_ablations(table, found, prompts)) if table.factors else found
 
 
-def _varied(table: Table, found: Sequence[Entry], prompts: Sequence[str]) -> Iterator[Entry]:
+def _with_ablations(
+    table: Table, found: Sequence[Entry], prompts: Sequence[str]
+) -> Iterator[Entry]:
     """Yield the rows, each followed by those that differ from it in one factor.
 
     A recording made in two stages is compared with those made in one.
@@ -195,20 +197,20 @@ def _varied(table: Table, found: Sequence[Entry], prompts: Sequence[str]) -> Ite
         if arm is None:
             yield entry
         elif (kept := recorded[arm]) and kept.staged:
-            yield _less(entry, table.factors["stages"], arm, whole)
+            yield _ablation_of(entry, table.factors["stages"], arm, whole)
         else:
             yield entry
             for factor, head in table.factors.items():
-                for other in _changed(factor, arm, prompts):
-                    yield _less(entry, head, other, (arm,))
+                for other in _ablated_methods(factor, arm, prompts):
+                    yield _ablation_of(entry, head, other, (arm,))
 
 
-def _less(entry: Entry, head: str, arm: Method, whole: tuple[Method, ...]) -> Entry:
+def _ablation_of(entry: Entry, head: str, arm: Method, whole: tuple[Method, ...]) -> Entry:
     row = entry.row.model_copy(update={"row": f"{head} {arm.prompt or ''}".strip()})
     return replace(entry, row=row, arm=arm, whole=whole)
 
 
-def _changed(factor: Factor, arm: Method, prompts: Sequence[str]) -> list[Method]:
+def _ablated_methods(factor: Factor, arm: Method, prompts: Sequence[str]) -> list[Method]:
     """Return the methods that differ from an arm in this factor alone, if there can be any."""
     if factor in get_args(Part):
         return [replace(arm, without=factor)]
@@ -222,7 +224,7 @@ def _changed(factor: Factor, arm: Method, prompts: Sequence[str]) -> list[Method
     return [replace(arm, prompt=name) for name in prompts or before]
 
 
-def _takes(table: Table, row: Row, model: str) -> bool:
+def _is_for_model(table: Table, row: Row, model: str) -> bool:
     """Return whether a row is for a model, judged by its name, of A+B by the planner's."""
     if model == SIMULATED or model.startswith(REPLAY):
         words = REPLAY if model.startswith(REPLAY) else ""
@@ -235,13 +237,13 @@ def _takes(table: Table, row: Row, model: str) -> bool:
     return row.models in (named or [""])
 
 
-def _learnt(row: Row, folder: Path | None, trials: int) -> list[Entry]:
+def _policy_rows(row: Row, folder: Path | None, trials: int) -> list[Entry]:
     """Return the row of trained policies; unconverged ones get one without the paper's figures."""
     if folder is None:
         return [Entry(row, None, trials, f"--checkpoints DIR, which {TRAIN} --out DIR writes")]
     policies = trained(folder)
     arm = check_method(Method(RL, str(folder)))
-    own = row.model_copy(update={"row": f"{row.row}: {policies.told}"})
+    own = row.model_copy(update={"row": f"{row.row}: {policies.description}"})
     if not policies.unconverged:
         return [Entry(own, arm, trials)]
     missing = f"not run: what was trained is unconverged; {TRAIN} with more --steps trains it anew"

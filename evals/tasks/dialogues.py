@@ -18,7 +18,7 @@ from ..scenes.stories import entry_of, story_of
 from .annotations import ANNOTATIONS, PHOTOS, SCALE, Entry, read_entries
 from .task import Dialogue, Drawing, Split, Task, Thing, Turn
 
-SAID = ("say", "expect", "point", BACK)
+TURN_KEYS = ("say", "expect", "point", BACK)
 
 
 def dialogues_in(item: Entry, path: Path) -> list[Entry]:
@@ -75,7 +75,7 @@ def dialogue_task(given: Entry, category: str, split: Split) -> Task:
 
 def _turn(name: str, entry: Entry, given: Entry, things: list[Thing]) -> Turn:
     """Return a turn; a thing that it points at is added to `things` if it is new."""
-    checks: dict[str, Any] = {key: value for key, value in given.items() if key not in SAID}
+    checks: dict[str, Any] = {key: value for key, value in given.items() if key not in TURN_KEYS}
     unknown = sorted(checks.keys() - CHECKS.keys())
     if unknown or given["expect"] not in STATUSES:
         what = unknown[0] if unknown else given["expect"]

@@ -42,13 +42,13 @@ def render(
                 part = path.with_suffix(".part")
                 task.picture.image().save(part, format="PNG", compress_level=1)
                 part.replace(path)
-            found[path] = RenderedPicture(path, hashed(load_picture(path)))
+            found[path] = RenderedPicture(path, pixel_hash(load_picture(path)))
         rendered[task.id] = found[path]
         done()
     return rendered
 
 
-def hashed(picture: Picture) -> str:
+def pixel_hash(picture: Picture) -> str:
     """Return the SHA-256 of a picture's size and pixels, whatever the file's format."""
     pixels = picture.pixels
     return hashlib.sha256(repr(pixels.shape).encode() + pixels.tobytes()).hexdigest()
